@@ -1,0 +1,44 @@
+# `make demo` and `make test` need nothing but Python 3.11 or later; the rest is for developers.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: demo test check bench lock proto clean
+
+demo: $(READY)
+	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
+
+test: check
+	@$(BIN)/pytest
+
+check: $(READY)
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@$(BIN)/pyright
+	@$(BIN)/lint-imports --no-logo
+
+bench: $(VENV)/.ready-bench
+	@$(BIN)/python -m tests.bench
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v >= (3, 11) else f"$(PYTHON) is {v[0]}.{v[1]}: stickslip needs Python 3.11 or later; try make PYTHON=python3.11")'
+	@echo "setting up $(VENV) (once, about a minute)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/.ready-bench: $(READY) requirements-bench.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
+	@touch $@
+
+lock: ## needs uv
+	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes --no-annotate --no-header -o requirements.lock
+	uv pip compile pyproject.toml --extra bench --universal --python-version 3.11 --generate-hashes --no-annotate --no-header -c requirements.lock -o requirements-bench.lock
+
+proto: $(READY) ## after a change of bridge/stickslip.proto
+	$(BIN)/python -m grpc_tools.protoc -I bridge --python_out=bridge --pyi_out=bridge bridge/stickslip.proto
+
+clean:
+	rm -rf $(VENV) runs

@@ -1,0 +1,93 @@
+"""Strict configuration from TOML: a misspelt or out-of-range key is one clear line, never a default."""
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from bridge.faults import Fault
+
+
+class Strict(BaseModel):
+    """Base of every configuration table: no unknown keys, no conversion between types, immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+# two numbers; TOML has only arrays, which strictness would not take for a tuple
+Two = Annotated[tuple[float, float], Field(strict=False)]
+
+T = TypeVar("T", bound=Strict)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read one TOML file. Raises Fault CONFIG when it is missing or is not TOML."""
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise Fault("CONFIG", f"{path}: no such file; give the path of a TOML file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise Fault("CONFIG", f"{path}: not valid TOML: {error}") from None
+
+
+def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, Any]:
+    """Return `table` with `key.sub=value` settings applied; values are TOML (`1.1`, `true`, `"text"`, `[1, 2]`)."""
+    result = _copied(table)
+    for setting in settings:
+        key, separator, text = setting.partition("=")
+        if not separator:
+            raise Fault("CONFIG", f"--set {setting}: expected key=value, for example --set rig.slide.mass_kg=1.4")
+        try:
+            value = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            value = text
+        at = result
+        parts = key.strip().split(".")
+        for part in parts[:-1]:
+            at = at.setdefault(part, {})
+            if not isinstance(at, dict):
+                raise Fault("CONFIG", f"--set {setting}: {part} is a value, not a table; nothing lies below it")
+        at[parts[-1]] = value
+    return result
+
+
+def _copied(table: dict[str, Any]) -> dict[str, Any]:
+    return {key: _copied(value) if isinstance(value, dict) else value for key, value in table.items()}
+
+
+def validate(model: type[T], table: dict[str, Any], source: str) -> T:
+    """Turn a table into `model`. Raises Fault CONFIG: source: key = value: rule; remedy, one line a problem."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        raise Fault("CONFIG", "\n".join(_line(model, source, problem) for problem in error.errors())) from None
+
+
+def _line(model: type[Strict], source: str, problem: Any) -> str:
+    path = [str(part) for part in problem["loc"]]
+    key = ".".join(path) or "(file)"
+    kind: str = problem["type"]
+    if kind == "extra_forbidden":
+        known = ", ".join(_keys_beside(model, path)) or "none"
+        return f"{source}: {key} = {problem['input']!r}: unknown key; known here: {known}"
+    if kind == "missing":
+        return f"{source}: {key}: missing; add it"
+    message: str = problem["msg"].removeprefix("Value error, ")
+    if kind == "value_error":
+        return f"{source}: {key}: {message}" if path else f"{source}: {message}"
+    if kind in {"float_type", "int_type"} and isinstance(problem["input"], str):
+        return f"{source}: {key} = {problem['input']!r}: must be a number; write it without quotes"
+    rule = message[:1].lower() + message[1:]
+    rule = rule.replace("input should be", "must be")
+    return f"{source}: {key} = {problem['input']!r}: {rule}; change the value"
+
+
+def _keys_beside(model: type[Strict], path: list[str]) -> list[str]:
+    at: Any = model
+    for part in path[:-1]:
+        field = at.model_fields.get(part) if hasattr(at, "model_fields") else None
+        at = field.annotation if field else None
+    return sorted(at.model_fields) if hasattr(at, "model_fields") else []

@@ -1,0 +1,95 @@
+"""Everything that can go wrong and that a person has to act on: a short code, an exit status, a paragraph of help."""
+
+from typing import NamedTuple
+
+
+class FaultKind(NamedTuple):
+    """One row of `FAULTS`."""
+
+    code: str
+    exit_status: int
+    help: str
+
+
+FAULTS = {
+    kind.code: kind
+    for kind in (
+        FaultKind(
+            "CONFIG",
+            2,
+            "A configuration or scenario file has a key that is unknown, missing or out of range. The line names the "
+            "file, the key, its value, the rule and the remedy. Nothing was started.",
+        ),
+        FaultKind(
+            "ENDPOINT_BUSY",
+            3,
+            "The plant could not listen on the bus endpoint: another process (often an earlier run) holds the port. End "
+            "that process, or choose another port with --endpoint tcp/127.0.0.1:PORT.",
+        ),
+        FaultKind(
+            "NO_PEER",
+            4,
+            "A process waited for its peer on the bus and nobody came, or the peer went away. Check that the plant runs, "
+            "that every process names the same --endpoint and --prefix, and look at the peer's own last line.",
+        ),
+        FaultKind(
+            "LOG_WRITE",
+            5,
+            "The log could not be written: the disk is full, a size limit was reached, or the folder is not writable. "
+            "What was written before is kept. Free space, or point --log to another disk. `stickslip log recover FILE` "
+            "makes a cut file whole.",
+        ),
+        FaultKind(
+            "PEER_DIED",
+            6,
+            "A process of the run ended before the run did (killed, or it failed by itself: see its line above). The "
+            "others were stopped and the log was closed. Blocks up to the death are in the log.",
+        ),
+        FaultKind(
+            "BAD_LOG",
+            7,
+            "The file is not a run log of this project, is damaged beyond its first chunk, or holds another schema "
+            "version. `stickslip log info FILE` says what is in it; `stickslip log recover FILE` saves what can be read.",
+        ),
+        FaultKind(
+            "BAD_MESSAGE",
+            8,
+            "A message on the bus does not follow bridge/PROTOCOL.md: wrong length, undecodable bytes, or another "
+            "number of samples than configured. The line names the topic. Compare the client with PROTOCOL.md.",
+        ),
+        FaultKind(
+            "LOCKSTEP_STALLED",
+            9,
+            "In lockstep the plant waits for the command that answers its block; none came in time. The controller "
+            "hangs, died, or answers with another block number.",
+        ),
+        FaultKind(
+            "BAD_EVIDENCE",
+            2,
+            "An evidence folder cannot be used: the line names the file, the key or column, the row, what was expected "
+            "and what to do. Nothing was written. `stickslip log import FILE --map MAP.toml --out FOLDER` makes such a "
+            "folder from a CSV, Parquet, MATLAB or TDMS file.",
+        ),
+        FaultKind(
+            "BAD_TABLE",
+            2,
+            "A file of measured data cannot be read as a table, lacks a column that the channel map names, or is too "
+            "large for the format that was asked for. The line names the file, the column and the row. Nothing was "
+            "written.",
+        ),
+        FaultKind(
+            "INTERRUPTED",
+            130,
+            "Somebody pressed Ctrl-C. The vibration was ramped down, the log was closed and every process has ended.",
+        ),
+    )
+}
+
+
+class Fault(Exception):
+    """A fault with its code and one clear line for the person in front of the machine."""
+
+    def __init__(self, code: str, line: str) -> None:
+        self.kind = FAULTS[code]
+        self.line = line
+        Exception.__init__(self, f"{code}: {line}")

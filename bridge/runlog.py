@@ -1,0 +1,127 @@
+"""Writing a run: MCAP with real schemas, cut into chunks by time so that a kill loses little."""
+
+import contextlib
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bridge import stickslip_pb2 as wire
+from bridge.faults import Fault
+from bridge.mcap_chunks import ChunkWriter, ending_without_index
+from bridge.messages import SCHEMA_VERSION, file_descriptor_set, sequence_and_time
+from bridge.topics import RECORDER_EVENT, TOPICS, Topic
+
+FLUSH_PERIOD_S = 0.1  # a kill loses at most the open chunk: this, and never more than 0.25 s
+LARGEST_CHUNK_BYTES = 1 << 20  # a run in one process fills more than this in 0.1 s
+LIBRARY = f"stickslip schema {SCHEMA_VERSION}"
+
+
+class RunLog:
+    """One log file being written. Not thread safe: one thread owns it.
+
+    Args:
+        path: the file; its folder is made.
+        lockstep: log times are simulated times, so that the same run gives the same bytes.
+
+    """
+
+    def __init__(self, path: Path, lockstep: bool) -> None:
+        self.path = path
+        self.lost: dict[str, int] = {topic.name: 0 for topic in TOPICS if topic.logged}
+        self.written: dict[str, int] = dict.fromkeys(self.lost, 0)
+        self._lockstep = lockstep
+        self._next: dict[str, int] = {}
+        self._last_t_ns = 0
+        self._events = 0
+        self._whole_bytes = 0
+        self._due_s = time.monotonic() + FLUSH_PERIOD_S
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("wb")
+        except OSError as error:
+            raise Fault("LOG_WRITE", f"{path}: cannot be written: {error.strerror}; choose another --log") from None
+        self._writer = ChunkWriter(self._file, LIBRARY)
+        schema_data = file_descriptor_set()
+        self._channels: dict[str, int] = {}
+        schemas: dict[str, int] = {}
+        for topic in TOPICS:
+            if topic.logged:
+                name = topic.message.DESCRIPTOR.full_name
+                if name not in schemas:
+                    schemas[name] = self._writer.add_schema(name, "protobuf", schema_data)
+                self._channels[topic.name] = self._writer.add_channel(
+                    "/" + topic.name, "protobuf", schemas[name], {"rate_Hz": f"{topic.rate_Hz:g}"}
+                )
+
+    def add_header(self, header: wire.Header) -> None:
+        """Keep the configuration and versions of one process: a log alone can re-create its run."""
+        fields = {
+            "schema_version": str(header.schema_version),
+            "configuration": header.configuration,
+            "versions": header.versions,
+        }
+        self._guarded(lambda: self._writer.add_metadata(header.role, fields))
+
+    def add_metadata(self, name: str, fields: dict[str, Any]) -> None:
+        """Keep a table of values, each as JSON."""
+        text = {key: json.dumps(value) for key, value in fields.items()}
+        self._guarded(lambda: self._writer.add_metadata(name, text))
+
+    def write(self, topic: Topic, payload: bytes) -> None:
+        """Keep one message, and note a gap in its sequence. Raises Fault LOG_WRITE."""
+        sequence, t_ns = sequence_and_time(payload, topic.message)
+        expected = self._next.get(topic.name, sequence if topic.rate_Hz else 0)
+        if sequence > expected:
+            self.lost[topic.name] += sequence - expected
+            self.add_event("GAP", f"/{topic.name}: {sequence - expected} lost before {sequence}", t_ns)
+        self._next[topic.name] = sequence + 1
+        self._last_t_ns = max(self._last_t_ns, t_ns)
+        self._add(topic, payload, sequence, t_ns)
+        self.flush_when_due()
+
+    def flush_when_due(self) -> None:
+        """End the open chunk when it is old enough. Raises Fault LOG_WRITE."""
+        if time.monotonic() > self._due_s or self._writer.open_bytes > LARGEST_CHUNK_BYTES:
+            self._due_s = time.monotonic() + FLUSH_PERIOD_S
+            self._guarded(self._writer.flush)
+
+    def add_event(self, code: str, text: str, t_ns: int | None = None) -> None:
+        """Keep an event of the recorder itself."""
+        at_ns = self._last_t_ns if t_ns is None else t_ns
+        event = wire.Event(sequence=self._events, t_ns=at_ns, source="recorder", code=code, text=text)
+        self._add(RECORDER_EVENT, event.SerializeToString(), self._events, at_ns)
+        self._events += 1
+
+    def _add(self, topic: Topic, payload: bytes, sequence: int, t_ns: int) -> None:
+        self.written[topic.name] += 1
+        log_time_ns = t_ns if self._lockstep else time.time_ns()
+        self._writer.add_message(self._channels[topic.name], log_time_ns, payload, t_ns, sequence & 0xFFFFFFFF)
+
+    def _guarded(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+            self._file.flush()
+            self._whole_bytes = self._file.tell()
+        except OSError as error:
+            self._end_without_index()
+            line = (
+                f"{self.path}: {error.strerror}; the log was closed at {self._last_t_ns * 1e-9:.2f} s, what came before "
+                f"is kept; free space, then `stickslip log recover {self.path}` gives it its index back"
+            )
+            raise Fault("LOG_WRITE", line) from None
+
+    def _end_without_index(self) -> None:
+        """Close with 50 bytes where the last whole chunk ended: room that the chunk which did not fit has given back."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+        with contextlib.suppress(OSError), self.path.open("r+b", buffering=0) as file:
+            file.truncate(self._whole_bytes)
+            file.seek(self._whole_bytes)
+            file.write(ending_without_index())
+
+    def close(self) -> None:
+        """Write the index and close. The file is whole after this. Raises Fault LOG_WRITE."""
+        self._guarded(self._writer.finish)
+        self._file.close()

@@ -1,0 +1,266 @@
+from google.protobuf.internal import containers as _containers
+from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from collections.abc import Iterable as _Iterable
+from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    DISABLED: _ClassVar[Mode]
+    WATCH: _ClassVar[Mode]
+    EXCITE: _ClassVar[Mode]
+    WAIT: _ClassVar[Mode]
+    PROBE: _ClassVar[Mode]
+    STOPPED: _ClassVar[Mode]
+
+class ContactState(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    UNKNOWN: _ClassVar[ContactState]
+    STANDSTILL: _ClassVar[ContactState]
+    STICK: _ClassVar[ContactState]
+    SLIP: _ClassVar[ContactState]
+    SMOOTH: _ClassVar[ContactState]
+
+class Limit(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    NO_LIMIT: _ClassVar[Limit]
+    RANGE: _ClassVar[Limit]
+    SLEW: _ClassVar[Limit]
+    FREQUENCY_BAND: _ClassVar[Limit]
+    STALE_INPUT: _ClassVar[Limit]
+    OPERATOR_STOP: _ClassVar[Limit]
+    NOT_FINITE: _ClassVar[Limit]
+
+class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    NO_REASON: _ClassVar[Reason]
+    NOT_ENABLED: _ClassVar[Reason]
+    NOTHING_TO_DO: _ClassVar[Reason]
+    STICK_SEEN: _ClassVar[Reason]
+    HELD: _ClassVar[Reason]
+    LATE_SO_GENTLE: _ClassVar[Reason]
+    TOO_LATE: _ClassVar[Reason]
+    STILL_NEEDED: _ClassVar[Reason]
+    NOT_NEEDED: _ClassVar[Reason]
+    DRIVE_STANDS: _ClassVar[Reason]
+    PIEZO_WEAK: _ClassVar[Reason]
+DISABLED: Mode
+WATCH: Mode
+EXCITE: Mode
+WAIT: Mode
+PROBE: Mode
+STOPPED: Mode
+UNKNOWN: ContactState
+STANDSTILL: ContactState
+STICK: ContactState
+SLIP: ContactState
+SMOOTH: ContactState
+NO_LIMIT: Limit
+RANGE: Limit
+SLEW: Limit
+FREQUENCY_BAND: Limit
+STALE_INPUT: Limit
+OPERATOR_STOP: Limit
+NOT_FINITE: Limit
+NO_REASON: Reason
+NOT_ENABLED: Reason
+NOTHING_TO_DO: Reason
+STICK_SEEN: Reason
+HELD: Reason
+LATE_SO_GENTLE: Reason
+TOO_LATE: Reason
+STILL_NEEDED: Reason
+NOT_NEEDED: Reason
+DRIVE_STANDS: Reason
+PIEZO_WEAK: Reason
+
+class SensorBlock(_message.Message):
+    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    MASS_ACCEL_MPS2_FIELD_NUMBER: _ClassVar[int]
+    BASE_ACCEL_MPS2_FIELD_NUMBER: _ClassVar[int]
+    MASS_POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    drive_force_N: _containers.RepeatedScalarFieldContainer[float]
+    mass_accel_mps2: _containers.RepeatedScalarFieldContainer[float]
+    base_accel_mps2: _containers.RepeatedScalarFieldContainer[float]
+    mass_position_m: _containers.RepeatedScalarFieldContainer[float]
+    drive_position_m: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class Command(_message.Message):
+    __slots__ = ("sequence", "t_ns", "block", "frequency_Hz", "amplitude_m", "mode", "limit", "reason")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    BLOCK_FIELD_NUMBER: _ClassVar[int]
+    FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
+    AMPLITUDE_M_FIELD_NUMBER: _ClassVar[int]
+    MODE_FIELD_NUMBER: _ClassVar[int]
+    LIMIT_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    block: int
+    frequency_Hz: float
+    amplitude_m: float
+    mode: int
+    limit: int
+    reason: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., mode: _Optional[int] = ..., limit: _Optional[int] = ..., reason: _Optional[int] = ...) -> None: ...
+
+class Applied(_message.Message):
+    __slots__ = ("sequence", "t_ns", "frequency_Hz", "amplitude_m", "command_block", "commands", "fallback", "round_trip_ns", "late_ns")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
+    AMPLITUDE_M_FIELD_NUMBER: _ClassVar[int]
+    COMMAND_BLOCK_FIELD_NUMBER: _ClassVar[int]
+    COMMANDS_FIELD_NUMBER: _ClassVar[int]
+    FALLBACK_FIELD_NUMBER: _ClassVar[int]
+    ROUND_TRIP_NS_FIELD_NUMBER: _ClassVar[int]
+    LATE_NS_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    frequency_Hz: float
+    amplitude_m: float
+    command_block: int
+    commands: int
+    fallback: int
+    round_trip_ns: int
+    late_ns: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ...) -> None: ...
+
+class Trace(_message.Message):
+    __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    BLOCK_FIELD_NUMBER: _ClassVar[int]
+    EVENTS_FIELD_NUMBER: _ClassVar[int]
+    GAP_BLOCKS_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    MODE_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    LIMIT_FIELD_NUMBER: _ClassVar[int]
+    SLIPS_FIELD_NUMBER: _ClassVar[int]
+    SCORE_FIELD_NUMBER: _ClassVar[int]
+    FORCE_RATE_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    BURST_MPS2_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    VIBRATION_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    WANTED_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    WANTED_AMPLITUDE_M_FIELD_NUMBER: _ClassVar[int]
+    WANTED_FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
+    TIME_TO_SLIP_S_FIELD_NUMBER: _ClassVar[int]
+    LATENESS_NS_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    block: int
+    events: int
+    gap_blocks: int
+    state: int
+    mode: int
+    reason: int
+    limit: int
+    slips: int
+    score: float
+    force_rate: float
+    drive_force_N: float
+    burst_mps2: float
+    drive_velocity_mps: float
+    vibration_velocity_mps: float
+    wanted_velocity_mps: float
+    wanted_amplitude_m: float
+    wanted_frequency_Hz: float
+    time_to_slip_s: float
+    lateness_ns: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., events: _Optional[int] = ..., gap_blocks: _Optional[int] = ..., state: _Optional[int] = ..., mode: _Optional[int] = ..., reason: _Optional[int] = ..., limit: _Optional[int] = ..., slips: _Optional[int] = ..., score: _Optional[float] = ..., force_rate: _Optional[float] = ..., drive_force_N: _Optional[float] = ..., burst_mps2: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., wanted_velocity_mps: _Optional[float] = ..., wanted_amplitude_m: _Optional[float] = ..., wanted_frequency_Hz: _Optional[float] = ..., time_to_slip_s: _Optional[float] = ..., lateness_ns: _Optional[int] = ...) -> None: ...
+
+class State(_message.Message):
+    __slots__ = ("sequence", "t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "velocity_ratio", "force_rate", "score", "mode", "state", "slips")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    VIBRATION_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_RATIO_FIELD_NUMBER: _ClassVar[int]
+    FORCE_RATE_FIELD_NUMBER: _ClassVar[int]
+    SCORE_FIELD_NUMBER: _ClassVar[int]
+    MODE_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    SLIPS_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    drive_force_N: float
+    vibration_velocity_mps: float
+    drive_velocity_mps: float
+    velocity_ratio: float
+    force_rate: float
+    score: float
+    mode: int
+    state: int
+    slips: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., velocity_ratio: _Optional[float] = ..., force_rate: _Optional[float] = ..., score: _Optional[float] = ..., mode: _Optional[int] = ..., state: _Optional[int] = ..., slips: _Optional[int] = ...) -> None: ...
+
+class Snapshot(_message.Message):
+    __slots__ = ("sequence", "t_ns", "step", "layout", "memory")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    STEP_FIELD_NUMBER: _ClassVar[int]
+    LAYOUT_FIELD_NUMBER: _ClassVar[int]
+    MEMORY_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    step: int
+    layout: str
+    memory: bytes
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., step: _Optional[int] = ..., layout: _Optional[str] = ..., memory: _Optional[bytes] = ...) -> None: ...
+
+class Event(_message.Message):
+    __slots__ = ("sequence", "t_ns", "source", "code", "text")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    SOURCE_FIELD_NUMBER: _ClassVar[int]
+    CODE_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    source: str
+    code: str
+    text: str
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., source: _Optional[str] = ..., code: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...
+
+class Operator(_message.Message):
+    __slots__ = ("action", "who")
+    class Action(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        NOTHING: _ClassVar[Operator.Action]
+        STOP: _ClassVar[Operator.Action]
+        RESET: _ClassVar[Operator.Action]
+    NOTHING: Operator.Action
+    STOP: Operator.Action
+    RESET: Operator.Action
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    WHO_FIELD_NUMBER: _ClassVar[int]
+    action: Operator.Action
+    who: str
+    def __init__(self, action: _Optional[_Union[Operator.Action, str]] = ..., who: _Optional[str] = ...) -> None: ...
+
+class Header(_message.Message):
+    __slots__ = ("role", "schema_version", "configuration", "versions")
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    SCHEMA_VERSION_FIELD_NUMBER: _ClassVar[int]
+    CONFIGURATION_FIELD_NUMBER: _ClassVar[int]
+    VERSIONS_FIELD_NUMBER: _ClassVar[int]
+    role: str
+    schema_version: int
+    configuration: str
+    versions: str
+    def __init__(self, role: _Optional[str] = ..., schema_version: _Optional[int] = ..., configuration: _Optional[str] = ..., versions: _Optional[str] = ...) -> None: ...

@@ -1,0 +1,139 @@
+"""Measured data of other programs as columns: CSV, Parquet, MATLAB v5 and TDMS. Every error names file, column and row."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+import scipy.io
+from nptdms import TdmsFile
+from scipy.io.matlab import MatReadError
+
+from bridge.faults import Fault
+
+Floats = npt.NDArray[np.float64]
+SUFFIXES = (".csv", ".parquet", ".mat", ".tdms")
+
+
+class Dialect(NamedTuple):
+    """How a CSV file is written."""
+
+    delimiter: str = ","
+    decimal: str = "."
+    skip_rows: int = 0  # lines before the one with the names
+
+
+class Table(NamedTuple):
+    """The columns of one file, as they were stored."""
+
+    path: Path
+    columns: dict[str, Any]
+    sample_rate_Hz: float | None = None  # where the file itself says so (TDMS)
+
+    def column(self, name: str) -> Floats:
+        """One column, float64 [rows]. Raises Fault BAD_TABLE when it is not there or is no column of numbers."""
+        if name not in self.columns:
+            known = ", ".join(sorted(self.columns)) or "none"
+            raise Fault("BAD_TABLE", f"{self.path.name}: column {name}: not in the file; known here: {known}")
+        return _numbers(self.columns[name], f"{self.path.name}: column {name}")
+
+
+def read_table(path: Path, dialect: Dialect | None = None) -> Table:
+    """Read a table. Raises Fault BAD_TABLE when it cannot be read as what its name says."""
+    if not path.is_file():
+        raise Fault("BAD_TABLE", f"{path}: no such file; give the path of a file of measured data")
+    if path.suffix not in SUFFIXES:
+        line = f"{path}: ends in {path.suffix or 'nothing'}: must be one of {', '.join(SUFFIXES)}; convert it"
+        raise Fault("BAD_TABLE", line)
+    try:
+        if path.suffix == ".csv":
+            return Table(path, _csv(path, dialect or Dialect()))
+        if path.suffix == ".parquet":
+            table: Any = pq.read_table(path)
+            return Table(path, {name: table.column(name) for name in table.column_names})
+        if path.suffix == ".mat":
+            return Table(path, _mat(path))
+        return _tdms(path)
+    except NotImplementedError:
+        line = f"{path.name}: a MATLAB v7.3 file: must be v5 to v7; save it in MATLAB with -v7"
+        raise Fault("BAD_TABLE", line) from None
+    except (pa.ArrowException, MatReadError, OSError, ValueError, KeyError, TypeError, IndexError, EOFError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        line = f"{path.name}: cannot be read as {path.suffix[1:]}: {reason}; take another copy, or export it again"
+        raise Fault("BAD_TABLE", line) from None
+
+
+def _csv(path: Path, dialect: Dialect) -> dict[str, Any]:
+    table: Any = pa_csv.read_csv(
+        path,
+        read_options=pa_csv.ReadOptions(skip_rows=dialect.skip_rows),
+        parse_options=pa_csv.ParseOptions(delimiter=dialect.delimiter),
+        convert_options=pa_csv.ConvertOptions(decimal_point=dialect.decimal),
+    )
+    return {name.strip(): table.column(name) for name in table.column_names}
+
+
+def _mat(path: Path) -> dict[str, Any]:
+    """Variables that are vectors; `NAME.FIELD` of a struct; `NAME[0]`, `NAME[1]`... of a matrix."""
+    variables = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
+    columns: dict[str, Any] = {}
+    for name, value in variables.items():
+        if name.startswith("__"):
+            continue
+        fields = getattr(value, "_fieldnames", None)
+        found = {name: value} if fields is None else {f"{name}.{field}": getattr(value, field) for field in fields}
+        for key, array in found.items():
+            values = np.atleast_1d(np.asarray(array))
+            if values.ndim == 2:
+                columns |= {f"{key}[{i}]": values[:, i] for i in range(values.shape[1])}
+            elif values.ndim == 1:
+                columns[key] = values
+    return columns
+
+
+def _tdms(path: Path) -> Table:
+    """Channels as `GROUP/CHANNEL`, and as `CHANNEL` where no other group has one of that name."""
+    file: Any = TdmsFile.read(path)
+    columns: dict[str, Any] = {}
+    names: list[str] = []
+    rates_Hz: set[float] = set()
+    for group in file.groups():
+        for channel in group.channels():
+            columns[f"{group.name}/{channel.name}"] = channel[:]
+            names.append(channel.name)
+            step_s = float(channel.properties.get("wf_increment", 0.0))
+            if step_s > 0.0:
+                rates_Hz.add(1.0 / step_s)
+    short = {key.split("/", 1)[1]: values for key, values in columns.items() if names.count(key.split("/", 1)[1]) == 1}
+    return Table(path, columns | short, rates_Hz.pop() if len(rates_Hz) == 1 else None)
+
+
+def _numbers(values: Any, where: str) -> Floats:
+    """A column as float64; an empty cell is NaN. Raises Fault BAD_TABLE with the row of the first text in it."""
+    if isinstance(values, pa.ChunkedArray):
+        column: Any = values
+        if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
+            # rows as a person counts them: the first one under the names is 1
+            for row, text in enumerate(column.to_pylist(), 1):
+                if text is not None and not _is_number(text):
+                    line = f"{where}: row {row} = {text!r}: must be a number; remove the row or name another column"
+                    raise Fault("BAD_TABLE", line)
+        try:
+            return np.asarray(column.cast(pa.float64()).to_numpy(), np.float64)
+        except pa.ArrowException:
+            raise Fault("BAD_TABLE", f"{where}: is {column.type}: must be numbers; name another column") from None
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiub":
+        raise Fault("BAD_TABLE", f"{where}: is {array.dtype}: must be numbers; name another column")
+    return array.astype(np.float64)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

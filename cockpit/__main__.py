@@ -1,0 +1,5 @@
+"""`python -m cockpit` is `stickslip`."""
+
+from cockpit.cli import main
+
+main()

@@ -1,0 +1,304 @@
+"""The `stickslip` command. Each command imports what it needs when it runs, so that `--help` is quick."""
+
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Generator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.faults import FAULTS, Fault
+from cockpit.processes import guarded, stop_event
+
+app = typer.Typer(
+    help="Real-time control against stick-slip: run a rig or its stand-in, replay, recover and judge its logs.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+ScenarioName = Annotated[
+    str, typer.Option("--scenario", help="Name of a scenario in deploy/scenarios, or a .toml file.")
+]
+Settings = Annotated[
+    list[str],
+    typer.Option("--set", help="Change one value: key=value, e.g. controller.limits.v_ratio=1.3. Repeatable."),
+]
+Seed = Annotated[int | None, typer.Option(help="Seed of the sensor noise; the same seed gives the same run.")]
+Endpoint = Annotated[str | None, typer.Option(help="Where the processes meet, e.g. tcp/127.0.0.1:7447.")]
+Prefix = Annotated[str | None, typer.Option(help="First part of every key on the bus.")]
+Lockstep = Annotated[
+    bool,
+    typer.Option("--lockstep", help="Not paced: each block waits for its command. Repeatable to the bit."),
+]
+ChildFlag = Annotated[bool, typer.Option("--child", hidden=True)]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+LogFile = Annotated[Path | None, typer.Option("--log", help="Where the log goes; runs/NAME.mcap if not given.")]
+DEFAULT_SCENARIO = "paper-c45-c45"
+
+
+def _settings(settings: list[str], seed: int | None, endpoint: str | None, prefix: str | None) -> list[str]:
+    result = list(settings)
+    if seed is not None:
+        result.append(f"seed={seed}")
+    if endpoint is not None:
+        result.append(f'bus.endpoint="{endpoint}"')
+    if prefix is not None:
+        result.append(f'bus.prefix="{prefix}"')
+    return result
+
+
+@app.command()
+def run(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    settings: Settings = [],  # noqa: B006 (typer reads the default and never changes it)
+    seed: Seed = None,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    lockstep: Lockstep = False,
+    in_process: Annotated[
+        bool, typer.Option("--in-process", help="Lockstep in one process, without a bus: fastest.")
+    ] = False,
+    log: LogFile = None,
+    as_json: Json = False,
+) -> None:
+    """Run plant, controller and recorder to the end of a scenario and say what came of it."""
+
+    def work() -> int:
+        from cockpit.running import run_scenario
+
+        changed = _settings(settings, seed, endpoint, prefix)
+        return run_scenario(scenario, changed, lockstep, in_process, log, as_json)
+
+    sys.exit(guarded(work, as_json))
+
+
+@app.command()
+def plant(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    settings: Settings = [],  # noqa: B006
+    seed: Seed = None,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    lockstep: Lockstep = False,
+    wait_for: Annotated[str, typer.Option(help="Roles that must be on the bus before the first block.")] = "controller",
+    child: ChildFlag = False,
+) -> None:
+    """Serve the stand-in rig of a scenario on the bus."""
+
+    def work() -> None:
+        from cockpit.scenario import header, load_scenario
+        from plant.app import run as serve
+
+        made = load_scenario(scenario, _settings(settings, seed, endpoint, prefix))
+        roles = [role for role in wait_for.split(",") if role]
+        described = header(made, "plant", lockstep)
+        serve(made.rig, made.seed, made.duration_s, made.bus, described, roles, lockstep, stop_event(child))
+
+    sys.exit(guarded(work))
+
+
+@app.command()
+def controller(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    settings: Settings = [],  # noqa: B006
+    seed: Seed = None,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    lockstep: Lockstep = False,
+    child: ChildFlag = False,
+) -> None:
+    """Control the rig that is on the bus, with the controller of a scenario."""
+
+    def work() -> None:
+        from cockpit.scenario import header, load_scenario
+        from controller.app import run as control
+
+        made = load_scenario(scenario, _settings(settings, seed, endpoint, prefix))
+        control(made.controller, made.bus, header(made, "controller", lockstep), lockstep, stop_event(child))
+
+    sys.exit(guarded(work))
+
+
+@app.command("record")
+def recorder(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    settings: Settings = [],  # noqa: B006
+    seed: Seed = None,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    lockstep: Lockstep = False,
+    log: LogFile = None,
+    child: ChildFlag = False,
+) -> None:
+    """Record everything on the bus until the plant ends its run."""
+
+    def work() -> None:
+        from bridge.recorder import run as record
+        from cockpit.running import about_run, log_path
+        from cockpit.scenario import load_scenario
+
+        made = load_scenario(scenario, _settings(settings, seed, endpoint, prefix))
+        path = log_path(log, made.name)
+        record(path, made.bus, ["plant", "controller"], about_run(made, lockstep), lockstep, stop_event(child))
+
+    sys.exit(guarded(work))
+
+
+app.command("recorder", hidden=True)(recorder)  # a child is named by its role
+
+
+@app.command("stop")
+def operator_stop(
+    reset: Annotated[bool, typer.Option("--reset", help="Let the controller work again after a stop.")] = False,
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+) -> None:
+    """Tell a running controller to ramp the vibration down and keep it down, until --reset."""
+
+    def work() -> None:
+        from bridge import stickslip_pb2 as wire
+        from bridge.topics import OPERATOR
+        from bridge.zenoh_link import Bus
+        from cockpit.scenario import load_scenario
+
+        made = load_scenario(scenario, _settings([], None, endpoint, prefix))
+        action = wire.Operator.RESET if reset else wire.Operator.STOP
+        with Bus(made.bus, "operator", lockstep=True) as bus:
+            send = bus.publisher(OPERATOR)
+            if bus.wait_for(["controller"], 2.0):
+                raise Fault("NO_PEER", f"{made.bus.endpoint}: no controller on the bus; nothing to tell")
+            send(wire.Operator(action=action, who=os.environ.get("USER", "")).SerializeToString())
+
+    sys.exit(guarded(work))
+
+
+@contextlib.contextmanager
+def _writing(out: Path) -> Generator[None]:
+    """Make the folder of `out`; a failure to write is one clear line."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise Fault("LOG_WRITE", f"{out}: cannot be written: {error.strerror}; choose another --out") from None
+
+
+@app.command()
+def reproduce(
+    out: Annotated[Path, typer.Option(help="The report, one HTML file.")] = Path("runs/reproduce.html"),
+    as_json: Json = False,
+) -> None:
+    """Redo the paper: its figures, tables and claims, each with its number and whether it holds."""
+
+    def work() -> int:
+        from cockpit.reproduce import reproduce as redo
+
+        with _writing(out):
+            result = redo(out, progress=True)
+        print(json.dumps(result.as_json()) if as_json else f"{result.verdict}\nreport   {out}")
+        return 0 if result.passed else 1
+
+    sys.exit(guarded(work, as_json))
+
+
+@app.command("map")
+def stability(
+    rig: Annotated[str, typer.Option(help="Name of a rig in deploy/rigs, or a .toml file.")] = DEFAULT_SCENARIO,
+    settings: Settings = [],  # noqa: B006
+    out: Annotated[Path, typer.Option(help="The picture, a PNG file.")] = Path("runs/map.png"),
+    as_json: Json = False,
+) -> None:
+    """Draw where a rig sticks and slips, over drive velocity, stiffness and vibration."""
+
+    def work() -> None:
+        from cockpit.scenario import load_rig
+        from cockpit.stability_map import stability_map
+
+        with _writing(out):
+            result = stability_map(load_rig(rig, settings), out)
+        print(json.dumps(result._asdict()) if as_json else f"{result.answer}\npicture  {out}")
+
+    sys.exit(guarded(work, as_json))
+
+
+@app.command()
+def explain(code: Annotated[str, typer.Argument(help="For example ENDPOINT_BUSY.")]) -> None:
+    """Say what a fault code means and what to do."""
+    kind = FAULTS.get(code.upper())
+    if kind is None:
+        print(f"stickslip: {code}: unknown code; known: {', '.join(FAULTS)}", file=sys.stderr)
+        sys.exit(2)
+    print(f"{kind.code} (exit status {kind.exit_status})\n{kind.help}")
+
+
+@app.command()
+def scenarios(as_json: Json = False) -> None:
+    """List the scenarios and rigs that come with the project."""
+    from bridge.config import read_toml
+    from cockpit.scenario import deploy_folder
+
+    found = {
+        path.stem: str(read_toml(path).get("description", ""))
+        for path in sorted(deploy_folder().glob("scenarios/*.toml"))
+    }
+    rigs = [path.stem for path in sorted(deploy_folder().glob("rigs/*.toml"))]
+    if as_json:
+        print(json.dumps({"scenarios": found, "rigs": rigs}))
+        return
+    for name, description in found.items():
+        print(f"{name:<24} {description}")
+    print("rigs: " + ", ".join(rigs))
+
+
+log_app = typer.Typer(help="Look into a log, make a cut one whole.", no_args_is_help=True)
+app.add_typer(log_app, name="log")
+LogArgument = Annotated[Path, typer.Argument(help="A run log, .mcap.")]
+
+
+@log_app.command("info")
+def log_info(path: LogArgument, as_json: Json = False) -> None:
+    """Judge the run in a log: slips, swing, v_a / v_d, latency, what was lost."""
+
+    def work() -> None:
+        from cockpit.verdict import headline, in_words, judge
+
+        verdict = judge(path)
+        if as_json:
+            print(json.dumps(verdict.as_dict()))
+        else:
+            print("\n".join([headline(verdict), *in_words(verdict)]))
+
+    sys.exit(guarded(work, as_json))
+
+
+@log_app.command("recover")
+def log_recover(
+    path: LogArgument,
+    out: Annotated[Path | None, typer.Option(help="Write here instead of in place.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Save every message that can be read from a cut or damaged log, with a new index."""
+
+    def work() -> None:
+        from bridge.logfile import recover
+
+        saved = recover(path, out or path)
+        damage = saved.damage
+        if as_json:
+            print(json.dumps({"messages": saved.messages, "out": str(out or path)} | damage._asdict()))
+            return
+        lost = "nothing was lost"
+        if damage.cut_bytes or damage.bad_chunks:
+            lost = f"lost: {damage.cut_bytes} bytes of an open chunk at the end, {damage.bad_chunks} damaged chunks"
+        print(f"{out or path}: {saved.messages} messages, whole again; {lost}")
+
+    sys.exit(guarded(work, as_json))
+
+
+def main() -> None:
+    """Entry point of the `stickslip` command."""
+    app()

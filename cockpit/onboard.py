@@ -1,0 +1,57 @@
+"""A lockstep run in one process: the same nodes and the same log, without a bus. For tests and for many runs."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bridge import stickslip_pb2 as wire
+from bridge.runlog import RunLog
+from bridge.topics import CONTROLLER_EVENT, PLANT_EVENT
+from cockpit.scenario import Scenario, header
+from controller.node import ControllerNode
+from plant.node import PlantNode
+
+
+def run_onboard(
+    scenario: Scenario, path: Path, about: dict[str, Any], progress: Callable[[float], None] | None = None
+) -> None:
+    """Run a scenario and write its log. Raises Fault LOG_WRITE.
+
+    Args:
+        progress: called now and then with the simulated time [s].
+
+    """
+    plant = PlantNode(scenario.rig, scenario.seed)
+    controller = ControllerNode(scenario.controller)
+    plant.warm_up()
+    controller.warm_up()
+    log = RunLog(path, lockstep=True)
+    log.add_metadata("run", about)
+    for role in ("controller", "plant"):
+        log.add_header(header(scenario, role, lockstep=True))
+    blocks = round(scenario.duration_s / scenario.rig.solver.block_s)
+    log.write(PLANT_EVENT, _event("plant", 0, 0, "START", "lockstep"))
+    commands: list[bytes] = []
+    try:
+        while plant.block < blocks:
+            sensors, applied = plant.advance(commands)
+            log.write(*sensors)
+            log.write(*applied)
+            command = controller.block(sensors.payload)
+            if command is not None:
+                log.write(*command)
+                commands = [command.payload]
+            for message in controller.rest(0):
+                log.write(*message)
+            if progress is not None and plant.block % 500 == 0:
+                progress(plant.block * scenario.rig.solver.block_s)
+        t_ns = plant.block * plant.block_ns
+        log.write(PLANT_EVENT, _event("plant", 1, t_ns, "END", f"blocks={plant.block}"))
+        text = f"steps={controller.steps} duplicates={controller.duplicates} dropped=0"
+        log.write(CONTROLLER_EVENT, _event("controller", 0, t_ns, "END", text))
+    finally:
+        log.close()
+
+
+def _event(source: str, sequence: int, t_ns: int, code: str, text: str) -> bytes:
+    return wire.Event(sequence=sequence, t_ns=t_ns, source=source, code=code, text=text).SerializeToString()

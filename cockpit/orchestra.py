@@ -1,0 +1,125 @@
+"""A run of several processes: starts plant, controller and recorder, watches them, ends them, leaves nobody behind."""
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from bridge.faults import FAULTS, Fault
+
+_GRACE_S = 6.0  # to fade out, say goodbye on the bus and close the log
+_LOOK_S = 0.05
+# in this order they are asked to stop: the plant fades the vibration out and tells the others
+_ROLES = ("plant", "controller", "recorder")
+
+
+class Child:
+    """One process of the run; what it says on stderr is kept for the fault line."""
+
+    def __init__(self, role: str, arguments: list[str]) -> None:
+        self.role = role
+        # a session of its own: Ctrl-C reaches the parent alone, which ends the children in order
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "cockpit", role, *arguments, "--child"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self._lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        if self.process.stderr is not None:
+            self._lines.extend(line.rstrip() for line in self.process.stderr)
+
+    def last_words(self) -> str:
+        """What it said last on stderr."""
+        self._reader.join(1.0)
+        return next((line for line in reversed(self._lines) if line.strip()), "")
+
+
+def run_processes(
+    arguments: list[str],
+    log: Path,
+    lockstep: bool,
+    watch: Callable[[threading.Event], None],
+) -> None:
+    """Run a scenario to its end and close its log.
+
+    Args:
+        arguments: the command line that makes the same scenario in a child.
+        watch: follows the run on the bus until its event is set; runs in a thread of its own.
+
+    Raises the Fault of the child that failed first, PEER_DIED when one was killed, KeyboardInterrupt after Ctrl-C.
+
+    """
+    more = ["--lockstep"] if lockstep else []
+    children: list[Child] = []
+    over = threading.Event()
+    watcher = threading.Thread(target=watch, args=(over,), daemon=True)
+    try:
+        for role in _ROLES:
+            extra = ["--log", str(log)] if role == "recorder" else []
+            wait_for = ["--wait-for", "controller,recorder"] if role == "plant" else []
+            children.append(Child(role, [*arguments, *more, *extra, *wait_for]))
+        watcher.start()
+        _until_the_end(children)
+    except KeyboardInterrupt:
+        _stop(children)
+        raise
+    finally:
+        over.set()
+        _stop(children)
+        if watcher.is_alive():
+            watcher.join(2.0)
+
+
+def _until_the_end(children: list[Child]) -> None:
+    """Wait for all to end well; raise for the first that does not."""
+    while True:
+        ended = [child for child in children if child.process.poll() is not None]
+        failed = [child for child in ended if child.process.returncode != 0]
+        if failed:
+            # the others fail in the wake of the first: the one that was killed, or that names a cause, is the news
+            time.sleep(_LOOK_S)
+            failed = [child for child in children if child.process.poll() not in {None, 0}]
+            raise _fault(failed)
+        if len(ended) == len(children):
+            return
+        time.sleep(_LOOK_S)
+
+
+def _fault(failed: list[Child]) -> Fault:
+    for child in failed:
+        if child.process.returncode < 0:
+            return Fault(
+                "PEER_DIED",
+                f"the {child.role} was killed by signal {-child.process.returncode}; the run was stopped",
+            )
+    followers = {FAULTS["PEER_DIED"].exit_status, FAULTS["NO_PEER"].exit_status}
+    first = next((child for child in failed if child.process.returncode not in followers), failed[0])
+    kinds = {kind.exit_status: kind for kind in FAULTS.values()}
+    words = first.last_words()
+    kind = kinds.get(first.process.returncode)
+    if kind is None:
+        return Fault("PEER_DIED", f"the {first.role} ended with status {first.process.returncode}: {words}")
+    return Fault(kind.code, words.removeprefix(f"stickslip: {kind.code}: ") or f"the {first.role} gave up")
+
+
+def _stop(children: list[Child]) -> None:
+    """Ask all to stop, in order, and end those that do not."""
+    for child in children:
+        if child.process.poll() is None:
+            child.process.terminate()
+    until_s = time.monotonic() + _GRACE_S
+    for child in children:
+        try:
+            child.process.wait(max(0.0, until_s - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            child.process.kill()
+            child.process.wait()

@@ -1,0 +1,56 @@
+"""Running as one process among several: signals, a dying parent, one clear line for every fault."""
+
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from bridge.faults import Fault
+
+_PARENT_CHECK_S = 0.25
+
+
+def stop_event(child: bool) -> threading.Event:
+    """An event that SIGINT and SIGTERM set, and for a child the death of its parent: no orphan keeps a rig running."""
+    stop = threading.Event()
+
+    def on_signal(_number: int, _frame: Any) -> None:
+        stop.set()
+
+    signal.signal(signal.SIGINT, on_signal)
+    signal.signal(signal.SIGTERM, on_signal)
+    if child:
+        parent = os.getppid()
+
+        def watch() -> None:
+            while not stop.wait(_PARENT_CHECK_S):
+                if os.getppid() != parent:
+                    stop.set()
+
+        threading.Thread(target=watch, daemon=True, name="parent").start()
+    return stop
+
+
+def report(fault: Fault, as_json: bool) -> int:
+    """Print a fault, one line on stderr or a JSON object on stdout; its exit status."""
+    if as_json:
+        print(json.dumps({"fault": fault.kind.code, "line": fault.line, "exit_status": fault.kind.exit_status}))
+    else:
+        print(f"stickslip: {fault.kind.code}: {fault.line}", file=sys.stderr)
+    return fault.kind.exit_status
+
+
+def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
+    """Run a command's work; its exit status, faults and Ctrl-C included."""
+    try:
+        return work() or 0
+    except Fault as fault:
+        return report(fault, as_json)
+    except KeyboardInterrupt:
+        return report(Fault("INTERRUPTED", "stopped by Ctrl-C"), as_json)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

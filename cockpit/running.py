@@ -1,0 +1,58 @@
+"""`stickslip run`: one scenario, one log, one verdict."""
+
+import json
+import sys
+from pathlib import Path
+
+from bridge.faults import Fault
+from cockpit.processes import report
+from cockpit.scenario import Scenario, load_scenario
+
+
+def log_path(given: Path | None, name: str) -> Path:
+    """Where a log goes."""
+    return given if given is not None else Path("runs") / f"{name}.mcap"
+
+
+def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
+    """What a log says of its run besides the configurations."""
+    return {
+        "scenario": scenario.name,
+        "description": scenario.description,
+        "seed": scenario.seed,
+        "clock": "lockstep" if lockstep else "realtime",
+    }
+
+
+def run_scenario(
+    name: str, settings: list[str], lockstep: bool, in_process: bool, log: Path | None, as_json: bool
+) -> int:
+    """Run a scenario and print its verdict; the exit status: 0 good, 1 when the run itself shows stick-slip or loss."""
+    scenario = load_scenario(name, settings)
+    path = log_path(log, scenario.name)
+    interrupted = False
+    try:
+        if in_process:
+            from cockpit.onboard import run_onboard
+
+            run_onboard(scenario, path, about_run(scenario, lockstep=True))
+        else:
+            from cockpit.live import follower
+            from cockpit.orchestra import run_processes
+
+            arguments = ["--scenario", name, *(part for setting in settings for part in ("--set", setting))]
+            run_processes(arguments, path, lockstep, follower(scenario.bus, scenario.duration_s))
+    except KeyboardInterrupt:
+        interrupted = True
+    from cockpit.verdict import headline, in_words, judge
+
+    if interrupted:
+        if path.is_file():
+            print("\n".join(in_words(judge(path))), file=sys.stderr)
+        return report(Fault("INTERRUPTED", "stopped by Ctrl-C; the log is closed"), as_json)
+    verdict = judge(path)
+    if as_json:
+        print(json.dumps(verdict.as_dict()))
+    else:
+        print("\n".join([headline(verdict), *in_words(verdict)]))
+    return 0 if verdict.good else 1

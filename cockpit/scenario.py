@@ -1,0 +1,121 @@
+"""A scenario file: one rig, one controller, one duration. And where the files that come with the project are."""
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from bridge import stickslip_pb2 as wire
+from bridge.config import Strict, read_toml, validate, with_overrides
+from bridge.faults import Fault
+from bridge.messages import SCHEMA_VERSION
+from bridge.zenoh_link import BusConfig
+from controller.config import ControllerConfig
+from plant.config import RigConfig
+
+
+class Scenario(Strict):
+    """One run, with every default filled in."""
+
+    name: str = "unnamed"
+    description: str = ""
+    duration_s: Annotated[float, Field(ge=0)] = 16.0  # 0: until stopped
+    seed: Annotated[int, Field(ge=0)] = 1
+    rig: RigConfig
+    controller: ControllerConfig = ControllerConfig()
+    bus: BusConfig = BusConfig()
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> "Scenario":
+        solver, controller = self.rig.solver, self.controller
+        for name in ("block_s", "samples_per_block"):
+            theirs, ours = getattr(solver, name), getattr(controller, name)
+            if theirs != ours:
+                raise ValueError(f"controller.{name} = {ours}: must equal rig.solver.{name} = {theirs}")
+        times_s = np.arange(0.0, self.duration_s, solver.block_s)
+        profile = np.array(self.rig.drive.profile)
+        travel_m = float(np.interp(times_s, profile[:, 0], profile[:, 1]).sum()) * solver.block_s
+        range_m = self.rig.sensors.position_range_m
+        if travel_m > range_m:
+            raise ValueError(
+                f"duration_s = {self.duration_s:g}: the drive would travel {travel_m * 1e3:.1f} mm, beyond the transducers' "
+                f"{range_m * 1e3:g} mm; shorten the run or slow the drive"
+            )
+        return self
+
+
+def deploy_folder() -> Path:
+    """The folder of rigs and scenarios: inside an installed package, beside the packages in a checkout."""
+    installed = Path(__file__).parent / "deploy"
+    return installed if installed.is_dir() else Path(__file__).parent.parent / "deploy"
+
+
+def _find(name: str, kind: str) -> Path:
+    """A file by path, or by the name of one that comes with the project."""
+    given = Path(name)
+    if given.suffix == ".toml":
+        return given
+    known = deploy_folder() / kind / f"{name}.toml"
+    if not known.is_file():
+        names = ", ".join(sorted(path.stem for path in known.parent.glob("*.toml")))
+        raise Fault(
+            "CONFIG",
+            f"{name}: no such {kind.removesuffix('s')}; known: {names}; or give the path of a .toml file",
+        )
+    return known
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    result = dict(below)
+    for key, value in above.items():
+        inner = result.get(key)
+        result[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
+    return result
+
+
+def load_rig(name: str, settings: list[str]) -> RigConfig:
+    """A rig by name or path, with `key=value` settings applied. Raises Fault CONFIG."""
+    path = _find(name, "rigs")
+    return validate(RigConfig, with_overrides(read_toml(path), settings), path.name)
+
+
+def load_scenario(name: str, settings: list[str]) -> Scenario:
+    """A scenario by name or path, with `key=value` settings applied. Raises Fault CONFIG.
+
+    Its table `rig` names a rig file (`file`) and may override any of its keys.
+    """
+    path = _find(name, "scenarios")
+    table = with_overrides({"name": path.stem} | read_toml(path), settings)
+    rig = table.get("rig")
+    if isinstance(rig, dict) and "file" in rig:
+        overrides = {key: value for key, value in rig.items() if key != "file"}
+        rig_name = str(rig["file"])
+        beside = path.parent / rig_name
+        rig_path = beside if beside.suffix == ".toml" and beside.is_file() else _find(rig_name, "rigs")
+        table["rig"] = _merged(read_toml(rig_path), overrides)
+    return validate(Scenario, table, path.name)
+
+
+def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
+    """What a process of this scenario says of itself."""
+    if role == "plant":
+        configuration: dict[str, Any] = {
+            "rig": scenario.rig.model_dump(mode="json"),
+            "seed": scenario.seed,
+            "duration_s": scenario.duration_s,
+            "lockstep": lockstep,
+        }
+    else:
+        configuration = scenario.controller.model_dump(mode="json")
+    versions = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
+    versions |= {"python": platform.python_version(), "machine": platform.machine()}
+    return wire.Header(
+        role=role,
+        schema_version=SCHEMA_VERSION,
+        configuration=json.dumps(configuration, sort_keys=True),
+        versions=json.dumps(versions, sort_keys=True),
+    )

@@ -1,0 +1,192 @@
+"""The envelope of a rig as a picture: where it sticks and slips, and how much vibration removes that."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from bridge.faults import Fault
+from plant.config import RigConfig
+
+if TYPE_CHECKING:
+    from plant.stability import Floats
+
+_RED, _AMBER, _GREEN, _INK = "#d9826b", "#f2d694", "#dcebd8", "#1f2d3a"
+_KINDS = (
+    (2, _RED, "unstable: stick-slip"),
+    (1, _AMBER, "smooth if undisturbed; stick-slip from a start at rest goes on"),
+    (0, _GREEN, "stable: smooth sliding"),
+)
+_RATIO_SET_POINT = 1.2  # of v_a to v_d: the margin that the controller keeps from the edge
+
+
+class MapResult(NamedTuple):
+    """The numbers behind the picture, SI, ready for JSON. None: no such value exists."""
+
+    picture: str
+    drive_velocity_mps: float
+    drive_stiffness_N_per_m: float
+    stable_without_vibration: bool
+    growth_per_s: float  # largest real part of the poles at the operating point, without vibration
+    smallest_vibration_velocity_mps: float | None  # stable from here on; None: not up to 5 v_d
+    critical_velocity_mps: float | None  # None: steady sliding is unstable at every velocity
+    self_sustained_velocity_mps: float | None  # None: stick-slip that has started never dies out
+    answer: str
+
+
+def stability_map(rig: RigConfig, out: Path) -> MapResult:
+    """Draw the map of `rig` to the PNG file `out` and return its numbers.
+
+    The operating point is the highest velocity of the drive's profile: it needs the most vibration. Raises
+    Fault CONFIG if the drive never moves, and OSError if `out` cannot be written.
+    """
+    import math
+
+    from plant.stability import (
+        critical_velocity_mps,
+        hurwitz_margin,
+        self_sustained_velocity_mps,
+        stabilising_vibration_mps,
+    )
+    from plant.stability import stability_map as growth_map
+
+    v_d = max(velocity_mps for _, velocity_mps in rig.drive.profile)
+    if v_d == 0.0:
+        raise Fault("CONFIG", f"{rig.name}: drive.profile: the drive never moves; give it a velocity above 0")
+    sustained_mps = float(self_sustained_velocity_mps(rig))
+    numbers = MapResult(
+        picture=str(out),
+        drive_velocity_mps=v_d,
+        drive_stiffness_N_per_m=rig.drive.stiffness_N_per_m,
+        stable_without_vibration=bool(hurwitz_margin(rig, v_d) >= 0.0),
+        growth_per_s=float(growth_map(rig, v_d)),
+        smallest_vibration_velocity_mps=stabilising_vibration_mps(rig, v_d),
+        critical_velocity_mps=critical_velocity_mps(rig),
+        self_sustained_velocity_mps=sustained_mps if math.isfinite(sustained_mps) else None,
+        answer="",
+    )
+    result = numbers._replace(answer=_answer(rig.name, numbers))
+    _draw(rig, result, out)
+    return result
+
+
+def _answer(name: str, result: MapResult) -> str:
+    """Two sentences: what happens here, and from which drive velocity on it no longer would."""
+    v_d, critical, sustained = (
+        result.drive_velocity_mps,
+        result.critical_velocity_mps,
+        result.self_sustained_velocity_mps,
+    )
+    here = f"{name} at {_mm(v_d)} mm/s: "
+    vibration = result.smallest_vibration_velocity_mps
+    if not result.stable_without_vibration and vibration is None:
+        here += "stick-slip without vibration; no vibration removes it"
+    elif not result.stable_without_vibration:
+        here += f"stick-slip without vibration; {_mm(vibration or 0.0)} mm/s of vibration or more removes it"
+    elif sustained is None or v_d < sustained:
+        here += "steady sliding is stable, but stick-slip from a start at rest goes on"
+    else:
+        here += "no stick-slip, no vibration needed"
+    if critical is None:
+        return f"{here}.\nNo drive velocity is fast enough: the drive has no damping."
+    if critical == 0.0:
+        return f"{here}.\nSteady sliding is stable at every drive velocity."
+    return f"{here}.\nCritical velocity {_mm(critical)} mm/s."
+
+
+def _mm(velocity_mps: float) -> str:
+    return f"{velocity_mps * 1e3:.3g}"
+
+
+def _draw(rig: RigConfig, result: MapResult, out: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.5, 6.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    _draw_without_vibration(left, rig, result)
+    _draw_with_vibration(right, rig, result)
+    figure.suptitle(result.answer, fontsize=13, color=_INK)
+    figure.savefig(out, dpi=120, format="png")
+
+
+def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
+    import numpy as np
+
+    from plant.stability import hurwitz_margin, self_sustained_velocity_mps, stability_map
+
+    v_d, k_d = result.drive_velocity_mps, result.drive_stiffness_N_per_m
+    v_s = rig.contact.stribeck_velocity_mps
+    # 20 v_s: beyond 27 v_s the slope of friction is 0 in double precision and an undamped rig would look stable
+    velocity_mps = np.geomspace(min(v_d, v_s) / 20.0, max(v_d * 3.0, v_s * 20.0), 300)
+    stiffness = np.geomspace(k_d / 30.0, k_d * 30.0, 201)
+    grid = (velocity_mps, stiffness[:, None])
+    unstable = hurwitz_margin(rig, *grid) < 0.0
+    sustained = grid[0] < self_sustained_velocity_mps(rig, grid[1])
+    areas = _regions(axes, velocity_mps * 1e3, stiffness * 1e-3, unstable, sustained)
+    if result.critical_velocity_mps is None:
+        # with no border to draw, the lines beyond which the instability is slow are what there is to know
+        growth_per_s = stability_map(rig, *grid)
+        for level_per_s, style in ((1.0, "-"), (1e-3, "--")):
+            axes.contour(
+                velocity_mps * 1e3, stiffness * 1e-3, growth_per_s,
+                levels=[level_per_s], colors="white", linestyles=style, linewidths=1.5,
+            )  # fmt: skip
+            label = f"white: to the right a disturbance takes over {1.0 / level_per_s:.0f} s to grow e-fold"
+            axes.plot([], [], color="#b0b0b0", ls=style, label=label)
+    elif result.critical_velocity_mps > 0.0:
+        label = f"critical velocity at the rig's k_d: {_mm(result.critical_velocity_mps)} mm/s"
+        axes.axvline(result.critical_velocity_mps * 1e3, color=_INK, lw=1.8, label=label)
+    _operating_point(axes, v_d * 1e3, k_d * 1e-3, f"this rig: {_mm(v_d)} mm/s, {k_d * 1e-3:.3g} N/mm")
+    axes.set(xscale="log", yscale="log", ylabel="drive stiffness k_d [N/mm]")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+    axes.set_title("Without vibration", loc="left", fontsize=11)
+    _finish(axes, areas)
+
+
+def _draw_with_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
+    import numpy as np
+
+    from plant.stability import hurwitz_margin
+
+    v_d = result.drive_velocity_mps
+    smallest = result.smallest_vibration_velocity_mps
+    top_mps = 2.5 * v_d
+    velocity_mps = np.linspace(top_mps / 360.0, top_mps, 360)
+    vibration_mps = np.linspace(0.0, top_mps, 361)
+    unstable = hurwitz_margin(rig, velocity_mps, None, vibration_mps[:, None]) < 0.0
+    areas = _regions(axes, velocity_mps * 1e3, vibration_mps * 1e3, unstable, np.zeros_like(unstable))
+    line_mm = np.array([0.0, top_mps * 1e3])
+    axes.plot(line_mm, line_mm, color=_INK, lw=1.2, ls="--", label="v_a = v_d")
+    set_point = f"v_a = {_RATIO_SET_POINT} v_d, a set point with margin"
+    axes.plot(line_mm, _RATIO_SET_POINT * line_mm, color=_INK, lw=1.2, ls=":", label=set_point)
+    if smallest:
+        axes.plot(
+            [v_d * 1e3] * 2, [0.0, smallest * 1e3], color=_INK, lw=2.0, ls="-", marker="_", ms=10,
+            label=f"at {_mm(v_d)} mm/s stable from {_mm(smallest)} mm/s of vibration on",
+        )  # fmt: skip
+    _operating_point(axes, v_d * 1e3, 0.0, f"this rig, vibration off: {_mm(v_d)} mm/s")
+    axes.set(xlim=(0.0, line_mm[1]), ylim=(0.0, line_mm[1]), ylabel="vibration velocity amplitude v_a [mm/s]")
+    axes.set_title("With vibration well above the contact resonance", loc="left", fontsize=11)
+    _finish(axes, areas)
+
+
+def _regions(axes: Any, x: "Floats", y: "Floats", unstable: Any, sustained: Any) -> list[Any]:
+    """Colour the regions; returns a legend entry for each that is there."""
+    import numpy as np
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    kind = np.where(unstable, 2, np.where(sustained, 1, 0))
+    axes.pcolormesh(x, y, kind, cmap=ListedColormap([_GREEN, _AMBER, _RED]), vmin=0, vmax=2, shading="nearest")
+    return [Patch(fc=color, label=label) for number, color, label in _KINDS if (kind == number).any()]
+
+
+def _operating_point(axes: Any, x: float, y: float, label: str) -> None:
+    axes.plot([x], [y], "o", ms=10, mfc="white", mec=_INK, mew=2.0, label=label, clip_on=False, zorder=5, ls="")
+
+
+def _finish(axes: Any, areas: list[Any]) -> None:
+    handles, _ = axes.get_legend_handles_labels()
+    axes.set_xlabel("drive velocity v_d [mm/s]")
+    axes.legend(handles=[*areas, *handles], loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False, fontsize=9)

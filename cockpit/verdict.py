@@ -1,0 +1,180 @@
+"""What came of a run, read from its log alone: in numbers for scripts and in words for a mechanic."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bridge import stickslip_pb2 as wire
+from bridge.logfile import RunData, read_run
+from diagnosis.cycles import Cycles, find_cycles
+
+_SETTLING_S = 1.0  # after the controller is enabled it has this long
+_ALARM_RATIO = 1.05
+
+
+class Phase(NamedTuple):
+    """One stretch of a run."""
+
+    seconds: float
+    slips: int
+    slips_per_min: float
+    swing_N: float  # of the drive force, largest to smallest block mean
+    mean_force_N: float
+
+
+class Latency(NamedTuple):
+    """Block out to its command in."""
+
+    p50_us: float
+    p99_us: float
+    p999_us: float
+    within_1_ms: float  # share
+
+
+class Verdict(NamedTuple):
+    """A run's figures."""
+
+    log: str
+    seconds: float
+    blocks: int
+    lost_blocks: int
+    lost_messages: int
+    enabled_from_s: float
+    before: Phase | None
+    after: Phase | None
+    velocity_ratio_min: float
+    velocity_ratio_max: float
+    latency: Latency | None
+    faults: list[str]
+
+    @property
+    def good(self) -> bool:
+        """Whether stick-slip is gone while the controller is in charge, and nothing was lost."""
+        gone = self.after is None or self.after.slips == 0
+        return gone and self.lost_blocks == 0 and not self.faults
+
+    def as_dict(self) -> dict[str, Any]:
+        """For `--json`."""
+        table: dict[str, Any] = self._asdict() | {"good": self.good}
+        for name in ("before", "after", "latency"):
+            table[name] = table[name] and table[name]._asdict()
+        return table
+
+
+def judge(path: Path) -> Verdict:
+    """Read a log and judge its run. Raises Fault BAD_LOG."""
+    return judge_run(read_run(path))
+
+
+def judge_run(run: RunData) -> Verdict:
+    """Judge a run that was read."""
+    controller = run.configuration("controller")
+    block_s = float(controller["block_s"])
+    blocks = len(run.sensors)
+    sequence = run.sensors["sequence"].astype(np.int64)
+    lost_blocks = int(sequence[-1] - sequence[0] + 1 - blocks) if blocks else 0
+    t_s = run.sensors["t_ns"] * 1e-9
+    force_N = run.sensors["drive_force_N"].astype(np.float64)
+    enabled_from_s = float(controller["policy"]["enabled_from_s"])
+    seconds = float(t_s[-1]) if blocks else 0.0
+    in_charge_s = enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
+    samples = force_N.shape[1] if blocks else 1
+    sample_s = (t_s[:, None] + (np.arange(samples) + 1 - samples) * (block_s / samples)).ravel()
+    cycles = find_cycles(sample_s, force_N.ravel()) if blocks else None
+    mean_N = force_N.mean(axis=1) if blocks else force_N
+    trace = run.trace
+    excited = (trace["mode"] == wire.EXCITE) & (
+        trace["t_ns"] * 1e-9 > in_charge_s + (0.5 if enabled_from_s == 0 else 0.0)
+    )
+    ratio = trace["vibration_velocity_mps"][excited] / np.maximum(trace["drive_velocity_mps"][excited], 1e-9)
+    faults = [
+        f"{event.code}: {event.text}" for event in run.events if event.code in {"GAP", "DROPPED", "PLANT_LOST", "STALE"}
+    ]
+    return Verdict(
+        log=str(run.path),
+        seconds=seconds,
+        blocks=blocks,
+        lost_blocks=lost_blocks,
+        lost_messages=_lost(run),
+        enabled_from_s=enabled_from_s,
+        before=_phase(cycles, t_s, mean_N, 0.0, min(enabled_from_s, seconds)),
+        after=_phase(cycles, t_s, mean_N, in_charge_s, seconds),
+        velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
+        velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
+        latency=_latency(run),
+        faults=faults,
+    )
+
+
+def _lost(run: RunData) -> int:
+    lost = 0
+    for table in (run.sensors, run.applied, run.command, run.trace, run.state):
+        if len(table):
+            sequence = table["sequence"].astype(np.int64)
+            lost += int(sequence[-1] - sequence[0] + 1 - len(np.unique(sequence)))
+    return lost
+
+
+def _phase(cycles: Cycles | None, t_s: Any, mean_N: Any, from_s: float, to_s: float) -> Phase | None:
+    inside = (t_s > from_s) & (t_s <= to_s)
+    if cycles is None or not inside.any():
+        return None
+    slips = cycles.between(from_s, to_s).slips
+    seconds = to_s - from_s
+    # the first ramp of a run starts from an unloaded spring: no part of the swing of what follows
+    steady = inside & (t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
+    swing_N = float(np.ptp(mean_N[steady]))
+    return Phase(seconds, slips, 60.0 * slips / seconds, swing_N, float(mean_N[steady].mean()))
+
+
+def _latency(run: RunData) -> Latency | None:
+    round_trip_ns = run.applied["round_trip_ns"][run.applied["commands"] > 0]
+    round_trip_ns = round_trip_ns[round_trip_ns > 0]
+    if not len(round_trip_ns):
+        return None
+    p50, p99, p999 = (float(value) * 1e-3 for value in np.percentile(round_trip_ns, [50, 99, 99.9]))
+    # a command that never came is a late one
+    within = float((round_trip_ns < 1_000_000).sum()) / max(len(run.applied) - 1, 1)
+    return Latency(p50, p99, p999, min(within, 1.0))
+
+
+def in_words(verdict: Verdict) -> list[str]:
+    """The verdict as lines for a person."""
+    v = verdict
+    lines: list[str] = []
+    if v.before is not None:
+        lines.append(
+            f"before   {v.before.slips} slips in {v.before.seconds:.1f} s ({v.before.slips_per_min:.0f} per minute), "
+            f"drive force swings by {v.before.swing_N:.2f} N"
+        )
+    if v.after is not None:
+        lines.append(
+            f"after    {v.after.slips} slips in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
+        )
+    if v.velocity_ratio_max > 0:
+        low = "ok" if v.velocity_ratio_min >= _ALARM_RATIO else f"below {_ALARM_RATIO}: stick-slip may return"
+        lines.append(f"v_a/v_d  {v.velocity_ratio_min:.2f} to {v.velocity_ratio_max:.2f} while vibrating ({low})")
+    if v.latency is not None:
+        latency = v.latency
+        lines.append(
+            f"latency  block to command p50 {latency.p50_us:.0f} us, p99 {latency.p99_us:.0f} us, p99.9 "
+            f"{latency.p999_us:.0f} us; {100 * latency.within_1_ms:.2f} % within 1 ms"
+        )
+    lost = "none lost" if v.lost_blocks == 0 else f"{v.lost_blocks} LOST"
+    lines.append(f"blocks   {v.blocks}, {lost}" + (f"; {v.lost_messages} log messages lost" if v.lost_messages else ""))
+    lines.extend(f"warning  {fault}" for fault in v.faults)
+    lines.append(f"log      {v.log}")
+    return lines
+
+
+def headline(verdict: Verdict) -> str:
+    """The answer in one line."""
+    v = verdict
+    if v.after is None:
+        return "the controller was not in charge in this run"
+    if v.after.slips:
+        return f"stick-slip is still there: {v.after.slips} slips while the controller was in charge"
+    if v.before is not None and v.before.slips:
+        return f"stick-slip is gone: {v.before.slips} slips before, none with the controller in charge"
+    return "no stick-slip with the controller in charge"

@@ -1,0 +1,115 @@
+"""The controller process: blocks in, commands out. The command leaves first; everything else follows it."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from bridge import realtime
+from bridge import stickslip_pb2 as wire
+from bridge.faults import Fault
+from bridge.topics import COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, SNAPSHOT, STATE, TRACE
+from bridge.zenoh_link import Bus, BusConfig, Inbox, Received
+from controller.config import ControllerConfig
+from controller.node import ControllerNode
+
+# A step takes 0.03 ms: a backlog of this many blocks is worked off within 8 ms, so none needs to be skipped.
+_INBOX_LIMIT = 256
+_PLANT_LOST_S = 1.0
+
+
+def run(
+    config: ControllerConfig,
+    bus_config: BusConfig,
+    header: wire.Header,
+    lockstep: bool,
+    stop: threading.Event,
+) -> None:
+    """Answer every block on the bus until the plant ends its run or `stop` is set.
+
+    Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE.
+    """
+    node = ControllerNode(config)
+    node.warm_up()
+    with Bus(bus_config, "controller", lockstep) as bus:
+        bus.serve_header(header)
+        process = _Process(config, node, bus, lockstep)
+        process.prepare()
+        bus.announce()
+        if not lockstep:
+            process.event("START", realtime.claim(1))
+        process.loop(stop)
+
+
+class _Process:
+    def __init__(self, config: ControllerConfig, node: ControllerNode, bus: Bus, lockstep: bool) -> None:
+        self._node = node
+        self._bus = bus
+        self._lockstep = lockstep
+        self._block_s = config.block_s
+        self._stale_after_s = config.limits.stale_after_s
+        self._inbox = Inbox(_INBOX_LIMIT)
+        self._send: dict[str, Callable[[bytes], None]] = {}
+        self._events = 0
+        self._ended = False
+
+    def prepare(self) -> None:
+        """Take one's place on the bus."""
+        for topic in (COMMAND, TRACE, STATE, SNAPSHOT, CONTROLLER_EVENT):
+            self._send[topic.name] = self._bus.publisher(topic)
+        for topic in (SENSORS, PLANT_EVENT, OPERATOR):
+            self._bus.listen(topic, self._inbox.push)
+
+    def event(self, code: str, text: str) -> None:
+        """Tell the bus."""
+        event = wire.Event(sequence=self._events, t_ns=self._node.t_ns, source="controller", code=code, text=text)
+        self._events += 1
+        self._send[CONTROLLER_EVENT.name](event.SerializeToString())
+
+    def loop(self, stop: threading.Event) -> None:
+        """Consume blocks in order and answer each; the plant takes the newest answer it has."""
+        node = self._node
+        heard_s = time.monotonic()
+        started = False
+        stale = False
+        while not stop.is_set() and not self._ended:
+            received = self._inbox.get(self._stale_after_s)
+            if received is None:
+                self._mind_the_plant(heard_s)
+                if started and not self._lockstep:
+                    if not stale:
+                        self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
+                    stale = True
+                    self._send[COMMAND.name](node.stale(round(self._stale_after_s / self._block_s)).payload)
+                    self._send_rest(0)
+                continue
+            heard_s = time.monotonic()
+            if stale and received.topic is SENSORS:
+                self.event("FRESH", "blocks arrive again")
+                stale = False
+            started |= received.topic is SENSORS
+            self._consume(received)
+        self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
+
+    def _consume(self, received: Received) -> None:
+        node = self._node
+        if received.topic is SENSORS:
+            command = node.block(received.payload)
+            if command is not None:
+                self._send[COMMAND.name](command.payload)
+                self._send_rest(0 if self._lockstep else received.arrival_ns)
+        elif received.topic is OPERATOR:
+            word = wire.Operator.FromString(received.payload)
+            node.operator(word.action)
+            self.event("OPERATOR", f"{wire.Operator.Action.Name(word.action)} by {word.who or 'somebody'}")
+        elif wire.Event.FromString(received.payload).code == "END":
+            self._ended = True
+
+    def _send_rest(self, arrival_ns: int) -> None:
+        lateness_ns = time.perf_counter_ns() - arrival_ns if arrival_ns else 0
+        for message in self._node.rest(lateness_ns):
+            self._send[message.topic.name](message.payload)
+
+    def _mind_the_plant(self, heard_s: float) -> None:
+        silent_s = time.monotonic() - heard_s
+        if silent_s > _PLANT_LOST_S and not self._bus.alive("plant"):
+            raise Fault("PEER_DIED", f"the plant left the bus; last block at {self._node.t_ns * 1e-9:.3f} s")

@@ -1,0 +1,34 @@
+"""The codes of modes, states, reasons and limits, and the event bits of a frame, as plain numbers for kernels."""
+
+from bridge import stickslip_pb2 as wire
+
+DISABLED, WATCH, EXCITE, WAIT, PROBE, STOPPED = (
+    int(mode) for mode in (wire.DISABLED, wire.WATCH, wire.EXCITE, wire.WAIT, wire.PROBE, wire.STOPPED)
+)
+UNKNOWN, STANDSTILL, STICK, SLIP, SMOOTH = (
+    int(state) for state in (wire.UNKNOWN, wire.STANDSTILL, wire.STICK, wire.SLIP, wire.SMOOTH)
+)
+NO_LIMIT, RANGE, SLEW, FREQUENCY_BAND, STALE_INPUT, OPERATOR_STOP, NOT_FINITE = (
+    int(limit)
+    for limit in (
+        *(wire.NO_LIMIT, wire.RANGE, wire.SLEW, wire.FREQUENCY_BAND),
+        *(wire.STALE_INPUT, wire.OPERATOR_STOP, wire.NOT_FINITE),
+    )
+)
+NOT_ENABLED, NOTHING_TO_DO, STICK_SEEN, HELD, LATE_SO_GENTLE, TOO_LATE = (
+    int(reason)
+    for reason in (
+        *(wire.NOT_ENABLED, wire.NOTHING_TO_DO, wire.STICK_SEEN),
+        *(wire.HELD, wire.LATE_SO_GENTLE, wire.TOO_LATE),
+    )
+)
+STILL_NEEDED, NOT_NEEDED, DRIVE_STANDS, PIEZO_WEAK = (
+    int(reason) for reason in (wire.STILL_NEEDED, wire.NOT_NEEDED, wire.DRIVE_STANDS, wire.PIEZO_WEAK)
+)
+
+# bits of a frame's events, as Trace.events
+BLOCK = 1
+GAP = 2
+STALE = 4
+STOP = 8
+RESET = 16

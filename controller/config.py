@@ -1,0 +1,131 @@
+"""What a controller file may say."""
+
+import math
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from bridge.config import Strict, Two
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(gt=0, le=1)]
+LONGEST_WINDOW_BLOCKS = 128
+MOST_BANDS = 8
+
+
+class OnsetConfig(Strict):
+    """How stick, slip and smooth sliding are told apart."""
+
+    # five sigma of a fitted slope: (300 sigma^2 / (f_s (k_d v_d)^2))^(1/3) = 9 ms at 20 mN and 5.85 N/s; twice that
+    window_s: Positive = 0.02
+    velocity_window_s: Positive = 0.04
+    stick_force_rate: Annotated[float, Field(gt=0, lt=1)] = 0.5
+    slip_drop_N: Positive = 0.15  # over 3 ms; a slip of the paper's rig drops 0.5 N, noise 0.01 N
+    slip_burst_mps2: Positive = 0.2  # a slip of the paper's rig reaches 2.6
+    standstill_mps: Positive = 2e-5
+    breakaway_force_N: NotNegative = 0.0  # 0: learnt from the slips that are seen
+
+
+class PolicyConfig(Strict):
+    """When to vibrate and when to stop. Times from the start of the run."""
+
+    enabled_from_s: NotNegative = 0.0
+    gentle_ratio: Annotated[float, Field(ge=1.05, le=1.5)] = 1.12
+    # of the breakaway force; on the paper's rig a vibration that starts above 0.85 F_s causes the slip it should prevent
+    gentle_from: Share = 0.8
+    too_late_from: Share = 0.85
+    probe_every_s: Positive = 30.0  # doubles with every probe that finds the vibration still needed
+    probe_every_max_s: Positive = 600.0
+    probe_fade_s: Positive = 0.5
+    probe_hold_s: Positive = 3.0
+
+
+class AmplitudeConfig(Strict):
+    """The loop that makes the measured v_a what it should be; `loop_design` gives its margins."""
+
+    # phase margin 60 degrees and gain margin 6.3 with this filter and a delay of 2 blocks: controller/loop_design.py
+    gain: Positive = 0.0826
+    filter_s: Positive = 0.005
+    accel_bandwidth_Hz: Positive = 10000.0  # of the base accelerometer, undone at f
+
+
+class LimitsConfig(Strict):
+    """What no policy can exceed, and the set point of v_a / v_d."""
+
+    v_ratio: Annotated[float, Field(ge=1.05, le=3.0)] = 1.2
+    amplitude_max_m: Positive = 1e-7
+    velocity_max_mps: Positive = 5e-3
+    slew_m_per_s: Positive = 1e-6
+    frequency_min_Hz: Positive = 500.0
+    frequency_max_Hz: Positive = 5000.0
+    # the displacement transducers' carrier is 4.8 kHz: a vibration close by beats with it
+    forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = [(4600.0, 5000.0)]
+    stale_after_s: Positive = 0.02
+
+
+class ControllerConfig(Strict):
+    """One controller."""
+
+    block_s: Positive = 1e-3
+    samples_per_block: Annotated[int, Field(ge=4, le=200)] = 20
+    drive_stiffness_N_per_m: Positive = 11700.0
+    contact_resonance_Hz: NotNegative = 1144.0  # sqrt(k_t / m) / 2 pi of the steel pair
+    onset: OnsetConfig = OnsetConfig()
+    policy: PolicyConfig = PolicyConfig()
+    amplitude: AmplitudeConfig = AmplitudeConfig()
+    limits: LimitsConfig = LimitsConfig()
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> "ControllerConfig":
+        limits, onset, policy = self.limits, self.onset, self.policy
+        if limits.frequency_max_Hz <= limits.frequency_min_Hz:
+            raise ValueError(
+                f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be above "
+                f"limits.frequency_min_Hz = {limits.frequency_min_Hz}"
+            )
+        nyquist_Hz = 0.5 * self.samples_per_block / self.block_s
+        if limits.frequency_max_Hz >= nyquist_Hz:
+            raise ValueError(
+                f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be below half the sample rate, {nyquist_Hz:g} Hz"
+            )
+        for low, high in limits.forbidden_Hz:
+            if high <= low:
+                raise ValueError(f"limits.forbidden_Hz: [{low}, {high}]: the second must be above the first")
+        if not candidate_frequencies_Hz(self):
+            raise ValueError(
+                "limits.forbidden_Hz: no frequency is left between limits.frequency_min_Hz = "
+                f"{limits.frequency_min_Hz:g} and limits.frequency_max_Hz = {limits.frequency_max_Hz:g}; narrow the bands"
+            )
+        for name, window_s in (("window_s", onset.window_s), ("velocity_window_s", onset.velocity_window_s)):
+            blocks = window_s / self.block_s
+            if not 5 <= blocks <= LONGEST_WINDOW_BLOCKS:
+                raise ValueError(
+                    f"onset.{name} = {window_s:g}: must hold 5 to {LONGEST_WINDOW_BLOCKS} blocks of {self.block_s:g} s"
+                )
+        if policy.too_late_from <= policy.gentle_from:
+            raise ValueError(
+                f"policy.too_late_from = {policy.too_late_from}: must be above policy.gentle_from = {policy.gentle_from}"
+            )
+        return self
+
+
+MOST_CANDIDATES = 64
+_ABOVE_RESONANCE = 2.2  # from about twice the contact resonance up the edge is at v_a / v_d = 1.05 whatever the damping
+
+
+def candidate_frequencies_Hz(config: ControllerConfig) -> list[float]:
+    """Frequencies to choose from, lowest first: above the contact resonance where the band allows, none forbidden."""
+    limits = config.limits
+    lowest_Hz = limits.frequency_min_Hz
+    above_Hz = _ABOVE_RESONANCE * config.contact_resonance_Hz
+    if above_Hz < limits.frequency_max_Hz:
+        lowest_Hz = max(lowest_Hz, above_Hz)
+    step_Hz = 100.0 * max(1, math.ceil((limits.frequency_max_Hz - lowest_Hz) / (100.0 * (MOST_CANDIDATES - 1))))
+    first = math.ceil(lowest_Hz / step_Hz)
+    last = math.floor(limits.frequency_max_Hz / step_Hz)
+    return [
+        step_Hz * n
+        for n in range(first, last + 1)
+        if not any(low <= step_Hz * n <= high for low, high in limits.forbidden_Hz)
+    ]

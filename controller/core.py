@@ -1,0 +1,93 @@
+"""One step of the controller: onset, policy, limits. The same function runs live, in lockstep and in replay."""
+
+from typing import Any
+
+import numpy.typing as npt
+
+from bridge.kernel import Record, kernel
+from controller.codes import BLOCK
+from controller.limits import allow
+from controller.onset import contact, drive_velocity
+from controller.policy import decide, want
+from controller.vibration import burst, measure
+
+
+@kernel
+def step(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    sensors: npt.NDArray[Any],
+    events: int,
+    gap_blocks: int,
+    t_ns: int,
+    command: npt.NDArray[Any],
+    trace: npt.NDArray[Any],
+    scratch: npt.NDArray[Any],
+) -> None:
+    """Advance `state` by one frame, in place, and fill in `command` and `trace`.
+
+    Args:
+        params, state: one record each of `controller.records.PARAMS` and `STATE`.
+        sensors: one sensor block; not looked at when `events` has no BLOCK.
+        events: bits of `controller.codes`: BLOCK, GAP, STALE, STOP, RESET.
+        gap_blocks: blocks that never came, just before this one.
+        t_ns: of the frame.
+        command, trace: one message record each, filled but for the trace's lateness.
+        scratch: float64 [samples], overwritten.
+
+    """
+    p: Record = params[0]
+    s: Record = state[0]
+    samples = p.samples_per_block
+    force_N = 0.0
+    if events & BLOCK:
+        block: Record = sensors[0]
+        s.block = block.sequence
+        position_m = 0.0
+        for i in range(samples):
+            force_N += float(block.drive_force_N[i])
+            position_m += float(block.drive_position_m[i])
+        force_N /= samples
+        position_m /= samples
+        if gap_blocks > 0:  # the rings hold blocks one period apart: a slope across a gap would be wrong
+            s.force_count = 0
+            s.position_count = 0
+        measure(p, s, block.base_accel_mps2, scratch)
+        drive_velocity(p, s, position_m)
+        contact(p, s, force_N, burst(p, s, block.mass_accel_mps2, scratch))
+        decide(p, s, t_ns, force_N)
+        want(p, s)
+    allow(p, s, events, s.wanted_Hz, s.wanted_m)
+
+    c: Record = command[0]
+    c.sequence = s.steps
+    c.t_ns = t_ns
+    c.block = s.block
+    c.frequency_Hz = s.allowed_Hz
+    c.amplitude_m = s.allowed_m
+    c.mode = s.mode
+    c.limit = s.limit
+    c.reason = s.reason
+
+    t: Record = trace[0]
+    t.sequence = s.steps
+    t.t_ns = t_ns
+    t.block = s.block
+    t.events = events
+    t.gap_blocks = gap_blocks
+    t.state = s.contact
+    t.mode = s.mode
+    t.reason = s.reason
+    t.limit = s.limit
+    t.slips = s.slips
+    t.score = s.score
+    t.force_rate = s.force_rate
+    t.drive_force_N = force_N
+    t.burst_mps2 = s.burst_mps2
+    t.drive_velocity_mps = s.drive_velocity_mps
+    t.vibration_velocity_mps = s.vibration_velocity_mps
+    t.wanted_velocity_mps = s.wanted_velocity_mps
+    t.wanted_amplitude_m = s.wanted_m
+    t.wanted_frequency_Hz = s.wanted_Hz
+    t.time_to_slip_s = s.time_to_slip_s
+    s.steps += 1

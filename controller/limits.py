@@ -1,0 +1,83 @@
+"""What is allowed, whatever the policy wants. Nothing reaches the bus that did not come out of `allow`."""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import (
+    BLOCK,
+    FREQUENCY_BAND,
+    NO_LIMIT,
+    NOT_FINITE,
+    OPERATOR_STOP,
+    RANGE,
+    RESET,
+    SLEW,
+    STALE,
+    STALE_INPUT,
+    STOP,
+)
+
+TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def _allowed_frequency(p: Record, frequency_Hz: float) -> float:
+    """The nearest frequency inside the band and outside every forbidden one, upwards first [Hz]."""
+    result = min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz)
+    for _ in range(p.bands):  # a push may land in the next band
+        for i in range(p.bands):
+            low, high = p.band_Hz[i, 0], p.band_Hz[i, 1]
+            if low <= result <= high:
+                result = high + 1.0 if high + 1.0 <= p.frequency_max_Hz else low - 1.0
+    return result
+
+
+@kernel
+def allow(p: Record, s: Record, events: int, wanted_Hz: float, wanted_m: float) -> None:
+    """Set `allowed_Hz`, `allowed_m` and the `limit` that changed what was wanted.
+
+    The amplitude goes to zero, at the slew limit, on an operator's stop, without fresh input, and for anything that is no
+    number. A stop stays until a reset.
+    """
+    if events & STOP:
+        s.stopped = 1
+    elif events & RESET:
+        s.stopped = 0
+    if events & STALE:
+        s.stale = 1
+    elif events & BLOCK:
+        s.stale = 0
+
+    limit = NO_LIMIT
+    frequency_Hz = wanted_Hz
+    target_m = wanted_m
+    if not (math.isfinite(wanted_Hz) and math.isfinite(wanted_m)):
+        limit, frequency_Hz, target_m = NOT_FINITE, s.allowed_Hz, 0.0
+    elif s.stopped == 1:
+        limit, target_m = OPERATOR_STOP, 0.0
+    elif s.stale == 1:
+        limit, target_m = STALE_INPUT, 0.0
+
+    if target_m <= 0.0:
+        target_m = 0.0
+        frequency_Hz = s.allowed_Hz  # a vibration that fades keeps its frequency
+    if frequency_Hz > 0.0:
+        inside_Hz = _allowed_frequency(p, frequency_Hz)
+        if inside_Hz != frequency_Hz and limit == NO_LIMIT:
+            limit = FREQUENCY_BAND
+        s.allowed_Hz = inside_Hz
+        largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * inside_Hz))
+    else:
+        largest_m = 0.0  # no frequency was ever asked for
+    if target_m > largest_m:
+        target_m = largest_m
+        if limit == NO_LIMIT:
+            limit = RANGE
+    low_m, high_m = s.allowed_m - p.slew_m_per_step, s.allowed_m + p.slew_m_per_step
+    slewed_m = min(max(target_m, low_m), high_m)
+    slewed_m = min(max(slewed_m, 0.0), largest_m)
+    if slewed_m != target_m and limit == NO_LIMIT:
+        limit = SLEW
+    s.allowed_m = slewed_m
+    s.limit = limit
+    s.free_steps = s.free_steps + 1 if limit == NO_LIMIT else 0

@@ -1,0 +1,115 @@
+"""The controller as a participant of the bus: sensor blocks in; command, trace, state and snapshots out."""
+
+from typing import Any
+
+import numpy as np
+
+from bridge import stickslip_pb2 as wire
+from bridge.messages import COMMAND as COMMAND_LAYOUT
+from bridge.messages import STATE as STATE_LAYOUT
+from bridge.messages import TRACE as TRACE_LAYOUT
+from bridge.messages import sensor_block, sequence_and_time
+from bridge.topics import COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
+from controller.codes import BLOCK, GAP, RESET, STALE, STOP
+from controller.config import ControllerConfig
+from controller.core import step
+from controller.records import LAYOUT_ID, build
+
+_STATE_EVERY = 10  # steps: 100 Hz
+_SNAPSHOT_EVERY = 1000  # steps: once a second
+
+
+class ControllerNode:
+    """The controller, stepped frame by frame. Raises Fault BAD_MESSAGE for blocks that cannot be read."""
+
+    def __init__(self, config: ControllerConfig) -> None:
+        self.duplicates = 0
+        self.steps = 0
+        self.t_ns = 0  # of the last frame
+        self._params, self._state = build(config)
+        self._block_ns = round(config.block_s * 1e9)
+        self._layout = sensor_block(config.samples_per_block)
+        self._no_sensors = self._layout.blank()
+        self._scratch = np.empty(config.samples_per_block)
+        self._command = COMMAND_LAYOUT.blank()
+        self._trace = TRACE_LAYOUT.blank()
+        self._lateness_ns = self._trace["lateness_ns"]
+        self._plotted = STATE_LAYOUT.blank()
+        self._expected = 0
+        self._operator_events = 0
+
+    def warm_up(self) -> None:
+        """Compile or load the kernel on copies, so that the first answer is not late."""
+        step(
+            self._params, self._state.copy(), self._no_sensors, BLOCK, 0, 0,
+            COMMAND_LAYOUT.blank(), TRACE_LAYOUT.blank(), self._scratch,
+        )  # fmt: skip
+
+    def operator(self, action: int) -> None:
+        """A person's word; it takes effect with the next frame, where the log shows it."""
+        if action == wire.Operator.STOP:
+            self._operator_events = STOP
+        elif action == wire.Operator.RESET and not self._operator_events & STOP:
+            self._operator_events = RESET
+
+    def block(self, payload: bytes) -> Outgoing | None:
+        """Consume a sensor block: the command that answers it, or None for one seen before.
+
+        After this `rest` gives what else is to be sent, once the command is out.
+        """
+        payload = self._layout.canonical(payload, SENSORS.name)
+        sequence, t_ns = sequence_and_time(payload, SENSORS.message)
+        if sequence < self._expected:
+            self.duplicates += 1  # late or repeated: what it would have told is already in a gap
+            return None
+        gap_blocks = sequence - self._expected if self.steps else 0
+        self._expected = sequence + 1
+        self.t_ns = t_ns
+        sensors = self._layout.read(payload, SENSORS.name)
+        events = BLOCK | (GAP if gap_blocks else 0) | self._operator_events
+        return self._step(sensors, events, gap_blocks)
+
+    def stale(self, silent_blocks: int) -> Outgoing:
+        """Step without a block, `silent_blocks` periods after the last frame: the command ramps to zero."""
+        self.t_ns += silent_blocks * self._block_ns
+        return self._step(self._no_sensors, STALE | self._operator_events, 0)
+
+    def _step(self, sensors: Any, events: int, gap_blocks: int) -> Outgoing:
+        self._operator_events = 0
+        step(
+            self._params, self._state, sensors, events, gap_blocks, self.t_ns,
+            self._command, self._trace, self._scratch,
+        )  # fmt: skip
+        self.steps += 1
+        return Outgoing(COMMAND, self._command.tobytes())
+
+    def rest(self, lateness_ns: int) -> list[Outgoing]:
+        """What follows the command: the trace, now and then the plotted state and a snapshot of the memory."""
+        self._lateness_ns[0] = lateness_ns
+        messages = [Outgoing(TRACE, self._trace.tobytes())]
+        if self.steps % _STATE_EVERY == 0:
+            messages.append(self._state_message())
+        if self.steps % _SNAPSHOT_EVERY == 0:
+            snapshot = wire.Snapshot(
+                sequence=self.steps // _SNAPSHOT_EVERY - 1,
+                t_ns=self.t_ns,
+                step=self.steps - 1,
+                layout=LAYOUT_ID,
+                memory=self._state.tobytes(),
+            )
+            messages.append(Outgoing(SNAPSHOT, snapshot.SerializeToString()))
+        return messages
+
+    def _state_message(self) -> Outgoing:
+        trace: Any = self._trace[0]
+        plotted: Any = self._plotted[0]
+        plotted.sequence = self.steps // _STATE_EVERY - 1
+        plotted.t_ns = self.t_ns
+        for name in (
+            *("drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate", "score"),
+            *("mode", "state", "slips"),
+        ):
+            plotted[name] = trace[name]
+        moving = trace.state > wire.STANDSTILL and trace.drive_velocity_mps > 0.0
+        plotted.velocity_ratio = trace.vibration_velocity_mps / trace.drive_velocity_mps if moving else 0.0
+        return Outgoing(STATE, self._plotted.tobytes())

@@ -1,0 +1,75 @@
+"""What the accelerometers say about the vibration: the delivered v_a, and the slide's burst without the exciter's lines."""
+
+import math
+
+from bridge.kernel import Record, kernel
+
+TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def _line(samples: Record, residual: Record, step_rad: float, start_rad: float) -> tuple[float, float]:
+    """Fit a cos + b sin at one frequency to `samples` by least squares; `residual` gets the rest.
+
+    Exact for a pure sine however many periods a block holds, where a plain correlation leaks.
+    """
+    cos_cos, cos_sin, sin_sin, with_cos, with_sin = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(samples.shape[0]):
+        angle = start_rad + step_rad * i
+        c, sn = math.cos(angle), math.sin(angle)
+        value = float(samples[i])
+        cos_cos += c * c
+        cos_sin += c * sn
+        sin_sin += sn * sn
+        with_cos += value * c
+        with_sin += value * sn
+    determinant = cos_cos * sin_sin - cos_sin * cos_sin
+    if determinant < 1e-9:
+        a, b = 0.0, 0.0
+    else:
+        a = (with_cos * sin_sin - with_sin * cos_sin) / determinant
+        b = (with_sin * cos_cos - with_cos * cos_sin) / determinant
+    for i in range(samples.shape[0]):
+        angle = start_rad + step_rad * i
+        residual[i] = float(samples[i]) - a * math.cos(angle) - b * math.sin(angle)
+    return a, b
+
+
+@kernel
+def measure(p: Record, s: Record, base_accel_mps2: Record, scratch: Record) -> None:
+    """Demodulate the base accelerometer at the commanded frequency into v_a = a / (2 pi f).
+
+    Args:
+        base_accel_mps2: [samples]; scratch: [samples], overwritten.
+
+    """
+    frequency_Hz = s.allowed_Hz
+    if frequency_Hz <= 0.0:
+        s.vibration_velocity_mps = 0.0
+        return
+    step_rad = TWO_PI * frequency_Hz * p.sample_s
+    a, b = _line(base_accel_mps2, scratch, step_rad, s.phase_rad)
+    s.phase_rad = (s.phase_rad + step_rad * p.samples_per_block) % TWO_PI
+    if s.demodulated_Hz != frequency_Hz:
+        s.demodulated_Hz = frequency_Hz
+        s.in_phase_mps2, s.quadrature_mps2 = a, b
+    s.in_phase_mps2 += p.filter_share * (a - s.in_phase_mps2)
+    s.quadrature_mps2 += p.filter_share * (b - s.quadrature_mps2)
+    rolled_off = frequency_Hz / p.accel_bandwidth_Hz
+    amplitude_mps2 = math.sqrt(s.in_phase_mps2 * s.in_phase_mps2 + s.quadrature_mps2 * s.quadrature_mps2)
+    s.vibration_velocity_mps = amplitude_mps2 * math.sqrt(1.0 + rolled_off * rolled_off) / (TWO_PI * frequency_Hz)
+
+
+@kernel
+def burst(p: Record, s: Record, mass_accel_mps2: Record, scratch: Record) -> float:
+    """Rms of the slide's acceleration over the block [m/s2], without the exciter's line and its second harmonic."""
+    for i in range(mass_accel_mps2.shape[0]):
+        scratch[i] = float(mass_accel_mps2[i])
+    if s.allowed_m > 0.0:
+        step_rad = TWO_PI * s.allowed_Hz * p.sample_s
+        _line(scratch, scratch, step_rad, 0.0)
+        _line(scratch, scratch, 2.0 * step_rad, 0.0)
+    total = 0.0
+    for i in range(scratch.shape[0]):
+        total += scratch[i] * scratch[i]
+    return math.sqrt(total / scratch.shape[0])

@@ -1,0 +1,17 @@
+"""The rig that is not there: a LuGre contact, a compliant drive, a piezo exciter and a sensor chain.
+
+Symbols that appear here and nowhere else, as in the paper (A. Leus et al., longitudinal tangential vibrations):
+
+    k_t  contact stiffness [N/m]            x    position of the slide [m]
+    h_t  contact damping [N s/m]            v    velocity of the slide [m/s]
+    h_v  viscous damping [N s/m]            z    deflection of the bristles [m]
+    F_c  Coulomb friction force [N]         s_d  position of the drive [m]
+    F_s  static friction force [N]          v_r  relative velocity in the contact, v - u' [m/s]
+    v_s  Stribeck velocity [m/s]            u    displacement of the base [m], u0 its amplitude [m]
+    k_d  drive stiffness [N/m]              phi  phase of the vibration [rad]
+    h_d  drive damping [N s/m]              g    steady friction force at a velocity [N]
+
+`config` is what a rig file says, `records` the derived numbers and the state, `contact` one step of friction and slide,
+`core` one block of all of it, `sensors` what the channels make of the truth, `simulate` a run without a bus, `node` the rig
+as a participant of the bus, `app` the process.
+"""

@@ -1,0 +1,142 @@
+"""The plant process: the rig on the bus, paced to the wall clock or in lockstep with the controller."""
+
+import collections
+import threading
+import time
+from typing import Any
+
+from bridge import realtime
+from bridge import stickslip_pb2 as wire
+from bridge.faults import Fault
+from bridge.messages import COMMAND as COMMAND_LAYOUT
+from bridge.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS
+from bridge.zenoh_link import Bus, BusConfig, Inbox, Received
+from plant.config import RigConfig
+from plant.node import PlantNode
+
+PEER_TIMEOUT_S = 30.0  # a first start compiles the controller's kernels
+_ANSWER_TIMEOUT_S = 5.0
+_GOODBYE_S = 3.0
+_ROUND_TRIPS_KEPT = 1024
+
+
+def run(
+    rig: RigConfig,
+    seed: int,
+    duration_s: float,
+    bus_config: BusConfig,
+    header: wire.Header,
+    wait_for: list[str],
+    lockstep: bool,
+    stop: threading.Event,
+) -> None:
+    """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set.
+
+    Raises Fault ENDPOINT_BUSY, NO_PEER, LOCKSTEP_STALLED, BAD_MESSAGE.
+    """
+    node = PlantNode(rig, seed)
+    node.warm_up()
+    blocks = round(duration_s / rig.solver.block_s) if duration_s > 0 else 2**62
+    with Bus(bus_config, "plant", lockstep) as bus:
+        bus.serve_header(header)
+        process = _Process(node, bus)
+        bus.announce()
+        missing = _wait(bus, wait_for, stop)
+        if missing:
+            raise Fault(
+                "NO_PEER",
+                f"{bus_config.endpoint}: no {' and no '.join(sorted(missing))} within {PEER_TIMEOUT_S:g} s",
+            )
+        if lockstep:
+            process.event("START", "lockstep")
+            process.lockstep(blocks, stop)
+        else:
+            process.event("START", realtime.claim(0))
+            process.realtime(blocks, stop)
+        process.event("END", f"blocks={node.block}")
+        bus.wait_until_alone(_GOODBYE_S)  # the others are relayed by this process: it leaves last
+
+
+def _wait(bus: Bus, roles: list[str], stop: threading.Event) -> set[str]:
+    until_s = time.monotonic() + PEER_TIMEOUT_S
+    missing = bus.wait_for(roles, 0.0)
+    while missing and time.monotonic() < until_s and not stop.is_set():
+        missing = bus.wait_for(roles, 0.2)
+    return set() if stop.is_set() else missing
+
+
+class _Process:
+    def __init__(self, node: PlantNode, bus: Bus) -> None:
+        self._node = node
+        self._bus = bus
+        self._commands: collections.deque[Received] = collections.deque(maxlen=64)
+        self._answers = Inbox(64)
+        self._events = 0
+        self._send_sensors = bus.publisher(SENSORS)
+        self._send_applied = bus.publisher(APPLIED)
+        self._send_event = bus.publisher(PLANT_EVENT)
+        bus.listen(COMMAND, self._receive)
+
+    def _receive(self, received: Received) -> None:
+        self._commands.append(received)
+        self._answers.push(received)
+
+    def event(self, code: str, text: str) -> None:
+        """Tell the bus."""
+        t_ns = self._node.block * self._node.block_ns
+        event = wire.Event(sequence=self._events, t_ns=t_ns, source="plant", code=code, text=text)
+        self._events += 1
+        self._send_event(event.SerializeToString())
+
+    def realtime(self, blocks: int, stop: threading.Event) -> None:
+        """One block a period, under the newest command; after `stop` until the vibration has faded."""
+        node, pacer = self._node, realtime.Pacer(self._node.block_ns)
+        sent_ns = [0] * _ROUND_TRIPS_KEPT
+        fading = 0
+        tick = 0
+        while node.block < blocks:
+            late_ns = pacer.wait(tick)
+            tick += 1
+            commands: list[bytes] = []
+            round_trip_ns = 0
+            while self._commands:
+                received = self._commands.popleft()
+                commands.append(received.payload)
+                if len(received.payload) == COMMAND_LAYOUT.size:
+                    answered = int(COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0].block)
+                    if node.block - answered <= _ROUND_TRIPS_KEPT:
+                        round_trip_ns = received.arrival_ns - sent_ns[answered % _ROUND_TRIPS_KEPT]
+            if stop.is_set():
+                node.let_go()
+                commands = []
+                fading += 1
+            sensors, applied = node.advance(commands, round_trip_ns, late_ns)
+            sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
+            self._send_sensors(sensors.payload)
+            self._send_applied(applied.payload)
+            if fading and (node.at_rest or fading > 1000):
+                return
+
+    def lockstep(self, blocks: int, stop: threading.Event) -> None:
+        """Each block waits for the command that answers the one before it."""
+        node = self._node
+        commands: list[bytes] = []
+        while node.block < blocks and not stop.is_set():
+            sensors, applied = node.advance(commands)
+            self._send_sensors(sensors.payload)
+            self._send_applied(applied.payload)
+            commands = [self._answer(node.block - 1, stop)]
+
+    def _answer(self, block: int, stop: threading.Event) -> bytes:
+        until_s = time.monotonic() + _ANSWER_TIMEOUT_S
+        while time.monotonic() < until_s and not stop.is_set():
+            received = self._answers.get(0.1)
+            if received is not None:
+                command: Any = COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0]
+                if command.block == block:
+                    return received.payload
+            elif not self._bus.alive("controller"):
+                raise Fault("PEER_DIED", f"the controller left the bus; block {block} got no answer")
+        if stop.is_set():
+            return b""
+        raise Fault("LOCKSTEP_STALLED", f"block {block}: no command answered it within {_ANSWER_TIMEOUT_S:g} s")

@@ -1,0 +1,148 @@
+"""What a rig file may say, in human terms, with the paper's rig as the default of everything but the contact."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from bridge.config import Strict, Two, read_toml, validate
+from plant.pairs import PAIRS
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+
+
+class ContactConfig(Strict):
+    """The friction pair. `pair` fills in the numbers of a known pair; any of them may be overridden beside it."""
+
+    pair: str = ""
+    stiffness_N_per_m: Positive
+    damping_Ns_per_m: NotNegative
+    viscous_damping_Ns_per_m: NotNegative = 0.0
+    coulomb_force_N: Positive
+    static_force_N: Positive
+    stribeck_velocity_mps: Positive = 0.0005  # [15] in the paper; the same for every pair
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in_the_pair(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or "pair" not in table or table["pair"] == "":
+            return table
+        if table["pair"] not in PAIRS:
+            raise ValueError(f"pair = {table['pair']!r}: unknown friction pair; known: {', '.join(PAIRS)}")
+        return PAIRS[table["pair"]] | table
+
+    @model_validator(mode="after")
+    def _static_is_not_below_coulomb(self) -> "ContactConfig":
+        if self.static_force_N < self.coulomb_force_N:
+            raise ValueError(
+                f"static_force_N = {self.static_force_N}: must not be below coulomb_force_N = {self.coulomb_force_N}; "
+                "the paper's steel pair has 17.38 and 14.49"
+            )
+        return self
+
+
+class SlideConfig(Strict):
+    """The body that is dragged."""
+
+    mass_kg: Positive = 1.5
+
+
+class DriveConfig(Strict):
+    """The drive that moves and pulls the slide through a spring. `profile` is [[time_s, velocity_mps], ...], linear between."""
+
+    stiffness_N_per_m: Positive = 11700.0
+    damping_Ns_per_m: NotNegative = 0.0
+    profile: Annotated[list[Two], Field(min_length=1)] = [(0.0, 0.0005)]
+
+    @model_validator(mode="after")
+    def _time_goes_forward(self) -> "DriveConfig":
+        times_s = [time_s for time_s, _ in self.profile]
+        if any(later <= earlier for earlier, later in pairwise(times_s)):
+            raise ValueError(f"profile: the times {times_s} must increase; use 8.0 and 8.001 for a step at 8 s")
+        if any(velocity_mps < 0 for _, velocity_mps in self.profile):
+            raise ValueError("profile: velocities must not be negative; the rig drags in one direction")
+        return self
+
+
+class PiezoConfig(Strict):
+    """The exciter: its limits, how fast its amplitude may change, and what its mount does to it."""
+
+    amplitude_max_m: Positive = 1e-7
+    frequency_min_Hz: Positive = 500.0
+    frequency_max_Hz: Positive = 5000.0
+    # 1 um/s reaches the paper's 0.02 um in 20 ms; 0 means at once, as in the paper's own calculation
+    amplitude_slew_m_per_s: NotNegative = 1e-6
+    command_timeout_s: Positive = 0.05
+    delivered_ratio: Positive = 1.0
+    mount_resonance_Hz: NotNegative = 0.0  # 0: rigid mount
+    mount_damping_ratio: Positive = 0.05
+
+
+class SensorsConfig(Strict):
+    """The measuring chain of the paper's stand; noise is rms, a resolution of 0 means no quantisation."""
+
+    force_range_N: Positive = 50.0
+    force_noise_N: NotNegative = 0.02
+    force_bandwidth_Hz: Positive = 2000.0
+    force_gain: Positive = 1.0
+    force_resolution_N: NotNegative = 50.0 / 2**16
+    accel_range_mps2: Positive = 490.3325  # +-50 g, PCB M352C65
+    accel_noise_mps2: NotNegative = 0.0015  # 0.00015 g rms broadband
+    accel_lowest_Hz: Positive = 0.5
+    accel_bandwidth_Hz: Positive = 10000.0
+    accel_resolution_mps2: NotNegative = 2 * 490.3325 / 2**20
+    position_range_m: Positive = 0.05
+    position_noise_m: NotNegative = 5e-7
+    position_bandwidth_Hz: Positive = 800.0  # HBM WA on a carrier amplifier: below 1 kHz
+    position_linearity: NotNegative = 0.002
+    position_resolution_m: NotNegative = 0.05 / 2**18
+
+
+class SolverConfig(Strict):
+    """Time steps. `block_s` of physics make one message of `samples_per_block` samples a channel."""
+
+    step_s: Positive = 1e-5
+    block_s: Positive = 1e-3
+    samples_per_block: Annotated[int, Field(ge=4, le=200)] = 20
+
+
+class RigConfig(Strict):
+    """One rig file."""
+
+    name: str = "unnamed"
+    contact: ContactConfig
+    slide: SlideConfig = SlideConfig()
+    drive: DriveConfig = DriveConfig()
+    piezo: PiezoConfig = PiezoConfig()
+    sensors: SensorsConfig = SensorsConfig()
+    solver: SolverConfig = SolverConfig()
+
+    @model_validator(mode="after")
+    def _steps_fit(self) -> "RigConfig":
+        solver, piezo = self.solver, self.piezo
+        if piezo.frequency_max_Hz <= piezo.frequency_min_Hz:
+            raise ValueError(
+                f"piezo.frequency_max_Hz = {piezo.frequency_max_Hz}: must be above "
+                f"piezo.frequency_min_Hz = {piezo.frequency_min_Hz}"
+            )
+        coarsest_s = 1.0 / (20.0 * piezo.frequency_max_Hz)
+        if solver.step_s > coarsest_s * (1.0 + 1e-9):
+            raise ValueError(
+                f"solver.step_s = {solver.step_s:g}: too coarse for piezo.frequency_max_Hz = {piezo.frequency_max_Hz:g}: "
+                "below 20 steps a period the contact shows slips that are not real; "
+                f"use {coarsest_s:g} or less, or lower the frequency"
+            )
+        steps = solver.block_s / (solver.step_s * solver.samples_per_block)
+        if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+            raise ValueError(
+                f"solver.block_s = {solver.block_s:g}: must hold a whole number of steps between its "
+                f"{solver.samples_per_block} samples; with step_s = {solver.step_s:g} there are {steps:g}"
+            )
+        return self
+
+
+def load_rig(path: Path) -> RigConfig:
+    """Read a rig file. Raises Fault CONFIG with the file, the key, the value, the rule and the remedy."""
+    return validate(RigConfig, read_toml(path), path.name)

@@ -1,0 +1,71 @@
+"""One step of the LuGre contact and the slide on it.
+
+A leapfrog: x and z live half a step before v. The bristle's equation z' = v_r - k_t |v_r| z / g(v_r) is solved exactly
+over the step for a held v_r, so it cannot blow up however large k_t |v_r| dt / g is (1.2 at 10 us in the middle of a slip,
+where an explicit step goes silently wrong). The slide's equation is then solved by the implicit midpoint rule with
+F_f = k_t z + h_t (1 - k_t z sgn(v_r) / g) v_r + h_v v_r, whose bracket is carried to the middle of the step from the last
+two steps. Measured on the paper's steel pair: slip times differ from a converged solution by 0.002 ms at 10 us and 0.05 ms
+at 50 us after five slips, the error falls with the square of the step.
+"""
+
+import math
+
+from bridge.kernel import kernel
+
+
+@kernel
+def step(
+    dt: float,
+    z_dt: float,
+    m: float,
+    h_d: float,
+    k_t: float,
+    h_t: float,
+    h_v: float,
+    F_c: float,
+    F_s: float,
+    per_v_s: float,
+    pull_N: float,
+    drive_velocity: float,
+    base_velocity: float,
+    base_velocity_mid: float,
+    v: float,
+    z: float,
+    v_r_before: float,
+    g_before: float,
+) -> tuple[float, float, float, float, float]:
+    """Advance one step; all SI.
+
+    Args:
+        per_v_s: 1 / Stribeck velocity.
+        z_dt: how far the bristle moves: dt, half of it in the very first step.
+        pull_N: spring force of the drive in the middle of the step.
+        base_velocity, base_velocity_mid: of the base now and in the middle of the step.
+
+    Returns:
+        v after the step, its mean over the step, z after, v_r and g now (to be handed in again next time).
+
+    """
+    v_r = v - base_velocity
+    q = v_r * per_v_s
+    g = F_c + (F_s - F_c) * math.exp(-q * q)
+    decay = k_t * math.fabs(v_r) / g * z_dt
+    if decay < 0.03:
+        # exp(-decay) - 1 by its series, to 1e-14 of itself here; in pairs, because the step waits for this line
+        square = decay * decay
+        pairs = (1.0 - decay / 2) + square * ((1 / 6 - decay / 24) + square * (1 / 120 - decay / 720))
+        gone = -decay * pairs
+    else:
+        gone = math.exp(-decay) - 1.0
+    z_end = g / k_t if v_r > 0.0 else -g / k_t
+    per_g_mid = k_t / (1.5 * g - 0.5 * g_before)
+    if 1.5 * v_r - 0.5 * v_r_before < 0.0:
+        per_g_mid = -per_g_mid
+    z += (z - z_end) * gone
+    share = 1.0 - per_g_mid * z
+    damping = h_t * share + h_v
+    half = 0.5 * dt / m
+    v_mid = (v + half * (pull_N + h_d * drive_velocity - k_t * z + damping * base_velocity_mid)) / (
+        1.0 + half * (h_d + damping)
+    )
+    return 2.0 * v_mid - v, v_mid, z, v_r, g

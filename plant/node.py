@@ -1,0 +1,74 @@
+"""The rig as a participant of the bus: commands in, sensor blocks and what was applied out."""
+
+import numpy as np
+
+from bridge.messages import APPLIED as APPLIED_LAYOUT
+from bridge.messages import COMMAND as COMMAND_LAYOUT
+from bridge.messages import sensor_block
+from bridge.topics import APPLIED, COMMAND, SENSORS, Outgoing
+from plant.config import RigConfig
+from plant.records import CHANNELS, NO_COMMAND, TRUTH, build
+from plant.simulate import drive_velocity_mps
+from plant.step import step
+
+_BATCH_BLOCKS = 64  # noise and drive velocity are drawn for this many blocks at once
+
+
+class PlantNode:
+    """The rig, advanced block by block.
+
+    Args:
+        config: the rig.
+        seed: of the sensor noise; the same seed gives the same bytes.
+
+    """
+
+    def __init__(self, config: RigConfig, seed: int) -> None:
+        self.block_ns = round(config.solver.block_s * 1e9)
+        self.block = 0  # number of the next block
+        self._config = config
+        self._params, self._state = build(config)
+        self._random = np.random.Generator(np.random.PCG64(seed))
+        samples = config.solver.samples_per_block
+        self._analogue = np.empty((len(CHANNELS), samples))
+        self.truth = np.empty((len(TRUTH), samples))  # of the last block, rows as plant.records.TRUTH
+        self._noise = np.empty((_BATCH_BLOCKS, len(CHANNELS), samples))
+        self._velocity_mps = np.empty(_BATCH_BLOCKS)
+        self._command = COMMAND_LAYOUT.blank()
+        self._sensors = sensor_block(samples).blank()
+        self._applied = APPLIED_LAYOUT.blank()
+
+    def warm_up(self) -> None:
+        """Compile or load the kernel on copies, so that the first block is not late."""
+        step(
+            self._params, self._state.copy(), 0.0, self._command, 0, np.zeros_like(self._noise[0]), 0, 0,
+            self._analogue, self.truth, sensor_block(self._noise.shape[2]).blank(), APPLIED_LAYOUT.blank(),
+        )  # fmt: skip
+
+    def advance(self, commands: list[bytes], round_trip_ns: int = 0, late_ns: int = 0) -> tuple[Outgoing, Outgoing]:
+        """One block of the rig under the newest of `commands`: the sensor block, then what was applied.
+
+        Raises Fault BAD_MESSAGE when the command cannot be read.
+        """
+        if commands:
+            self._command = COMMAND_LAYOUT.read(commands[-1], COMMAND.name)
+        at = self.block % _BATCH_BLOCKS
+        if at == 0:
+            self._random.standard_normal(out=self._noise)
+            blocks = self.block + np.arange(_BATCH_BLOCKS)
+            self._velocity_mps = drive_velocity_mps(self._config, blocks * self._config.solver.block_s)
+        step(
+            self._params, self._state, self._velocity_mps[at], self._command, len(commands), self._noise[at],
+            round_trip_ns, late_ns, self._analogue, self.truth, self._sensors, self._applied,
+        )  # fmt: skip
+        self.block += 1
+        return Outgoing(SENSORS, self._sensors.tobytes()), Outgoing(APPLIED, self._applied.tobytes())
+
+    def let_go(self) -> None:
+        """Forget the command in force: the vibration fades to zero at the piezo's own rate."""
+        self._state["command_block"] = NO_COMMAND
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the base stands still."""
+        return self._state["amplitude_m"][0] == 0.0

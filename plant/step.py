@@ -1,0 +1,69 @@
+"""One block of the rig as the bus sees it: a command in, a sensor block and what was applied out."""
+
+import math
+from typing import Any
+
+import numpy.typing as npt
+
+from bridge.kernel import Record, kernel
+from plant.core import advance
+from plant.records import NO_COMMAND
+from plant.sensors import digitise
+
+
+@kernel
+def step(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    drive_velocity_mps: float,
+    command: npt.NDArray[Any],
+    commands: int,
+    noise: npt.NDArray[Any],
+    round_trip_ns: int,
+    late_ns: int,
+    analogue: npt.NDArray[Any],
+    truth: npt.NDArray[Any],
+    sensors: npt.NDArray[Any],
+    applied: npt.NDArray[Any],
+) -> None:
+    """Advance `state` by one block, in place, and fill in `sensors` and `applied`.
+
+    Args:
+        params, state: one record each of `plant.records.PARAMS` and `STATE`.
+        drive_velocity_mps: held over the block.
+        command: the newest command; not looked at when `commands`, how many came since the last block, is 0.
+        noise: standard normal numbers, [5, samples].
+        round_trip_ns, late_ns: noted in `applied`.
+        analogue, truth: filled, as `plant.core.advance` says.
+        sensors, applied: one message record each.
+
+    """
+    p: Record = params[0]
+    s: Record = state[0]
+    if commands > 0:
+        c: Record = command[0]
+        s.commanded_Hz = c.frequency_Hz
+        s.commanded_m = c.amplitude_m
+        s.command_block = c.block
+    fresh = s.command_block != NO_COMMAND and s.block - s.command_block <= p.command_timeout_blocks
+    usable = fresh and math.isfinite(s.commanded_Hz) and math.isfinite(s.commanded_m)
+    if usable:
+        advance(params, state, drive_velocity_mps, s.commanded_Hz, s.commanded_m, analogue, truth)
+    else:
+        advance(params, state, drive_velocity_mps, s.frequency_Hz, 0.0, analogue, truth)
+    t_ns = (s.block + 1) * p.block_ns
+    block: Record = sensors[0]
+    block.sequence = s.block
+    block.t_ns = t_ns
+    digitise(p, analogue, noise, block)
+    a: Record = applied[0]
+    a.sequence = s.block
+    a.t_ns = t_ns
+    a.frequency_Hz = s.frequency_Hz
+    a.amplitude_m = s.amplitude_m
+    a.command_block = s.command_block
+    a.commands = commands
+    a.fallback = 0 if usable else 1
+    a.round_trip_ns = round_trip_ns
+    a.late_ns = late_ns
+    s.block += 1

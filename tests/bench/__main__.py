@@ -1,0 +1,10 @@
+"""Run every bench, one after the other so that none slows another; exit 1 if one misses its bar."""
+
+import sys
+
+from tests.bench import kernel, loop
+
+BENCHES = [kernel.bench, loop.bench]
+
+kept = [bench() for bench in BENCHES]
+sys.exit(0 if all(kept) else 1)

@@ -1,0 +1,62 @@
+"""The controller on the rig, both in this process: what the loop does, sample by sample."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bridge.config import validate
+from bridge.messages import TRACE as TRACE_LAYOUT
+from bridge.topics import TRACE
+from controller.config import ControllerConfig
+from controller.node import ControllerNode
+from plant.config import RigConfig
+from plant.node import PlantNode
+
+
+class Loop(NamedTuple):
+    """Arrays of [blocks]."""
+
+    t_s: Any
+    trace: Any
+    drive_force_N: Any  # the true one, at the end of each block
+    velocity_mps: Any  # of the slide, true
+
+    def modes(self) -> list[int]:
+        """The modes in the order in which they came."""
+        mode = self.trace["mode"].astype(int)
+        return [int(mode[0]), *mode[1:][np.diff(mode) != 0].tolist()]
+
+    def slips(self, from_s: float, to_s: float = 1e9, fast_mps: float = 0.01) -> int:
+        """Slips as the slide's own speed shows them: it passes 10 mm/s (a slip of the paper's rig reaches 22)."""
+        fast = (self.velocity_mps > fast_mps) & (self.t_s >= from_s) & (self.t_s < to_s)
+        return int(np.count_nonzero(fast[1:] & ~fast[:-1]))
+
+    def ratio(self, from_s: float, to_s: float = 1e9) -> Any:
+        """v_a / v_d as measured."""
+        inside = (self.t_s >= from_s) & (self.t_s < to_s)
+        return self.trace["vibration_velocity_mps"][inside] / self.trace["drive_velocity_mps"][inside]
+
+
+def close_the_loop(
+    seconds: float,
+    rig: dict[str, Any] | None = None,
+    controller: dict[str, Any] | None = None,
+    pair: str = "C45-C45 @ 0.063",
+    seed: int = 1,
+) -> Loop:
+    """Run the loop in lockstep for `seconds`."""
+    plant = PlantNode(validate(RigConfig, {"contact": {"pair": pair}} | (rig or {}), "rig"), seed)
+    node = ControllerNode(validate(ControllerConfig, controller or {}, "controller"))
+    blocks = round(seconds * 1000)
+    traces: list[bytes] = []
+    truth = np.empty((2, blocks))
+    commands: list[bytes] = []
+    for block in range(blocks):
+        sensors, _ = plant.advance(commands)
+        command = node.block(sensors.payload)
+        assert command is not None
+        commands = [command.payload]
+        traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)
+        truth[:, block] = plant.truth[0, -1], plant.truth[2].max()
+    trace = np.frombuffer(b"".join(traces), TRACE_LAYOUT.dtype)
+    return Loop(trace["t_ns"] * 1e-9, trace, truth[0], truth[1])

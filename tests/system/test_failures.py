@@ -1,0 +1,230 @@
+"""Everything that can die, dies here: one clear line, a closed or recoverable log, nobody left behind."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from bridge.faults import FAULTS
+from bridge.logfile import read_run, recover
+from tests.system.ports import free_endpoint
+
+COMMAND = [sys.executable, "-m", "cockpit"]
+
+
+def children_of(pid: int) -> list[int]:
+    """Processes whose parent is `pid`."""
+    found: list[int] = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid:
+            found.append(int(stat.parent.name))
+    return found
+
+
+def role(pid: int) -> str:
+    """What a child of a run is, from its command line."""
+    try:
+        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
+    except OSError:
+        return ""
+    return words[3].decode() if len(words) > 3 else ""
+
+
+def gone(pid: int) -> bool:
+    """Whether a process has ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+class Run:
+    """A run under way, its children by role."""
+
+    def __init__(self, log: Path, *more: str, seconds: float = 30.0) -> None:
+        arguments = [
+            "run",
+            "--set",
+            f"duration_s={seconds}",
+            "--endpoint",
+            free_endpoint(),
+            "--log",
+            str(log),
+            *more,
+        ]
+        self.process = subprocess.Popen(
+            [*COMMAND, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self.log = log
+        self.children: dict[str, int] = {}
+
+    def wait_until_recording(self) -> None:
+        """Until two chunks are in the log."""
+        until_s = time.monotonic() + 60
+        while time.monotonic() < until_s and self.process.poll() is None:
+            if self.log.exists() and self.log.stat().st_size > 200_000:
+                self.children = {role(pid): pid for pid in children_of(self.process.pid)}
+                assert {"plant", "controller", "recorder"} <= set(self.children)
+                return
+            time.sleep(0.02)
+        pytest.fail(f"the run never began: {self.process.communicate(timeout=5)}")
+
+    def end(self) -> tuple[int, str, str]:
+        """Status, stdout and stderr; nobody may be left."""
+        out, err = self.process.communicate(timeout=30)
+        assert all(gone(pid) for pid in self.children.values())
+        return self.process.returncode, out, err
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> Iterator[list[Run]]:
+    made: list[Run] = []
+    yield made
+    for run in made:
+        pids = [*children_of(run.process.pid), run.process.pid]
+        if run.process.poll() is None:
+            for pid in pids:
+                os.kill(pid, signal.SIGKILL)
+            run.process.wait()
+
+
+@pytest.mark.parametrize("victim", ["plant", "controller", "recorder"])
+def test_a_killed_process_ends_the_run_and_costs_at_most_a_quarter_second(
+    tmp_path: Path, runs: list[Run], victim: str
+) -> None:
+    run = Run(tmp_path / "run.mcap")
+    runs.append(run)
+    run.wait_until_recording()
+    time.sleep(0.5)
+    killed_at_ns = time.time_ns()
+    os.kill(run.children[victim], signal.SIGKILL)
+    status, _, err = run.end()
+    assert status == FAULTS["PEER_DIED"].exit_status
+    assert f"the {victim} was killed by signal 9" in err
+    assert len(err.strip().splitlines()) == 1
+    if victim == "recorder":
+        saved = recover(run.log, run.log)
+        assert saved.messages > 0
+        assert not saved.damage.closed
+    with run.log.open("rb") as file:
+        newest_ns = max(message.log_time for _, _, message in make_reader(file).iter_messages(topics=["/sensors"]))
+    assert killed_at_ns - newest_ns < 250_000_000
+    data = read_run(run.log)
+    assert data.damage.closed
+    assert len(data.sensors) == data.sensors["sequence"][-1] + 1
+
+
+def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[Run]) -> None:
+    run = Run(tmp_path / "run.mcap", "--set", "controller.policy.enabled_from_s=0.0")
+    runs.append(run)
+    run.wait_until_recording()
+    time.sleep(0.5)
+    run.process.send_signal(signal.SIGINT)
+    status, _, err = run.end()
+    assert status == 130
+    assert "INTERRUPTED" in err.strip().splitlines()[-1]
+    data = read_run(run.log)
+    assert data.damage.closed
+    assert data.applied["amplitude_m"].max() > 0
+    assert data.applied["amplitude_m"][-1] == 0.0
+
+
+def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
+    run = Run(tmp_path / "run.mcap")
+    runs.append(run)
+    run.wait_until_recording()
+    os.kill(run.process.pid, signal.SIGKILL)
+    run.process.communicate(timeout=5)
+    until_s = time.monotonic() + 10
+    while time.monotonic() < until_s and not all(gone(pid) for pid in run.children.values()):
+        time.sleep(0.05)
+    assert all(gone(pid) for pid in run.children.values())
+    assert read_run(run.log).damage.closed
+
+
+def test_full_disk(tmp_path: Path, runs: list[Run]) -> None:
+    log = tmp_path / "run.mcap"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, before[1]))  # children inherit it: a write beyond fails
+    try:
+        run = Run(log)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    runs.append(run)
+    run.wait_until_recording()
+    status, _, err = run.end()
+    assert status == FAULTS["LOG_WRITE"].exit_status
+    assert "LOG_WRITE" in err
+    assert "recover" in err
+    assert len(err.strip().splitlines()) == 1
+    damage = read_run(log).damage
+    assert damage.closed
+    assert (damage.cut_bytes, damage.bad_chunks) == (0, 0)
+    with log.open("rb") as file:
+        assert sum(1 for _ in make_reader(file).iter_messages(topics=["/sensors"])) > 300
+
+
+def call(*arguments: str, timeout_s: float = 60.0) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout_s, check=False)
+
+
+def test_busy_endpoint(tmp_path: Path) -> None:
+    import socket
+
+    with socket.socket() as holder:
+        holder.bind(("127.0.0.1", 0))
+        holder.listen()
+        endpoint = f"tcp/127.0.0.1:{holder.getsockname()[1]}"
+        result = call("run", "--endpoint", endpoint, "--log", str(tmp_path / "run.mcap"))
+    assert result.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
+    assert endpoint in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_missing_plant(tmp_path: Path) -> None:
+    result = call("controller", "--endpoint", free_endpoint())
+    assert result.returncode == FAULTS["NO_PEER"].exit_status
+    assert "no plant answers" in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_bad_configuration_starts_nothing(tmp_path: Path) -> None:
+    result = call("run", "--set", "rig.slide.mass_kg=0", "--log", str(tmp_path / "run.mcap"), "--json")
+    assert result.returncode == FAULTS["CONFIG"].exit_status
+    assert json.loads(result.stdout)["fault"] == "CONFIG"
+    assert not (tmp_path / "run.mcap").exists()
+
+
+def test_unwritable_log(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    result = call("run", "--in-process", "--set", "duration_s=0.1", "--log", str(tmp_path / "file" / "run.mcap"))
+    assert result.returncode == FAULTS["LOG_WRITE"].exit_status
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("code", FAULTS)
+def test_every_fault_is_explained(code: str) -> None:
+    from typer.testing import CliRunner
+
+    from cockpit.cli import app
+
+    result = CliRunner().invoke(app, ["explain", code])
+    assert result.exit_code == 0
+    assert str(FAULTS[code].exit_status) in result.stdout
+    assert len(result.stdout) > 100

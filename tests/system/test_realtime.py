@@ -1,0 +1,58 @@
+"""A short run in real time over the bus, and an operator's word during it."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bridge import stickslip_pb2 as wire
+from bridge.logfile import read_run
+from tests.system.ports import free_endpoint
+
+COMMAND = [sys.executable, "-m", "cockpit"]
+
+
+def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
+    log = tmp_path / "run.mcap"
+    arguments = ["--set", "duration_s=6.0", "--set", "controller.policy.enabled_from_s=0.0"]
+    result = subprocess.run(
+        [*COMMAND, "run", *arguments, "--endpoint", free_endpoint(), "--log", str(log), "--json"],
+        capture_output=True, text=True, timeout=90, check=False,
+    )  # fmt: skip
+    data = read_run(log)
+    assert len(data.sensors) == 6000, result.stderr
+    assert np.array_equal(data.trace["block"][data.trace["events"] & 1 == 1], data.sensors["sequence"])
+    # how soon the answers come is for the bench to say; that they come at all is for this test
+    assert int(data.applied["commands"].sum()) >= 5990
+    assert set(data.headers) == {"run", "plant", "controller"}
+
+
+def test_operator_stop_and_reset(tmp_path: Path) -> None:
+    log, endpoint = tmp_path / "run.mcap", free_endpoint()
+    arguments = ["--set", "duration_s=12.0", "--set", "controller.policy.enabled_from_s=0.0"]
+    run = subprocess.Popen(
+        [*COMMAND, "run", *arguments, "--endpoint", endpoint, "--log", str(log)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        until_s = time.monotonic() + 60
+        while (not log.exists() or log.stat().st_size < 400_000) and time.monotonic() < until_s:
+            time.sleep(0.05)
+        assert subprocess.run([*COMMAND, "stop", "--endpoint", endpoint], timeout=30, check=False).returncode == 0
+        time.sleep(1.0)
+        again = [*COMMAND, "stop", "--reset", "--endpoint", endpoint]
+        assert subprocess.run(again, timeout=30, check=False).returncode == 0
+        run.communicate(timeout=60)
+    finally:
+        if run.poll() is None:
+            run.kill()
+            run.communicate()
+    data = read_run(log)
+    stopped = data.trace["mode"] == wire.STOPPED
+    assert stopped.any()
+    assert data.applied["amplitude_m"][: np.argmax(stopped)].max() > 0
+    assert data.trace["vibration_velocity_mps"][stopped][300:].max() < 1e-5
+    assert data.trace["mode"][-1] != wire.STOPPED
+    assert [event.code for event in data.events if event.source == "controller"].count("OPERATOR") == 2

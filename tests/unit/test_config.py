@@ -1,0 +1,87 @@
+"""Bad configuration is one clear line: place, value, rule, remedy."""
+
+from pathlib import Path
+
+import pytest
+
+from bridge.config import validate, with_overrides
+from bridge.faults import Fault
+from cockpit.scenario import load_rig, load_scenario
+from controller.config import ControllerConfig, candidate_frequencies_Hz
+from plant.config import RigConfig
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["rig.slide.mass_kg=-1.0"], ["rig.slide.mass_kg", "-1.0", "greater than 0"]),
+        (["rig.slide.mas_kg=1.0"], ["rig.slide.mas_kg", "unknown key", "mass_kg"]),
+        (['rig.slide.mass_kg="heavy"'], ["rig.slide.mass_kg", "'heavy'", "number"]),
+        (['rig.contact.pair="ice"'], ["ice", "unknown friction pair", "C45-C45 @ 0.063"]),
+        (["rig.solver.step_s=2e-5"], ["step_s", "too coarse", "5000", "1e-05"]),
+        (["rig.contact.static_force_N=1.0"], ["static_force_N", "coulomb_force_N"]),
+        (["controller.samples_per_block=25"], ["samples_per_block", "must equal"]),
+        (["duration_s=200.0"], ["duration_s", "50 mm", "shorten"]),
+        (["controller.limits.forbidden_Hz=[[0.0, 9000.0]]"], ["forbidden_Hz", "no frequency is left"]),
+        (["controller.onset.window_s=1.0"], ["window_s", "128"]),
+        (["bus.endpoint=here"], ["bus.endpoint", "here"]),
+        (["rig.drive.profile=[[1.0, 0.1], [0.5, 0.1]]"], ["profile", "must increase"]),
+    ],
+)
+def test_the_line_names_place_value_rule_and_remedy(settings: list[str], words: list[str]) -> None:
+    with pytest.raises(Fault) as caught:
+        load_scenario("paper-c45-c45", settings)
+    assert caught.value.kind.code == "CONFIG"
+    for word in [*words, "paper-c45-c45.toml"]:
+        assert word in caught.value.line
+    assert "\n" not in caught.value.line
+
+
+def test_unknown_scenario_names_the_known_ones() -> None:
+    with pytest.raises(Fault, match=r"nowhere.*paper-c45-c45"):
+        load_scenario("nowhere", [])
+
+
+def test_missing_and_broken_files(tmp_path: Path) -> None:
+    with pytest.raises(Fault, match="no such file"):
+        load_rig(str(tmp_path / "none.toml"), [])
+    broken = tmp_path / "broken.toml"
+    broken.write_text("a = = 1")
+    with pytest.raises(Fault, match="not valid TOML"):
+        load_rig(str(broken), [])
+
+
+def test_overrides_leave_the_table_alone() -> None:
+    table = {"a": {"b": 1}}
+    assert with_overrides(table, ["a.b=2", "a.c=[1, 2]", "d=text"]) == {
+        "a": {"b": 2, "c": [1, 2]},
+        "d": "text",
+    }
+    assert table == {"a": {"b": 1}}
+    with pytest.raises(Fault, match="expected key=value"):
+        with_overrides(table, ["a.b"])
+    with pytest.raises(Fault, match="is a value, not a table"):
+        with_overrides(table, ["a.b.c=1"])
+
+
+def test_frequencies_keep_away_from_resonance_and_forbidden_bands() -> None:
+    config = validate(ControllerConfig, {"limits": {"forbidden_Hz": [[3000.0, 3500.0]]}}, "test")
+    candidates = candidate_frequencies_Hz(config)
+    assert min(candidates) >= 2.2 * 1144.0
+    assert max(candidates) == 5000.0
+    assert not any(3000.0 <= frequency <= 3500.0 for frequency in candidates)
+
+
+def test_every_rig_and_scenario_that_comes_along_is_valid() -> None:
+    from cockpit.scenario import deploy_folder
+
+    for path in deploy_folder().glob("rigs/*.toml"):
+        assert load_rig(path.stem, []).name == path.stem
+    for path in deploy_folder().glob("scenarios/*.toml"):
+        assert load_scenario(path.stem, []).description
+
+
+def test_pair_fills_in_what_is_not_given() -> None:
+    rig = validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063", "static_force_N": 18.0}}, "test")
+    assert rig.contact.static_force_N == 18.0
+    assert rig.contact.stiffness_N_per_m == 77.52e6
