@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check bench lock proto clean
+.PHONY: demo test check bench bless lock proto clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -42,3 +42,6 @@ proto: $(READY) ## after a change of bridge/stickslip.proto
 
 clean:
 	rm -rf $(VENV) runs
+
+bless: $(READY) ## after a wanted change of behaviour: make bless REASON="why"
+	@$(BIN)/python -m tests.golden.bless --reason "$(REASON)"

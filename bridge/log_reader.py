@@ -33,7 +33,7 @@ _FOOTER_BYTES = 20
 _CHUNK_MARK = struct.pack("<I4s", 4, b"zstd")
 _MARK_AT = 28
 _SEARCH_BYTES = 1 << 20
-_UNREADABLE = (McapError, struct.error, UnicodeDecodeError, zstandard.ZstdError, MemoryError)
+_UNREADABLE = (McapError, struct.error, UnicodeDecodeError, zstandard.ZstdError, MemoryError, OverflowError)
 _CHANNEL_TOPICS = {i + 1: topic.name for i, topic in enumerate(topic for topic in TOPICS if topic.logged)}
 
 Bytes = npt.NDArray[np.uint8]

@@ -74,17 +74,18 @@ def iter_tables(path: Path) -> Iterator[tuple[str, Records]]:
 
 def _samples(payload: bytes) -> int:
     """How many samples a channel the sensor blocks of a log have, as its first one says."""
-    return len(_parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES
+    return len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES
 
 
-def _parsed(message: type[M], payload: bytes, topic: str) -> M:
-    parsed = message()
+def parsed(message: type[M], payload: bytes, topic: str) -> M:
+    """A message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
+    result = message()
     try:
-        parsed.ParseFromString(payload)
+        result.ParseFromString(payload)
     except DecodeError:
         line = f"{topic}: {len(payload)} bytes are no {message.DESCRIPTOR.name}; see bridge/PROTOCOL.md for its fields"
         raise Fault("BAD_MESSAGE", line) from None
-    return parsed
+    return result
 
 
 def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> bytes:
@@ -163,14 +164,14 @@ def read_run(path: Path) -> RunData:
             payloads[piece.topic].extend(piece.payloads)
     tables = {name: np.frombuffer(b"".join(stored[name]), dtypes[name]) for name in STREAMING}
     events = [
-        _parsed(wire.Event, payload, "/event/" + name)
+        parsed(wire.Event, payload, "/event/" + name)
         for name in ("plant", "controller", "recorder")
         for payload in payloads["event/" + name]
     ]
     return RunData(
         path,
         *(tables[name] for name in STREAMING),
-        snapshots=[_parsed(wire.Snapshot, payload, "/snapshot") for payload in payloads["snapshot"]],
+        snapshots=[parsed(wire.Snapshot, payload, "/snapshot") for payload in payloads["snapshot"]],
         events=events,
         headers=reader.metadata,
         damage=reader.damage,

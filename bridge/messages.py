@@ -80,10 +80,10 @@ class Layout:
         self._tags = int.from_bytes(template, "little")
         self._mask = int.from_bytes(fixed, "little")
 
-    def blank(self) -> Records:
-        """A message of zeros: one record, whose `tobytes()` is the protobuf encoding."""
+    def blank(self, count: int = 1) -> Records:
+        """`count` messages of zeros, whose `tobytes()` are their protobuf encodings."""
         # over a bytearray, since numpy's own copy of a record leaves the gaps between its fields, the tags, behind
-        return np.frombuffer(bytearray(self._template), self.dtype)
+        return np.frombuffer(bytearray(self._template * count), self.dtype)
 
     def is_canonical(self, payload: bytes) -> bool:
         """Whether every field is written, in order."""

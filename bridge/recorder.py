@@ -45,8 +45,7 @@ def run(
         log.add_metadata("run", about)
         for role in sorted(headers):
             log.add_header(headers[role])
-        if not lockstep:
-            realtime.claim(None, realtime.RECORDER_PRIORITY)
+        realtime.claim(None, realtime.RECORDER_PRIORITY)
         bus.announce()
         lost_plant = _record(log, bus, inbox, stop)
         if inbox.dropped:

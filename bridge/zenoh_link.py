@@ -169,8 +169,8 @@ class Bus:
         self._keep.append(self._session.declare_subscriber(self._key(topic.name), handler))
 
     def serve_header(self, header: wire.Header) -> None:
-        """Answer queries for this role's configuration."""
-        key = self._key(f"header/{self._role}")
+        """Answer queries for the configuration of the header's role."""
+        key = self._key(f"header/{header.role}")
         payload = header.SerializeToString()
 
         def reply(query: Any) -> None:

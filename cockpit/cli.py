@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from bridge.faults import FAULTS, Fault
+from cockpit.log_commands import log_app
 from cockpit.processes import guarded, stop_event
 
 app = typer.Typer(
@@ -226,6 +227,82 @@ def stability(
 
 
 @app.command()
+def plot(
+    log: Annotated[Path, typer.Argument(help="A run log, .mcap.")],
+    out: Annotated[Path, typer.Option(help="The picture, a PNG file.")] = Path("runs/run.png"),
+) -> None:
+    """Draw the run in a log: drive force, v_a against v_d, and what the controller did."""
+
+    def work() -> None:
+        from cockpit.run_plot import plot_run
+
+        with _writing(out):
+            plot_run(log, out)
+        print(f"picture  {out}")
+
+    sys.exit(guarded(work))
+
+
+@app.command("replay")
+def replay_command(
+    logs: Annotated[list[Path], typer.Argument(help="Run logs, .mcap.")],
+    settings: Annotated[
+        list[str], typer.Option("--set", help="What if: key=value, or key=value@20s from a time on. Repeatable.")
+    ] = [],  # noqa: B006
+    start: Annotated[
+        str, typer.Option("--from", help="Start here, e.g. 12.5s, at the nearest snapshot before.")
+    ] = "0s",
+    closed_loop: Annotated[
+        bool, typer.Option("--closed-loop", help="Simulate the run again from the log's own plant and seed.")
+    ] = False,
+    to_bus: Annotated[bool, typer.Option("--to-bus", help="Publish the log on the bus again, paced.")] = False,
+    speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="With --to-bus: times real time.")] = 1.0,
+    everything: Annotated[
+        bool, typer.Option("--all", help="With --to-bus: the controller's topics too, for viewers.")
+    ] = False,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="With --to-bus: begin when a controller and a recorder are on the bus.")
+    ] = False,
+    out: Annotated[Path, typer.Option("--log", help="With --closed-loop: the new log.")] = Path(
+        "runs/closed-loop.mcap"
+    ),
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    as_json: Json = False,
+) -> None:
+    """Feed a log to today's controller: the same bits (exit 0), or the first difference (exit 1)."""
+
+    def work() -> int:
+        try:
+            from_s = float(start.removesuffix("s"))
+        except ValueError:
+            raise Fault("CONFIG", f"--from {start}: no time; write for example 12.5s") from None
+        if to_bus:
+            from cockpit.scenario import load_scenario
+            from cockpit.to_bus import publish_log
+
+            bus = load_scenario(DEFAULT_SCENARIO, _settings([], None, endpoint, prefix)).bus
+            for path in logs:
+                publish_log(
+                    path,
+                    bus,
+                    speed,
+                    from_s,
+                    everything,
+                    ["controller", "recorder"] if wait else [],
+                    stop_event(child=False),
+                )
+            return 0
+        from cockpit import replaying
+
+        if closed_loop:
+            return max(replaying.closed_loop(path, settings, out, as_json) for path in logs)
+        return replaying.replay_logs(logs, from_s, settings, as_json)
+
+    sys.exit(guarded(work, as_json))
+
+
+@app.command()
 def explain(code: Annotated[str, typer.Argument(help="For example ENDPOINT_BUSY.")]) -> None:
     """Say what a fault code means and what to do."""
     kind = FAULTS.get(code.upper())
@@ -254,49 +331,7 @@ def scenarios(as_json: Json = False) -> None:
     print("rigs: " + ", ".join(rigs))
 
 
-log_app = typer.Typer(help="Look into a log, make a cut one whole.", no_args_is_help=True)
 app.add_typer(log_app, name="log")
-LogArgument = Annotated[Path, typer.Argument(help="A run log, .mcap.")]
-
-
-@log_app.command("info")
-def log_info(path: LogArgument, as_json: Json = False) -> None:
-    """Judge the run in a log: slips, swing, v_a / v_d, latency, what was lost."""
-
-    def work() -> None:
-        from cockpit.verdict import headline, in_words, judge
-
-        verdict = judge(path)
-        if as_json:
-            print(json.dumps(verdict.as_dict()))
-        else:
-            print("\n".join([headline(verdict), *in_words(verdict)]))
-
-    sys.exit(guarded(work, as_json))
-
-
-@log_app.command("recover")
-def log_recover(
-    path: LogArgument,
-    out: Annotated[Path | None, typer.Option(help="Write here instead of in place.")] = None,
-    as_json: Json = False,
-) -> None:
-    """Save every message that can be read from a cut or damaged log, with a new index."""
-
-    def work() -> None:
-        from bridge.logfile import recover
-
-        saved = recover(path, out or path)
-        damage = saved.damage
-        if as_json:
-            print(json.dumps({"messages": saved.messages, "out": str(out or path)} | damage._asdict()))
-            return
-        lost = "nothing was lost"
-        if damage.cut_bytes or damage.bad_chunks:
-            lost = f"lost: {damage.cut_bytes} bytes of an open chunk at the end, {damage.bad_chunks} damaged chunks"
-        print(f"{out or path}: {saved.messages} messages, whole again; {lost}")
-
-    sys.exit(guarded(work, as_json))
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """A lockstep run in one process: the same nodes and the same log, without a bus. For tests and for many runs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +9,22 @@ from bridge.runlog import RunLog
 from bridge.topics import CONTROLLER_EVENT, PLANT_EVENT
 from cockpit.scenario import Scenario, header
 from controller.node import ControllerNode
+from controller.replay import Change
 from plant.node import PlantNode
 
 
 def run_onboard(
-    scenario: Scenario, path: Path, about: dict[str, Any], progress: Callable[[float], None] | None = None
+    scenario: Scenario,
+    path: Path,
+    about: dict[str, Any],
+    progress: Callable[[float], None] | None = None,
+    changes: Sequence[Change] = (),
 ) -> None:
     """Run a scenario and write its log. Raises Fault LOG_WRITE.
 
     Args:
         progress: called now and then with the simulated time [s].
+        changes: of the controller's configuration during the run, in order of time.
 
     """
     plant = PlantNode(scenario.rig, scenario.seed)
@@ -32,11 +38,14 @@ def run_onboard(
     blocks = round(scenario.duration_s / scenario.rig.solver.block_s)
     log.write(PLANT_EVENT, _event("plant", 0, 0, "START", "lockstep"))
     commands: list[bytes] = []
+    ahead = list(changes)
     try:
         while plant.block < blocks:
             sensors, applied = plant.advance(commands)
             log.write(*sensors)
             log.write(*applied)
+            while ahead and plant.block * plant.block_ns >= ahead[0].t_ns:
+                controller.reconfigure(ahead.pop(0).config)
             command = controller.block(sensors.payload)
             if command is not None:
                 log.write(*command)

@@ -100,6 +100,15 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
     return validate(Scenario, table, path.name)
 
 
+def processor() -> str:
+    """Name of this processor: the last bit of a sine or an exponential depends on it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
 def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
     """What a process of this scenario says of itself."""
     if role == "plant":
@@ -112,7 +121,7 @@ def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
     else:
         configuration = scenario.controller.model_dump(mode="json")
     versions = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
-    versions |= {"python": platform.python_version(), "machine": platform.machine()}
+    versions |= {"python": platform.python_version(), "libc": "-".join(platform.libc_ver()), "processor": processor()}
     return wire.Header(
         role=role,
         schema_version=SCHEMA_VERSION,

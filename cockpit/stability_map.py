@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 _RED, _AMBER, _GREEN, _INK = "#d9826b", "#f2d694", "#dcebd8", "#1f2d3a"
 _KINDS = (
     (2, _RED, "unstable: stick-slip"),
-    (1, _AMBER, "smooth if undisturbed; stick-slip from a start at rest goes on"),
+    (1, _AMBER, "smooth if undisturbed; stick-slip that has started can go on"),
     (0, _GREEN, "stable: smooth sliding"),
 )
 _RATIO_SET_POINT = 1.2  # of v_a to v_d: the margin that the controller keeps from the edge
@@ -27,6 +27,8 @@ class MapResult(NamedTuple):
     stable_without_vibration: bool
     growth_per_s: float  # largest real part of the poles at the operating point, without vibration
     smallest_vibration_velocity_mps: float | None  # stable from here on; None: not up to 5 v_d
+    # ends stick-slip that has started, too: not below v_d where that could go on (0 where there is none)
+    removing_vibration_velocity_mps: float | None
     critical_velocity_mps: float | None  # None: steady sliding is unstable at every velocity
     self_sustained_velocity_mps: float | None  # None: stick-slip that has started never dies out
     answer: str
@@ -52,13 +54,16 @@ def stability_map(rig: RigConfig, out: Path) -> MapResult:
     if v_d == 0.0:
         raise Fault("CONFIG", f"{rig.name}: drive.profile: the drive never moves; give it a velocity above 0")
     sustained_mps = float(self_sustained_velocity_mps(rig))
+    smallest_mps = stabilising_vibration_mps(rig, v_d)
+    floor_mps = v_d if v_d < sustained_mps else 0.0
     numbers = MapResult(
         picture=str(out),
         drive_velocity_mps=v_d,
         drive_stiffness_N_per_m=rig.drive.stiffness_N_per_m,
         stable_without_vibration=bool(hurwitz_margin(rig, v_d) >= 0.0),
         growth_per_s=float(growth_map(rig, v_d)),
-        smallest_vibration_velocity_mps=stabilising_vibration_mps(rig, v_d),
+        smallest_vibration_velocity_mps=smallest_mps,
+        removing_vibration_velocity_mps=None if smallest_mps is None else max(smallest_mps, floor_mps),
         critical_velocity_mps=critical_velocity_mps(rig),
         self_sustained_velocity_mps=sustained_mps if math.isfinite(sustained_mps) else None,
         answer="",
@@ -76,13 +81,12 @@ def _answer(name: str, result: MapResult) -> str:
         result.self_sustained_velocity_mps,
     )
     here = f"{name} at {_mm(v_d)} mm/s: "
-    vibration = result.smallest_vibration_velocity_mps
-    if not result.stable_without_vibration and vibration is None:
-        here += "stick-slip without vibration; no vibration removes it"
-    elif not result.stable_without_vibration:
-        here += f"stick-slip without vibration; {_mm(vibration or 0.0)} mm/s of vibration or more removes it"
+    vibration = result.removing_vibration_velocity_mps
+    remedy = "no vibration" if vibration is None else f"{_mm(vibration)} mm/s of vibration or more"
+    if not result.stable_without_vibration:
+        here += f"stick-slip without vibration; {remedy} removes it"
     elif sustained is None or v_d < sustained:
-        here += "steady sliding is stable, but stick-slip from a start at rest goes on"
+        here += f"a start at rest ends in stick-slip, though steady sliding is stable; {remedy} removes it"
     else:
         here += "no stick-slip, no vibration needed"
     if critical is None:
@@ -147,23 +151,25 @@ def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> Non
 def _draw_with_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:
     import numpy as np
 
-    from plant.stability import hurwitz_margin
+    from plant.stability import hurwitz_margin, self_sustained_velocity_mps
 
     v_d = result.drive_velocity_mps
-    smallest = result.smallest_vibration_velocity_mps
+    removing = result.removing_vibration_velocity_mps
     top_mps = 2.5 * v_d
     velocity_mps = np.linspace(top_mps / 360.0, top_mps, 360)
     vibration_mps = np.linspace(0.0, top_mps, 361)
     unstable = hurwitz_margin(rig, velocity_mps, None, vibration_mps[:, None]) < 0.0
-    areas = _regions(axes, velocity_mps * 1e3, vibration_mps * 1e3, unstable, np.zeros_like(unstable))
+    # a vibration of v_d ends started stick-slip, one just below leaves a swing of 0.2 to 0.5 N on the paper's rig
+    sustained = (velocity_mps < self_sustained_velocity_mps(rig)) & (vibration_mps[:, None] < velocity_mps)
+    areas = _regions(axes, velocity_mps * 1e3, vibration_mps * 1e3, unstable, sustained)
     line_mm = np.array([0.0, top_mps * 1e3])
     axes.plot(line_mm, line_mm, color=_INK, lw=1.2, ls="--", label="v_a = v_d")
     set_point = f"v_a = {_RATIO_SET_POINT} v_d, a set point with margin"
     axes.plot(line_mm, _RATIO_SET_POINT * line_mm, color=_INK, lw=1.2, ls=":", label=set_point)
-    if smallest:
+    if removing:
         axes.plot(
-            [v_d * 1e3] * 2, [0.0, smallest * 1e3], color=_INK, lw=2.0, ls="-", marker="_", ms=10,
-            label=f"at {_mm(v_d)} mm/s stable from {_mm(smallest)} mm/s of vibration on",
+            [v_d * 1e3] * 2, [0.0, removing * 1e3], color=_INK, lw=2.0, ls="-", marker="_", ms=10,
+            label=f"at {_mm(v_d)} mm/s: {_mm(removing)} mm/s of vibration or more removes stick-slip",
         )  # fmt: skip
     _operating_point(axes, v_d * 1e3, 0.0, f"this rig, vibration off: {_mm(v_d)} mm/s")
     axes.set(xlim=(0.0, line_mm[1]), ylim=(0.0, line_mm[1]), ylabel="vibration velocity amplitude v_a [mm/s]")

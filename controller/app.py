@@ -35,8 +35,9 @@ def run(
         process = _Process(config, node, bus, lockstep)
         process.prepare()
         bus.announce()
+        granted = realtime.claim(1)
         if not lockstep:
-            process.event("START", realtime.claim(1))
+            process.event("START", granted)
         process.loop(stop)
 
 

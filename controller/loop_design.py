@@ -48,7 +48,7 @@ def design(
     """Choose K for the phase margin [degrees, 20 to 80] and report margins, crossover and settling.
 
     Raises ValueError outside that range or for a delay outside 1 to 10 blocks: without delay there is no gain
-    margin to start the search from, with 20 blocks the phase wraps between the points of the response.
+    margin to search up to, and beyond 10 the margins are untested.
     """
     import control  # noqa: PLC0415
 
@@ -67,7 +67,9 @@ def design(
         return margins(gain)[1] - phase_margin_deg
 
     # the phase margin falls from 90 degrees at K = 0 to 0 where the gain margin is used up
-    ultimate_gain = margins(1.0)[0]
+    # asked at 1e-3, far below it: of several phase crossings the library reports the one nearest to the gain
+    # it is given, and at 1 that is a later one from four blocks of delay on
+    ultimate_gain = 1e-3 * margins(1e-3)[0]
     root: Any = brentq(excess_deg, 1e-3 * ultimate_gain, 0.999 * ultimate_gain)
     gain = float(root)
     gain_margin, margin_deg, crossover_rad_per_s = margins(gain)

@@ -45,6 +45,10 @@ class ControllerNode:
             COMMAND_LAYOUT.blank(), TRACE_LAYOUT.blank(), self._scratch,
         )  # fmt: skip
 
+    def reconfigure(self, config: ControllerConfig) -> None:
+        """Go on with another configuration; the memory stays."""
+        self._params, _ = build(config)
+
     def operator(self, action: int) -> None:
         """A person's word; it takes effect with the next frame, where the log shows it."""
         if action == wire.Operator.STOP:

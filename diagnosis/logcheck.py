@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from bridge import stickslip_pb2 as wire
 from bridge.export import CHANNELS
 from bridge.faults import Fault
-from bridge.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
+from bridge.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces, parsed
 from bridge.messages import SCHEMA_VERSION
 from bridge.topics import BY_NAME
 from diagnosis.findings import Finding
@@ -69,7 +69,7 @@ class _Pass:
                 field = "late_ns" if piece.topic == "applied" else "lateness_ns"
                 self.late[piece.topic] += int((records[field] > LATE_NS).sum())
         elif piece.topic.startswith("event/"):
-            self.events += [wire.Event.FromString(payload) for payload in piece.payloads]
+            self.events += [parsed(wire.Event, payload, "/" + piece.topic) for payload in piece.payloads]
         elif piece.topic not in BY_NAME:
             self.unknown[piece.topic] = self.unknown.get(piece.topic, 0) + len(piece.payloads)
 
@@ -175,7 +175,8 @@ def _of_signal(where: str, seen: SignalLook, sample_s: float, limit: float | Non
         from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
         text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s of samples on"
         found.append(Finding("dead", where, text, seen.longest_run))
-    at_limit = limit is not None and max(seen.highest, -seen.lowest) >= limit
+    # a float32 just misses a limit that it cannot hold
+    at_limit = limit is not None and max(seen.highest, -seen.lowest) >= limit * (1.0 - 1e-6)
     if seen.clipped_high or seen.clipped_low or at_limit:
         ends = [f"{seen.clipped_high} samples at {seen.highest:g}"] if seen.clipped_high else []
         ends += [f"{seen.clipped_low} samples at {seen.lowest:g}"] if seen.clipped_low else []

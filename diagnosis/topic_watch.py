@@ -106,16 +106,16 @@ class TopicWatch:
         if self.topic == "sensors" and self.first_number > 0:
             add("gap", f"begins with block {self.first_number}: those before were not recorded", self.first_number)
         if self._duplicates:
-            add(
-                "duplicate",
-                f"{len(self._duplicates)} numbers came twice, first {self._duplicates[0]}",
-                len(self._duplicates),
-            )
+            text = f"numbers come a second time at {len(self._duplicates)} places, first {self._duplicates[0]}"
+            add("duplicate", text, len(self._duplicates))
         if self._late:
             add("order", f"{len(self._late)} messages came after a later one, first {self._late[0]}", len(self._late))
         if self._jumps:
             number, step_ns = self._jumps[0]
-            text = f"t_ns does not follow the numbers at {len(self._jumps)} places, first {number}: a step of {step_ns / 1e6:g} ms"
+            places = len(self._jumps)
+            text = (
+                f"t_ns does not follow the numbers at {places} places, first {number}: a step of {step_ns / 1e6:g} ms"
+            )
             add("clock-jump", text, len(self._jumps))
         if self._arrived_before:
             number, step_ns = self._arrived_before[0]

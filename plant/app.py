@@ -47,11 +47,12 @@ def run(
                 "NO_PEER",
                 f"{bus_config.endpoint}: no {' and no '.join(sorted(missing))} within {PEER_TIMEOUT_S:g} s",
             )
+        granted = realtime.claim(0)
         if lockstep:
-            process.event("START", "lockstep")
+            process.event("START", "lockstep")  # the same text everywhere: the same run gives the same log
             process.lockstep(blocks, stop)
         else:
-            process.event("START", realtime.claim(0))
+            process.event("START", granted)
             process.realtime(blocks, stop)
         process.event("END", f"blocks={node.block}")
         bus.wait_until_alone(_GOODBYE_S)  # the others are relayed by this process: it leaves last

@@ -176,15 +176,14 @@ class Rig:
                 return command
 
     def goodbye(self) -> None:
-        """Leave last: the others are relayed by this session."""
+        """Wait until the others have left, since this session relays them."""
         with self._changed:
             self._changed.wait_for(lambda: self._alive <= {"plant"}, GOODBYE_S)
-        self.session.close()
 
 
-def main(endpoint: str, blocks: int) -> None:
+def run(rig: Rig, blocks: int) -> dict[str, object]:
+    """`blocks` blocks in lockstep; what came of them."""
     slider = Slider()
-    rig = Rig(endpoint, "rig")
     rig.wait_for({"controller", "recorder"})
     rig.event("START", "lockstep", 0)
     command = wire.Command(block=NO_BLOCK)
@@ -201,7 +200,7 @@ def main(endpoint: str, blocks: int) -> None:
             amplitude_m=slider.amplitude_m,
             command_block=command.block,
             commands=min(block, 1),
-            fallback=block == 0,
+            fallback=int(block == 0),
         )
         rig.send_applied.put(applied.SerializeToString())
         command = rig.answer(block)
@@ -211,7 +210,7 @@ def main(endpoint: str, blocks: int) -> None:
     rig.event("END", f"blocks={blocks}", round(blocks * BLOCK_S * 1e9))
     rig.goodbye()
     before_s = math.inf if vibrates_from_s is None else vibrates_from_s
-    summary = {
+    return {
         "blocks": blocks,
         "commands": commands,
         "vibrates_from_s": vibrates_from_s,
@@ -220,6 +219,14 @@ def main(endpoint: str, blocks: int) -> None:
         "slips_s": slider.slips_s,
         "velocity_ratio": 2.0 * math.pi * command.frequency_Hz * slider.amplitude_m / DRIVE_VELOCITY_MPS,
     }
+
+
+def main(endpoint: str, blocks: int) -> None:
+    rig = Rig(endpoint, "rig")
+    try:
+        summary = run(rig, blocks)
+    finally:
+        rig.session.close()  # an open session would keep a failed process alive
     print(json.dumps(summary))
 
 

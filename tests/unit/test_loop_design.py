@@ -39,7 +39,7 @@ def test_the_phase_margin_is_what_was_asked_for(tau_s, delay, wanted_deg):
     assert found.phase_margin_deg == pytest.approx(wanted_deg, abs=0.01)
 
 
-@pytest.mark.parametrize(("tau_s", "delay"), [(5e-3, 2), (5e-3, 6), (2e-2, 1)])
+@pytest.mark.parametrize(("tau_s", "delay"), [(5e-3, 2), (5e-3, 10), (1e-3, 5), (2e-2, 1)])
 def test_the_gain_margin_is_where_the_loop_starts_to_oscillate(tau_s, delay):
     found = design(BLOCK_S, tau_s, delay)
     calm = correction(0.97 * found.gain_margin * found.gain, 8000, tau_s=tau_s, delay=delay)

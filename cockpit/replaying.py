@@ -1,0 +1,142 @@
+"""`stickslip replay`: is it the same, what if, and a log back on the bus."""
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bridge.config import validate, with_overrides
+from bridge.faults import Fault
+from bridge.logfile import RunData, read_run
+from cockpit.onboard import run_onboard
+from cockpit.scenario import Scenario, header
+from cockpit.verdict import judge_run
+from controller.config import ControllerConfig
+from controller.replay import Change, Replay, replay
+
+
+def changes_of(run: RunData, settings: list[str]) -> list[Change]:
+    """The log's own configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
+    table = run.configuration("controller")
+    source = f"{run.path.name} with --set"
+    timed: dict[int, list[str]] = {0: []}
+    for setting in settings:
+        plain, _, time = setting.rpartition("@")
+        t_ns = 0
+        if plain:
+            try:
+                t_ns = round(float(time.removesuffix("s")) * 1e9)
+            except ValueError:
+                raise Fault(
+                    "CONFIG", f"--set {setting}: {time!r} is no time; write for example key=value@20s"
+                ) from None
+        timed.setdefault(t_ns, []).append((plain or setting).removeprefix("controller."))
+    changes: list[Change] = []
+    for t_ns in sorted(timed):
+        table = with_overrides(table, timed[t_ns])
+        changes.append(Change(t_ns, validate(ControllerConfig, table, source)))
+    return changes
+
+
+def replay_logs(paths: list[Path], from_s: float, settings: list[str], as_json: bool) -> int:
+    """Replay logs and say whether today's controller does the same; 0 when all are identical, 1 otherwise."""
+    results: list[dict[str, Any]] = []
+    for path in paths:
+        run = read_run(path)
+        if not len(run.trace):
+            raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded, so nothing can be replayed")
+        result = replay(run, changes_of(run, settings), from_s)
+        results.append(_row(run, result, settings))
+        if not as_json:
+            print("\n".join(_lines(run, result, settings)))
+    if as_json:
+        print(json.dumps(results))
+    return 0 if all(row["identical"] for row in results) else 1
+
+
+def _row(run: RunData, result: Replay, settings: list[str]) -> dict[str, Any]:
+    difference = result.difference._asdict() if result.difference else None
+    return {
+        "log": str(run.path),
+        "identical": result.identical,
+        "compared_steps": result.compared,
+        "skipped_steps": result.skipped,
+        "difference": difference,
+        "likely_reason": "" if result.identical else likely_reason(run, settings),
+    }
+
+
+def _lines(run: RunData, result: Replay, settings: list[str]) -> list[str]:
+    skipped = (
+        f"; {result.skipped} steps could not be rebuilt, their blocks are not in the log" if result.skipped else ""
+    )
+    if result.difference is None:
+        return [f"{run.path}: identical, {result.compared} steps, every command and trace bit for bit{skipped}"]
+    d = result.difference
+    lines = [
+        f"{run.path}: differs from block {d.block} at {d.t_s:.3f} s on: {d.table}.{d.field} was {d.logged:.9g}, "
+        f"is {d.replayed:.9g}{skipped}",
+        f"  likely reason: {likely_reason(run, settings)}",
+    ]
+    if settings:
+        lines.append(
+            "  the log's plant heard the old commands: with these it would have answered differently from there on; "
+            "--closed-loop simulates that"
+        )
+    return lines
+
+
+def likely_reason(run: RunData, settings: list[str]) -> str:
+    """Why a replay would differ, in words."""
+    if settings:
+        return f"the configuration was changed: {', '.join(settings)}"
+    scenario = Scenario.model_construct(
+        controller=validate(ControllerConfig, run.configuration("controller"), run.path.name)
+    )
+    was = json.loads(run.headers["controller"]["versions"])
+    now = json.loads(header(scenario, "controller", lockstep=False).versions)
+    changed = [f"{name} {was.get(name)} then, {now[name]} now" for name in now if was.get(name) != now[name]]
+    if changed:
+        return f"other versions: {'; '.join(changed)}"
+    return "same versions and configuration: the controller's code was changed since, or the log was"
+
+
+class Outcome(NamedTuple):
+    """What a run came to, for comparing two."""
+
+    slips: int
+    swing_N: float
+    velocity_ratio_min: float
+    drive_work_J: float
+    vibration_dose_mm2_per_s: float  # integral of v_a squared
+
+
+def outcome(run: RunData) -> Outcome:
+    """The figures of a run from its log."""
+    verdict = judge_run(run)
+    trace = run.trace
+    block_s = float(run.configuration("controller")["block_s"])
+    work_J = float((trace["drive_force_N"] * trace["drive_velocity_mps"]).sum()) * block_s
+    dose = float((trace["vibration_velocity_mps"] ** 2).sum()) * block_s * 1e6
+    slips = int(trace["slips"][-1])
+    swing_N = verdict.after.swing_N if verdict.after else 0.0
+    return Outcome(slips, swing_N, verdict.velocity_ratio_min, work_J, dose)
+
+
+def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> int:
+    """Simulate a log's run again, from its own plant and seed, with the changed controller, and compare both."""
+    run = read_run(path)
+    changes = changes_of(run, settings)
+    plant = run.configuration("plant")
+    table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": plant["duration_s"]}
+    table["controller"] = changes[0].config.model_dump(mode="json")
+    scenario = validate(Scenario, table, path.name)
+    run_onboard(scenario, log, {"closed_loop_of": str(path), "settings": settings}, changes=changes[1:])
+    was, now = outcome(run), outcome(read_run(log))
+    if as_json:
+        print(json.dumps({"was": was._asdict(), "now": now._asdict(), "log": str(log)}))
+        return 0
+    print(f"{'':<28}{'as recorded':>14}{'changed':>14}")
+    for field in Outcome._fields:
+        print(f"{field:<28}{getattr(was, field):>14.4g}{getattr(now, field):>14.4g}")
+    print(f"log  {log}")
+    return 0

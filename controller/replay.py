@@ -1,0 +1,222 @@
+"""Today's controller on the frames that a log says were consumed: would it have done the same?
+
+Inputs are fed, outputs are compared; no output is ever copied from the log. The only field left out is the trace's
+lateness: it was read from a clock and decides nothing.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.kernel import kernel
+from bridge.logfile import RunData
+from bridge.messages import COMMAND, TRACE, Layout, Records
+from controller.codes import BLOCK
+from controller.config import ControllerConfig
+from controller.core import step
+from controller.records import LAYOUT_ID, STATE, build
+
+_NO_ROW = -1
+
+
+class Change(NamedTuple):
+    """From `t_ns` on the controller runs with this configuration; its memory stays."""
+
+    t_ns: int
+    config: ControllerConfig
+
+
+class Difference(NamedTuple):
+    """Where a replay first departs from the log."""
+
+    table: str  # command or trace
+    step: int
+    block: int
+    t_s: float
+    field: str
+    logged: float
+    replayed: float
+
+
+class Replay(NamedTuple):
+    """What today's controller answers to the frames of a log, one row a step that could be replayed."""
+
+    steps: npt.NDArray[np.int64]  # sequence of each replayed step
+    command: Records
+    trace: Records
+    skipped: int  # steps of the log that cannot be rebuilt: their block or their memory is not in the log
+    compared: int
+    difference: Difference | None
+
+    @property
+    def identical(self) -> bool:
+        """Whether every bit that was compared is the same."""
+        return self.difference is None
+
+
+@kernel
+def _steps(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    sensors: npt.NDArray[Any],
+    rows: npt.NDArray[np.int64],
+    events: npt.NDArray[np.int64],
+    gap_blocks: npt.NDArray[np.int64],
+    t_ns: npt.NDArray[np.int64],
+    command: npt.NDArray[Any],
+    trace: npt.NDArray[Any],
+    scratch: npt.NDArray[np.float64],
+) -> None:
+    for i in range(rows.shape[0]):
+        row = max(rows[i], 0)  # a step without a block does not look at it
+        step(
+            params, state, sensors[row : row + 1], events[i], gap_blocks[i], t_ns[i],
+            command[i : i + 1], trace[i : i + 1], scratch,
+        )  # fmt: skip
+
+
+def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
+    """Replay a log from `from_s` on, starting at the last snapshot before it (or at the run's start).
+
+    Args:
+        changes: configurations in order of time; the first holds from the start.
+        from_s: only steps from this time on are compared and returned.
+
+    """
+    trace = run.trace
+    order = np.argsort(trace["sequence"], kind="stable")
+    sequence = trace["sequence"][order].astype(np.int64)
+    block = trace["block"][order]
+    events = trace["events"][order].astype(np.int64)
+    t_ns = trace["t_ns"][order].astype(np.int64)
+    gaps = trace["gap_blocks"][order].astype(np.int64)
+    rows = _rows(run.sensors, block, events)
+    sensors = _writable(run.sensors)
+
+    _, memory = build(changes[0].config)
+    scratch = np.empty(changes[0].config.samples_per_block)
+    replayed: list[npt.NDArray[np.int64]] = []
+    commands, traces = COMMAND.blank(len(order)), TRACE.blank(len(order))
+    at = _start(run, sequence, round(from_s * 1e9), memory)
+    while at < len(order):
+        end = _until(sequence, rows, events, at)
+        for start, stop, params in _spans(changes, t_ns, at, end):
+            part = slice(start, stop)
+            _steps(
+                params, memory, sensors, rows[part], events[part], gaps[part], t_ns[part],
+                commands[part], traces[part], scratch,
+            )  # fmt: skip
+        replayed.append(np.arange(at, end))
+        at = _resume(run, sequence, end, memory)
+    done = np.concatenate(replayed) if replayed else np.empty(0, np.int64)
+    wanted = done[t_ns[done] >= from_s * 1e9]
+    considered = int((t_ns >= from_s * 1e9).sum())
+    found = _first_difference(run, order[wanted], sequence[wanted], commands[wanted], traces[wanted])
+    return Replay(sequence[wanted], commands[wanted], traces[wanted], considered - len(wanted), len(wanted), found)
+
+
+def _writable(records: Records) -> Records:
+    return np.frombuffer(bytearray(records.tobytes()), records.dtype)
+
+
+def _rows(sensors: Records, block: Any, events: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Row of the sensor block that each step consumed; _NO_ROW where the log does not hold it."""
+    order = np.argsort(sensors["sequence"], kind="stable")
+    known = sensors["sequence"][order]
+    if not len(known):
+        return np.full(len(block), _NO_ROW)
+    place = np.minimum(np.searchsorted(known, block), len(known) - 1)
+    found = (known[place] == block) & (events & BLOCK != 0)
+    return np.where(found, order[place], _NO_ROW)
+
+
+def _until(sequence: Any, rows: Any, events: Any, start: int) -> int:
+    """End of the stretch from `start` whose every step can be rebuilt."""
+    jumps = np.flatnonzero(np.diff(sequence[start:]) != 1)
+    missing = np.flatnonzero((rows[start:] == _NO_ROW) & (events[start:] & BLOCK != 0))
+    ends = [len(sequence) - start]
+    if len(jumps):
+        ends.append(int(jumps[0]) + 1)
+    if len(missing):
+        ends.append(int(missing[0]))
+    return start + min(ends)
+
+
+def _spans(changes: list[Change], t_ns: Any, start: int, end: int) -> list[tuple[int, int, Any]]:
+    """The stretch cut where the configuration changes."""
+    spans: list[tuple[int, int, Any]] = []
+    for change, following in zip(changes, [*changes[1:], None], strict=True):
+        first = max(start, int(np.searchsorted(t_ns, change.t_ns)) if change.t_ns > 0 else 0)
+        last = end if following is None else min(end, int(np.searchsorted(t_ns, following.t_ns)))
+        if first < last:
+            spans.append((first, last, build(change.config)[0]))
+    return spans
+
+
+def _start(run: RunData, sequence: Any, from_ns: int, memory: Any) -> int:
+    """Index of the first step to replay, its memory restored."""
+    usable = [s for s in run.snapshots if s.layout == LAYOUT_ID and s.t_ns < from_ns]
+    if usable:
+        return _restore(sequence, usable[-1], memory)
+    if len(sequence) and sequence[0] == 0:
+        return 0
+    return _resume(run, sequence, 0, memory)
+
+
+def _resume(run: RunData, sequence: Any, at: int, memory: Any) -> int:
+    """Index after the next snapshot from index `at` on; the end when there is none."""
+    if at >= len(sequence):
+        return at
+    for snapshot in run.snapshots:
+        if snapshot.layout == LAYOUT_ID and snapshot.step >= sequence[at]:
+            return _restore(sequence, snapshot, memory)
+    return len(sequence)
+
+
+def _restore(sequence: Any, snapshot: Any, memory: Any) -> int:
+    memory[:] = np.frombuffer(snapshot.memory, STATE)
+    return int(np.searchsorted(sequence, snapshot.step + 1))
+
+
+def _first_difference(run: RunData, rows: Any, steps: Any, command: Records, trace: Records) -> Difference | None:
+    """The earliest step with a bit that differs, trace before command."""
+    logged_trace = run.trace[rows]
+    place = np.searchsorted(run.command["sequence"], steps)
+    place = np.minimum(place, max(len(run.command) - 1, 0))
+    logged_command = run.command[place]
+    there = logged_command["sequence"] == steps  # a command that the recorder lost cannot be compared
+    tables = (
+        ("trace", TRACE, logged_trace, trace, np.ones(len(steps), bool)),
+        ("command", COMMAND, logged_command, command, there),
+    )
+    found: list[Difference] = []
+    for name, layout, logged, again, valid in tables:
+        row = _first_row(layout, logged, again, valid)
+        if row is not None:
+            index, field = row
+            found.append(
+                Difference(
+                    table=name,
+                    step=int(steps[index]),
+                    block=int(trace["block"][index]),
+                    t_s=float(trace["t_ns"][index]) * 1e-9,
+                    field=field,
+                    logged=float(logged[field][index]),
+                    replayed=float(again[field][index]),
+                )
+            )
+    return min(found, key=lambda difference: difference.step) if found else None
+
+
+def _first_row(layout: Layout, logged: Records, again: Records, valid: Any) -> tuple[int, str] | None:
+    first: tuple[int, str] | None = None
+    for field in layout.message.DESCRIPTOR.fields:
+        if field.name == "lateness_ns":
+            continue
+        kind = f"u{logged[field.name].dtype.itemsize}"
+        bits, bits_again = (np.ascontiguousarray(table[field.name]).view(kind) for table in (logged, again))
+        differs = np.flatnonzero((bits != bits_again) & valid)
+        if len(differs) and (first is None or differs[0] < first[0]):
+            first = (int(differs[0]), field.name)
+    return first

@@ -1,0 +1,166 @@
+"""Replay: the same bits from any start, through gaps, duplicates and reordering, and in words when they differ."""
+
+import json
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from bridge.logfile import RunData, read_run
+from bridge.runlog import RunLog
+from bridge.topics import SENSORS
+from cockpit.cli import app
+from cockpit.onboard import run_onboard
+from cockpit.replaying import changes_of
+from cockpit.scenario import Scenario, header, load_scenario
+from controller.node import ControllerNode
+from controller.replay import replay
+from plant.node import PlantNode
+from tests.system.ports import free_endpoint
+
+COMMAND = [sys.executable, "-m", "cockpit"]
+
+
+def scenario(*settings: str) -> Scenario:
+    return load_scenario("paper-c45-c45", ["controller.policy.enabled_from_s=0.5", *settings])
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("replay") / "run.mcap"
+    run_onboard(scenario("duration_s=6.0"), path, {})
+    return path
+
+
+@pytest.mark.parametrize("from_s", [0.0, 0.5, 1.0, 1.7, 3.0005, 5.9, 9.0])
+def test_replay_equals_record_from_anywhere(log: Path, from_s: float) -> None:
+    run = read_run(log)
+    result = replay(run, changes_of(run, []), from_s)
+    assert result.identical
+    assert result.skipped == 0
+    assert result.compared == np.count_nonzero(run.trace["t_ns"] >= from_s * 1e9)
+
+
+def test_a_changed_bit_is_found_and_named(log: Path) -> None:
+    run = read_run(log)
+    trace = np.frombuffer(bytearray(run.trace.tobytes()), run.trace.dtype)
+    trace["score"][4321] = np.nextafter(trace["score"][4321], 1.0)
+    result = replay(run._replace(trace=trace), changes_of(run, []))
+    assert result.difference is not None
+    assert (result.difference.table, result.difference.step, result.difference.field) == ("trace", 4321, "score")
+
+
+def delivered(path: Path, deliver: "list[int]", blocks: list[bytes], run: Scenario) -> RunData:
+    """A log of a controller that was handed `blocks` in the order `deliver`."""
+    node = ControllerNode(run.controller)
+    written = RunLog(path, lockstep=True)
+    written.add_header(header(run, "controller", lockstep=True))
+    kept: set[int] = set()
+    for index in deliver:
+        if index not in kept:
+            written.write(SENSORS, blocks[index])
+            kept.add(index)
+        if index % 97 == 0:
+            written.write(*node.stale(20))
+            for message in node.rest(0):
+                written.write(*message)
+        command = node.block(blocks[index])
+        if command is not None:
+            written.write(*command)
+            for message in node.rest(0):
+                written.write(*message)
+    written.close()
+    return read_run(path)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_jitter_reordering_and_duplicates_change_nothing_that_the_log_does_not_explain(
+    tmp_path: Path, seed: int
+) -> None:
+    run = scenario("duration_s=3.0")
+    plant = PlantNode(run.rig, 1)
+    blocks = [plant.advance([])[0].payload for _ in range(3000)]
+    chance = random.Random(seed)
+    deliver: list[int] = []
+    for index in range(3000):
+        deliver.append(index)
+        if chance.random() < 0.05:
+            deliver.append(max(0, index - chance.randrange(4)))  # again, or late
+        if chance.random() < 0.05 and len(deliver) > 3:
+            deliver[-1], deliver[-2] = deliver[-2], deliver[-1]
+        if chance.random() < 0.02:
+            deliver.pop()  # lost
+    data = delivered(tmp_path / "log.mcap", deliver, blocks, run)
+    assert (data.trace["gap_blocks"] > 0).any()
+    result = replay(data, changes_of(data, []))
+    assert result.identical, result.difference
+    assert result.compared == len(data.trace)
+
+
+def test_a_recorder_that_lost_blocks_costs_only_until_the_next_snapshot(log: Path) -> None:
+    run = read_run(log)
+    keep = (run.sensors["sequence"] < 1500) | (run.sensors["sequence"] > 1510)
+    result = replay(run._replace(sensors=run.sensors[keep]), changes_of(run, []))
+    assert result.identical
+    assert result.skipped == 500  # 1500 to 1999: the memory is known again after step 1999
+
+
+def test_what_if_names_the_change_and_says_what_it_cannot_know(log: Path) -> None:
+    result = CliRunner().invoke(app, ["replay", str(log), "--set", "limits.v_ratio=1.1"])
+    assert result.exit_code == 1
+    assert "wanted_velocity_mps" in result.stdout
+    assert "limits.v_ratio=1.1" in result.stdout
+    assert "--closed-loop" in result.stdout
+
+
+def test_a_change_from_a_time_on_changes_nothing_before(log: Path) -> None:
+    run = read_run(log)
+    result = replay(run, changes_of(run, ["onset.window_s=0.03@3s"]))
+    assert result.difference is not None
+    assert 3.0 <= result.difference.t_s < 3.1
+
+
+@pytest.mark.parametrize("setting", ["limits.v_ratio=9", "limits.v_ratio=1.1@later", "nothing.here=1"])
+def test_bad_what_if(log: Path, setting: str) -> None:
+    result = CliRunner().invoke(app, ["replay", str(log), "--set", setting])
+    assert result.exit_code == 2
+    assert setting.split("=", maxsplit=1)[0].split(".", maxsplit=1)[0] in result.stderr
+
+
+def test_closed_loop_compares_both(log: Path, tmp_path: Path) -> None:
+    out = tmp_path / "again.mcap"
+    same = CliRunner().invoke(app, ["replay", str(log), "--closed-loop", "--json", "--log", str(out)])
+    figures = json.loads(same.stdout)
+    assert figures["was"] == figures["now"]
+    arguments = ["--closed-loop", "--set", "limits.v_ratio=1.1@3s", "--json", "--log", str(out)]
+    changed = json.loads(CliRunner().invoke(app, ["replay", str(log), *arguments]).stdout)
+    assert changed["now"]["vibration_dose_mm2_per_s"] < changed["was"]["vibration_dose_mm2_per_s"]
+    assert changed["now"]["velocity_ratio_min"] < 1.15 < changed["was"]["velocity_ratio_min"]
+
+
+def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path, tmp_path: Path) -> None:
+    endpoint, again = free_endpoint(), tmp_path / "again.mcap"
+    arguments = ["--endpoint", endpoint, "--set", "controller.policy.enabled_from_s=0.5"]
+    player = subprocess.Popen(
+        [*COMMAND, "replay", str(log), "--to-bus", "--from", "0s", "--endpoint", endpoint, "--wait"]
+    )
+    others = [
+        subprocess.Popen([*COMMAND, "controller", *arguments]),
+        subprocess.Popen([*COMMAND, "record", *arguments, "--log", str(again)]),
+    ]
+    try:
+        for process in [player, *others]:
+            assert process.wait(60) == 0
+    finally:
+        for process in [player, *others]:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+    was, now = read_run(log), read_run(again)
+    assert now.sensors.tobytes() == was.sensors.tobytes()
+    for field in ("mode", "score", "wanted_amplitude_m", "vibration_velocity_mps"):
+        assert np.array_equal(now.trace[field], was.trace[field]), field

@@ -1,0 +1,48 @@
+"""The golden logs: today's controller does the same, and the figures stay where they were, on both sides."""
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridge.logfile import read_run
+from cockpit.replaying import changes_of, outcome
+from cockpit.scenario import processor
+from controller.replay import replay
+from tests.golden.bless import FOLDER, make, situations
+
+FIGURES = tomllib.loads((FOLDER / "figures.toml").read_text())
+
+
+@pytest.mark.parametrize("name", situations())
+def test_replay_is_identical(name: str) -> None:
+    run = read_run(FOLDER / f"{name}.mcap")
+    result = replay(run, changes_of(run, []))
+    assert result.compared == len(run.trace) > 1000
+    if json.loads(run.headers["controller"]["versions"])["processor"] == processor():
+        assert result.difference is None, result.difference
+        return
+    # another processor: the last bit of a sine may differ, what is decided may not
+    assert np.array_equal(result.trace["mode"], run.trace["mode"])
+    for field in ("score", "force_rate", "vibration_velocity_mps", "wanted_amplitude_m"):
+        np.testing.assert_allclose(result.trace[field], run.trace[field], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", situations())
+def test_a_new_run_keeps_its_figures(name: str, tmp_path: Path) -> None:
+    make(name, tmp_path / "now.mcap")
+    now = outcome(read_run(tmp_path / "now.mcap"))._asdict()
+    assert now.keys() == FIGURES[name].keys()
+    for field, (low, high) in FIGURES[name].items():
+        assert low <= now[field] <= high or now[field] == pytest.approx(low), field
+
+
+def test_blessing_demands_a_reason() -> None:
+    for reason in ([], ["--reason", " "], ["--reason", "because"]):
+        result = subprocess.run([sys.executable, "-m", "tests.golden.bless", *reason], capture_output=True, check=False)
+        assert result.returncode != 0
+        assert b"reason" in result.stderr

@@ -1,0 +1,88 @@
+"""Small logs for tests: one short run, and copies of it with something wrong."""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from bridge.logfile import STREAMING, RunData, read_run
+from bridge.messages import APPLIED, COMMAND, STATE, TRACE, sensor_block
+from bridge.runlog import RunLog
+from bridge.topics import BY_NAME
+from cockpit.onboard import run_onboard
+from cockpit.scenario import load_scenario
+
+Tables = dict[str, Any]
+
+
+@cache
+def short_log() -> bytes:
+    """A run of 0.4 s, 400 blocks, in several chunks."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "short.mcap"
+        scenario = load_scenario("paper-c45-c45", ["duration_s=0.4"])
+        run_onboard(scenario, path, {"scenario": scenario.name})
+        return in_chunks(path, 40)
+
+
+def in_chunks(path: Path, blocks: int) -> bytes:
+    """The log again, with a chunk every `blocks` blocks."""
+    run = read_run(path)
+    again = path.with_name("again.mcap")
+    write(again, tables_of(run), run, blocks)
+    return again.read_bytes()
+
+
+def tables_of(run: RunData) -> Tables:
+    """The streaming topics of a run, writable."""
+    return {
+        name: np.frombuffer(bytearray(getattr(run, name).tobytes()), getattr(run, name).dtype) for name in STREAMING
+    }
+
+
+def with_tags(name: str, table: Any) -> Any:
+    """The records as messages again: numpy's copies leave the tags between the fields behind."""
+    layout = (
+        sensor_block(20)
+        if name == "sensors"
+        else {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE}[name]
+    )
+    messages = np.frombuffer(bytearray(layout.blank().tobytes() * len(table)), layout.dtype)
+    for field in layout.dtype.names or ():
+        messages[field] = table[field]
+    return messages
+
+
+def write(path: Path, tables: Tables, run: RunData, blocks: int = 40) -> None:
+    """Write messages in the order of their rows, a chunk every `blocks` of them."""
+    log = RunLog(path, lockstep=True)
+    for name, fields in run.headers.items():
+        log._writer.add_metadata(name, fields)
+    for event in run.events:
+        if event.code == "START":
+            log.write(BY_NAME["event/plant"], event.SerializeToString())
+    whole = {name: with_tags(name, table) for name, table in tables.items()}
+    for start in range(0, max(len(table) for table in tables.values()), blocks):
+        for name, table in whole.items():
+            for record in table[start : start + blocks]:
+                log._add(BY_NAME[name], record.tobytes(), int(record["sequence"]), int(record["t_ns"]))
+        log._writer.flush()
+    for event in run.events:
+        if event.code == "END":
+            log.write(BY_NAME["event/" + event.source], event.SerializeToString())
+    log.close()
+
+
+def doctored(folder: Path, change: Callable[[Tables], None], name: str = "doctored.mcap") -> Path:
+    """The short log with its tables changed."""
+    path = folder / "whole.mcap"
+    path.write_bytes(short_log())
+    run = read_run(path)
+    tables = tables_of(run)
+    change(tables)
+    out = folder / name
+    write(out, tables, run)
+    return out

@@ -1,0 +1,143 @@
+"""Cut and damaged logs: what lies before the damage is read, what can be saved is, and only a Fault is ever raised."""
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from bridge.faults import Fault
+from bridge.logfile import LogReader, read_run, recover
+from tests.logs import doctored, short_log
+
+TABLES = ("sensors", "applied", "command", "trace", "state")
+quick = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def chunk_ends() -> list[int]:
+    """Where each chunk of the short log ends, the first entry being where the first begins."""
+    data = short_log()
+    ends: list[int] = []
+    at = 8
+    while at < len(data) - 8:
+        length = int.from_bytes(data[at + 1 : at + 9], "little")
+        if data[at] == 6:
+            ends += [at + 9 + length] if ends else [at, at + 9 + length]
+        at += 9 + length
+    return ends
+
+
+def ends_of_header() -> int:
+    """Where the header record ends, which says whose file it is."""
+    return 8 + 9 + int.from_bytes(short_log()[9:17], "little")
+
+
+@quick
+@given(st.floats(0.0, 1.0))
+@example(0.0)
+@example(1.0)
+def test_a_cut_costs_only_the_open_chunk(tmp_path: Path, share: float) -> None:
+    data = short_log()
+    cut = round(share * len(data))
+    path, saved = tmp_path / "cut.mcap", tmp_path / "saved.mcap"
+    path.write_bytes(data[:cut])
+    ends = chunk_ends()
+    whole_chunks = sum(end <= cut for end in ends[1:])
+    if cut < ends_of_header():
+        with pytest.raises(Fault, match="BAD_LOG"):
+            read_run(path)
+        return
+    run = read_run(path)
+    assert len(run.sensors) == min(40 * whole_chunks, 400)
+    assert run.damage.cut_bytes < max(np.diff([8, *ends]).max(), 5000)
+    result = recover(path, saved)
+    again = read_run(saved)
+    assert again.damage == (0, 0, True, 0)
+    for name in TABLES:
+        assert getattr(again, name).tobytes() == getattr(run, name).tobytes()
+    assert again.headers == run.headers
+    with saved.open("rb") as file:  # the index is one that other programs can use
+        assert sum(1 for _ in make_reader(file).iter_messages()) == result.messages
+
+
+@quick
+@given(st.floats(0.0, 1.0, exclude_max=True), st.integers(0, 7))
+def test_a_flipped_bit_costs_one_chunk_at_most(tmp_path: Path, share: float, bit: int) -> None:
+    data = bytearray(short_log())
+    at = int(share * len(data))
+    data[at] ^= 1 << bit
+    path, saved = tmp_path / "flipped.mcap", tmp_path / "saved.mcap"
+    path.write_bytes(data)
+    if at < ends_of_header():  # magic and header: whose file it is cannot be told any more
+        with contextlib.suppress(Fault):
+            recover(path, saved)
+        return
+    result = recover(path, saved)
+    run, again = read_run(path), read_run(saved)
+    assert again.sensors.tobytes() == run.sensors.tobytes()
+    if chunk_ends()[0] <= at:  # behind the definitions
+        assert len(run.sensors) >= 360
+    if len(run.sensors) < 400 and chunk_ends()[0] <= at:
+        assert result.damage.bad_chunks + result.damage.bad_records >= 1
+
+
+@quick
+@given(st.data())
+def test_every_byte_of_the_definitions_may_be_damaged(tmp_path: Path, data: st.DataObject) -> None:
+    content = bytearray(short_log())
+    first = chunk_ends()[0]
+    # strings hold most of the bytes; what is around them is more interesting
+    at = data.draw(st.one_of(st.integers(8, 60), st.integers(8, first - 1), st.integers(first - 1500, first - 1)))
+    content[at] = data.draw(st.integers(0, 255))
+    path = tmp_path / "flipped.mcap"
+    path.write_bytes(content)
+    with contextlib.suppress(Fault):
+        recover(path, tmp_path / "saved.mcap")
+        run = read_run(tmp_path / "saved.mcap")
+        for role in ("plant", "controller"):
+            run.configuration(role)
+
+
+@quick
+@given(st.binary(max_size=400))
+def test_noise_after_the_magic_is_a_fault(tmp_path: Path, noise: bytes) -> None:
+    path = tmp_path / "noise.mcap"
+    path.write_bytes(short_log()[:8] + noise)
+    with pytest.raises(Fault, match="BAD_LOG"):
+        list(LogReader(path).chunks())
+
+
+def test_recover_in_place_and_leaves_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(short_log()[:-9000])
+    recover(path, path)
+    assert read_run(path).damage.closed
+    assert [entry.name for entry in tmp_path.iterdir()] == ["cut.mcap"]
+
+
+def test_a_clock_that_goes_back_is_read_as_it_is(tmp_path: Path) -> None:
+    def change(tables: dict[str, np.ndarray]) -> None:
+        tables["sensors"]["t_ns"][100:] -= 90_000_000
+
+    run = read_run(doctored(tmp_path, change))
+    assert (np.diff(run.sensors["t_ns"]) < 0).sum() == 1
+    assert len(run.sensors) == 400
+
+
+def test_messages_without_their_zeros_are_all_read(tmp_path: Path) -> None:
+    """A client that leaves zeros out sends messages of one length too: they are many, not one."""
+    from bridge import stickslip_pb2 as wire
+    from bridge.runlog import RunLog
+    from bridge.topics import COMMAND
+
+    path = tmp_path / "sparse.mcap"
+    log = RunLog(path, lockstep=True)
+    for i in range(1, 11):
+        log.write(COMMAND, wire.Command(sequence=i, t_ns=i * 1000, block=i, frequency_Hz=1500.0).SerializeToString())
+    log.close()
+    command = read_run(path).command
+    assert command["sequence"].tolist() == list(range(1, 11))
+    assert (command["frequency_Hz"] == 1500.0).all()

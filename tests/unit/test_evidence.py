@@ -1,0 +1,313 @@
+"""The evidence folder: every error names its place, every doubt is a finding, and what is doubtful is not used."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+
+from bridge.faults import Fault
+from diagnosis.evidence import Evidence, load_evidence
+from tests.logs import doctored, short_log
+
+MANIFEST = """
+format = "evidence/1"
+[rig]
+drive = "spring"
+mass_kg = 1.5
+drive_stiffness_N_per_m = 11700.0
+drive_damping_Ns_per_m = 0.0
+contact_stiffness_N_per_m = 77.52e6
+contact_damping_Ns_per_m = 2.15e4
+viscous_damping_Ns_per_m = 0.0
+coulomb_force_N = 14.49
+static_force_N = 17.38
+stribeck_velocity_mps = 0.0005
+[rig.tolerance]
+mass_kg = 0.005
+coulomb_force_N = 0.03
+[[run]]
+file = "run-01.parquet"
+drive_velocity_mps = 0.0005
+"""
+Columns = dict[str, Any]
+
+
+def columns() -> Columns:
+    t_s = np.arange(4000) / 2000
+    random = np.random.default_rng(1)
+    force_N = 15 + 2 * np.sin(9 * t_s) + random.normal(0, 0.02, t_s.size)
+    return {
+        "t_s": t_s,
+        "drive_force_N": force_N,
+        "mass_accel_mps2": random.normal(0, 1.0, t_s.size),
+        "drive_position_m": 0.0005 * t_s,
+    }
+
+
+def folder(at: Path, data: Columns, manifest: str = MANIFEST, file: str = "run-01.parquet") -> Path:
+    (at / "manifest.toml").write_text(manifest)
+    pq.write_table(pa.table(data), at / file)
+    return at
+
+
+def kinds(evidence: Evidence) -> dict[str, str]:
+    return {
+        finding.kind: f"{finding.where}: {finding.text}" for finding in evidence.findings if finding.kind != "missing"
+    }
+
+
+def test_a_good_folder(tmp_path: Path) -> None:
+    data = columns()
+    evidence = load_evidence(folder(tmp_path, data))
+    (run,) = evidence.runs
+    assert kinds(evidence) == {}
+    assert [finding.where for finding in evidence.findings] == [
+        "run-01.parquet: base_accel_mps2",
+        "run-01.parquet: mass_position_m",
+    ]
+    assert evidence.rig.mass_kg == 1.5
+    assert evidence.rig.tolerance == {"mass_kg": 0.005, "coulomb_force_N": 0.03}
+    assert run.drive_velocity_mps == 0.0005
+    assert (run.t_s == data["t_s"]).all()
+    for name, values in run.columns.items():
+        assert values.dtype == np.float64
+        assert (values == data[name]).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('"evidence/1"', '"evidence/2"', "manifest.toml: format = 'evidence/2': must be"),
+        ('format = "evidence/1"', "", "manifest.toml: format: missing"),
+        ("[[run]]", "[[runs]]", "manifest.toml: run: missing"),
+        ('"spring"', '"springs"', "manifest.toml: rig.drive = 'springs'"),
+        ('"spring"', '"force"', 'rig: drive_stiffness_N_per_m: unknown with drive = "force"'),
+        ("drive_stiffness_N_per_m = 11700.0", "", "rig: drive_stiffness_N_per_m: missing"),
+        ("mass_kg = 1.5", "mass_kg = -1.5", "manifest.toml: rig.mass_kg = -1.5: must be greater than 0"),
+        ("mass_kg = 1.5", 'mass_kg = "1.5"', "rig.mass_kg = '1.5': must be a number; write it without quotes"),
+        ("mass_kg = 1.5", "", "manifest.toml: rig.mass_kg: missing"),
+        ("mass_kg = 1.5", "mass_kg = nan", "rig.mass_kg = nan"),
+        ("static_force_N = 17.38", "static_force_N = 7.38", "rig: static_force_N = 7.38: must not be below"),
+        ("mass_kg = 0.005", "mass = 0.005", "rig: tolerance.mass = 0.005: unknown key; known here: mass_kg,"),
+        ("mass_kg = 0.005", "mass_kg = 5.0", "tolerance.mass_kg = 5: must be from 0 to 1; it is relative"),
+        ("[[run]]", '[channels]\nforce = { column = "F" }\n[[run]]', "channels.force: unknown key; known here: t_s,"),
+        ("[[run]]", "[channels]\nt_s = { scale = 2.0 }\n[[run]]", "channels.t_s.column: missing"),
+        ("[[run]]", "[[run]]\nspeed = 1", "manifest.toml: run.0.speed = 1: unknown key; known here:"),
+        ("run-01.parquet", "../run-01.parquet", "file = '../run-01.parquet': must lie in the evidence folder"),
+        ("run-01.parquet", "run-01.xlsx", "file = 'run-01.xlsx': must end in .parquet, .csv, .mat, .mcap"),
+        ("run-01.parquet", "run-07.parquet", "run-07.parquet: no such file"),
+        ("drive_velocity_mps = 0.0005", "holdout = true", "run.holdout = true for every run"),
+        ("[[run]]", "[[run", "manifest.toml: not valid TOML"),
+    ],
+)
+def test_a_bad_manifest_names_the_key(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    assert old in MANIFEST
+    with pytest.raises(Fault) as caught:
+        load_evidence(folder(tmp_path, columns(), MANIFEST.replace(old, new)))
+    assert caught.value.kind.code == "BAD_EVIDENCE"
+    assert caught.value.kind.exit_status == 2
+    assert expected in caught.value.line
+
+
+def without(*names: str) -> Callable[[Columns], None]:
+    def change(data: Columns) -> None:
+        for name in names:
+            del data[name]
+
+    return change
+
+
+def text_in_a_row(data: Columns) -> None:
+    data["drive_force_N"] = [str(value) for value in data["drive_force_N"]]
+    data["drive_force_N"][41] = "overload"
+
+
+def starts_again(data: Columns) -> None:
+    data["t_s"][2000:] -= 1.0
+
+
+def half_is_nan(data: Columns) -> None:
+    data["t_s"][::3] = np.nan
+
+
+def short(data: Columns) -> None:
+    for name in data:
+        data[name] = data[name][:9]
+
+
+def in_micronewton(data: Columns) -> None:
+    data["drive_force_N"] = data["drive_force_N"] * 1e6
+    del data["mass_accel_mps2"]
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (without("t_s"), "run-01.parquet: t_s: missing; the file has drive_force_N,"),
+        (
+            without("drive_force_N", "mass_accel_mps2"),
+            "run-01.parquet: has drive_position_m, t_s: must have drive_force_N or",
+        ),
+        (text_in_a_row, "run-01.parquet: column drive_force_N: row 42 = 'overload': must be a number"),
+        (
+            starts_again,
+            "run-01.parquet: t_s: 2000 rows are not later than the one before, first row 2001: 0 s after 0.9995 s",
+        ),
+        (half_is_nan, "run-01.parquet: t_s: 1334 samples are no finite number, first row 1"),
+        (short, "run-01.parquet: t_s: 9 rows: must have 16 at least"),
+        (in_micronewton, "drive_force_N: largest value 1.70"),
+    ],
+)
+def test_bad_data_names_the_column_and_the_row(
+    tmp_path: Path, change: Callable[[Columns], None], expected: str
+) -> None:
+    data = columns()
+    change(data)
+    with pytest.raises(Fault) as caught:
+        load_evidence(folder(tmp_path, data))
+    assert caught.value.kind.code == "BAD_EVIDENCE"
+    assert expected in caught.value.line
+
+
+def test_neither_drive_position_nor_velocity(tmp_path: Path) -> None:
+    data = columns()
+    del data["drive_position_m"]
+    with pytest.raises(Fault, match=r"run-01.parquet: drive_velocity_mps: missing"):
+        load_evidence(folder(tmp_path, data, MANIFEST.replace("drive_velocity_mps = 0.0005", "")))
+
+
+def test_a_force_drive_needs_its_force_and_an_answer(tmp_path: Path) -> None:
+    force = "\n".join(line for line in MANIFEST.splitlines() if not line.startswith(("drive_s", "drive_d")))
+    force = force.replace('"spring"', '"force"')
+    data = columns()
+    with pytest.raises(Fault, match="drive_force_N: missing"):
+        load_evidence(folder(tmp_path, {name: data[name] for name in ("t_s", "mass_accel_mps2")}, force))
+    with pytest.raises(Fault, match="must have mass_accel_mps2 or mass_position_m"):
+        load_evidence(folder(tmp_path, {name: data[name] for name in ("t_s", "drive_force_N")}, force))
+
+
+def spike_of_nan(data: Columns) -> None:
+    data["mass_accel_mps2"][[7, 9]] = np.nan, np.inf
+
+
+def repeated_time(data: Columns) -> None:
+    data["t_s"][100] = data["t_s"][99]
+
+
+def dead_sensor(data: Columns) -> None:
+    data["mass_accel_mps2"][:] = 0.0
+
+
+def clipped_force(data: Columns) -> None:
+    np.minimum(data["drive_force_N"], 16.0, out=data["drive_force_N"])
+
+
+def accel_in_other_unit(data: Columns) -> None:
+    data["mass_accel_mps2"] *= 1e6
+
+
+def hole_in_time(data: Columns) -> None:
+    data["t_s"][1000:] += 0.5
+
+
+def wrong_speed(data: Columns) -> None:
+    data["drive_position_m"] *= 1000.0
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "text", "unused", "rows"),
+    [
+        (spike_of_nan, "not-finite", "mass_accel_mps2: 2 samples are no finite number, first row 8", "", 3998),
+        (repeated_time, "time", "t_s: 1 rows are not later than the one before, first row 101", "", 3999),
+        (dead_sensor, "constant", "mass_accel_mps2: is 0 in every row; not used", "mass_accel_mps2", 4000),
+        (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
+        (clipped_force, "clipped", "drive_force_N: ", "", 4000),
+        (hole_in_time, "time-gap", "t_s: 1 gaps in time, first at 0.4995 s: 0.5", "", 4000),
+        (wrong_speed, "units", "moves at 0.5 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
+    ],
+)
+def test_doubts_are_told_and_not_used(
+    tmp_path: Path, change: Callable[[Columns], None], kind: str, text: str, unused: str, rows: int
+) -> None:
+    data = columns()
+    change(data)
+    evidence = load_evidence(folder(tmp_path, data))
+    assert text in kinds(evidence)[kind]
+    (run,) = evidence.runs
+    assert unused not in run.columns
+    assert len(run.t_s) == rows
+    assert (np.diff(run.t_s) > 0).all()
+    assert all(np.isfinite(values).all() and len(values) == rows for values in run.columns.values())
+    assert ("drive_force_N" in run.clipped) == (kind == "clipped")
+
+
+def test_channels_are_mapped_and_scaled(tmp_path: Path) -> None:
+    data = columns()
+    raw = {"time": data["t_s"] * 1e3, "F": data["drive_force_N"] * 10 - 4}
+    channels = '[channels]\nt_s = { column = "time", scale = 1e-3 }\n'
+    channels += 'drive_force_N = { column = "F", scale = 0.1, offset = 0.4 }\n[[run]]'
+    evidence = load_evidence(folder(tmp_path, raw, MANIFEST.replace("[[run]]", channels)))
+    assert evidence.runs[0].t_s == pytest.approx(data["t_s"])
+    assert evidence.runs[0].columns["drive_force_N"] == pytest.approx(data["drive_force_N"])
+    with pytest.raises(Fault, match=r"run-01.parquet: column time: not in the file; known here: drive_force_N"):
+        load_evidence(folder(tmp_path, data, MANIFEST.replace("[[run]]", channels)))
+
+
+def test_every_format_gives_the_same(tmp_path: Path) -> None:
+    data = columns()
+    manifest = MANIFEST
+    for file in ("b.csv", "c.mat", "d.parquet"):
+        manifest += f'[[run]]\nfile = "{file}"\n'
+    folder(tmp_path, data, manifest)
+    pq.write_table(pa.table(data), tmp_path / "d.parquet")
+    pyarrow.csv.write_csv(pa.table(data), tmp_path / "b.csv")
+    scipy.io.savemat(tmp_path / "c.mat", data)
+    evidence = load_evidence(tmp_path)
+    for run in evidence.runs:
+        assert (run.columns["drive_force_N"] == data["drive_force_N"]).all(), run.file
+    assert evidence.chosen_holdout == "d.parquet"
+    assert [run.holdout for run in evidence.runs] == [False, False, False, True]
+    assert "d.parquet" in kinds(evidence)["holdout"]
+
+
+def test_a_run_log_is_a_run(tmp_path: Path) -> None:
+    (tmp_path / "manifest.toml").write_text(MANIFEST.replace("run-01.parquet", "run.mcap"))
+    (tmp_path / "run.mcap").write_bytes(short_log())
+    (run,) = load_evidence(tmp_path).runs
+    assert len(run.t_s) == 8000
+    assert np.diff(run.t_s) == pytest.approx(5e-5)
+    assert {"drive_force_N", "base_accel_mps2", "vibration_frequency_Hz"} <= run.columns.keys()
+
+
+def test_the_command_in_force_is_the_one_that_the_rig_had(tmp_path: Path) -> None:
+    def change(tables: dict[str, Any]) -> None:
+        tables["command"]["amplitude_m"] = 1e-9 * (tables["command"]["block"] + 1)
+
+    doctored(tmp_path, change, "run.mcap")
+    (tmp_path / "manifest.toml").write_text(MANIFEST.replace("run-01.parquet", "run.mcap"))
+    amplitude_m = load_evidence(tmp_path).runs[0].columns["vibration_amplitude_m"].reshape(400, 20)
+    # in lockstep block n moves under the command that answers block n - 1
+    assert amplitude_m[:, 0] == pytest.approx(1e-9 * np.arange(400))
+
+
+@pytest.mark.parametrize("name", ["run-01.parquet", "run.csv", "run.mat", "run.mcap"])
+def test_a_file_that_is_not_what_its_name_says(tmp_path: Path, name: str) -> None:
+    (tmp_path / "manifest.toml").write_text(MANIFEST.replace("run-01.parquet", name))
+    (tmp_path / name).write_bytes(b"\x00\x01nothing of the kind\xff" * 20)
+    with pytest.raises(Fault) as caught:
+        load_evidence(tmp_path)
+    assert caught.value.kind.code == "BAD_EVIDENCE"
+    assert name in caught.value.line
+
+
+def test_no_folder_and_no_manifest(tmp_path: Path) -> None:
+    with pytest.raises(Fault, match="no such folder"):
+        load_evidence(tmp_path / "absent")
+    with pytest.raises(Fault, match=r"manifest.toml: no such file"):
+        load_evidence(tmp_path)

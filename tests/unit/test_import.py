@@ -1,0 +1,211 @@
+"""Import: every format gives the same evidence, and bad input leaves nothing behind."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+from nptdms import ChannelObject, TdmsWriter
+from typer.testing import CliRunner
+
+from bridge.export import export
+from bridge.faults import Fault
+from bridge.logfile import read_run
+from cockpit.log_commands import log_app
+from diagnosis.evidence import load_evidence
+from diagnosis.importing import import_file
+from diagnosis.logcheck import check_log
+from tests.logs import short_log
+
+MAP = """
+[channels]
+t_s = { column = "time", scale = 1e-3 }
+drive_force_N = { column = "F", scale = 0.5, offset = 1.0 }
+mass_accel_mps2 = { column = "acc", scale = 9.80665 }
+[rig]
+drive = "spring"
+mass_kg = 1.5
+drive_stiffness_N_per_m = 11700.0
+coulomb_force_N = 14.49
+static_force_N = 17.38
+stribeck_velocity_mps = 0.0005
+[rig.tolerance]
+mass_kg = 0.005
+[run]
+drive_velocity_mps = 0.0005
+"""
+ROWS = 4010
+
+
+def raw() -> dict[str, Any]:
+    random = np.random.default_rng(3)
+    time_ms = np.arange(ROWS) * 0.5
+    force = 28 + 4 * np.sin(time_ms * 9e-3) + random.normal(0, 0.02, ROWS)
+    return {"time": time_ms, "F": force, "acc": random.normal(0, 0.1, ROWS), "note": np.zeros(ROWS)}
+
+
+def write_raw(path: Path, data: dict[str, Any]) -> None:
+    if path.suffix == ".csv":
+        pyarrow.csv.write_csv(pa.table(data), path)
+    elif path.suffix == ".parquet":
+        pq.write_table(pa.table(data), path)
+    elif path.suffix == ".mat":
+        scipy.io.savemat(path, data | {"gain": 35.15})
+    else:
+        with TdmsWriter(path) as writer:
+            writer.write_segment(
+                [ChannelObject("DAQ", name, values, {"wf_increment": 0.0005}) for name, values in data.items()]
+            )
+
+
+def setup(at: Path, suffix: str, text: str = MAP) -> tuple[Path, Path]:
+    source, channel_map = at / f"measured{suffix}", at / "map.toml"
+    write_raw(source, raw())
+    channel_map.write_text(text)
+    return source, channel_map
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mat", ".tdms"])
+def test_a_file_becomes_evidence(tmp_path: Path, suffix: str) -> None:
+    source, channel_map = setup(tmp_path, suffix)
+    done = import_file(source, channel_map, tmp_path / "evidence")
+    evidence = load_evidence(tmp_path / "evidence")
+    (run,) = evidence.runs
+    data = raw()
+    assert done.rows == ROWS
+    assert run.t_s == pytest.approx(data["time"] * 1e-3)
+    assert run.columns["drive_force_N"] == pytest.approx(0.5 * data["F"] + 1.0)
+    assert run.columns["mass_accel_mps2"] == pytest.approx(9.80665 * data["acc"])
+    assert run.drive_velocity_mps == 0.0005
+    assert evidence.rig.tolerance == {"mass_kg": 0.005}
+    # presliding of 0.22 um, critically damped: what the paper's own pair has, 77.5 N/um and 2.15e4 N s/m
+    assert evidence.rig.contact_stiffness_N_per_m == pytest.approx(17.38 / 0.22e-6)
+    assert evidence.rig.contact_damping_Ns_per_m == pytest.approx(2.15e4, rel=0.02)
+    assumed = [finding.where for finding in done.findings if finding.kind == "assumed"]
+    assert "manifest.toml: rig.contact_stiffness_N_per_m" in assumed
+    assert "# assumed, not measured" in (tmp_path / "evidence" / "manifest.toml").read_text()
+
+
+def test_a_second_run_is_added_to_its_rig_only(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    out = tmp_path / "evidence"
+    import_file(source, channel_map, out)
+    with pytest.raises(Fault, match="is already a run of this folder"):
+        import_file(source, channel_map, out)
+    second = source.rename(tmp_path / "second.csv")
+    channel_map.write_text(MAP + "holdout = true\n")
+    import_file(second, channel_map, out)
+    assert [(run.file, run.holdout) for run in load_evidence(out).runs] == [
+        ("measured.parquet", False),
+        ("second.parquet", True),
+    ]
+    before = (out / "manifest.toml").read_text()
+    channel_map.write_text(MAP.replace("mass_kg = 1.5", "mass_kg = 1.6"))
+    with pytest.raises(Fault, match="describes another rig"):
+        import_file(second.rename(tmp_path / "third.csv"), channel_map, out)
+    assert (out / "manifest.toml").read_text() == before
+    assert sorted(path.name for path in out.iterdir()) == ["manifest.toml", "measured.parquet", "second.parquet"]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".tdms"])
+def test_a_file_becomes_a_log(tmp_path: Path, suffix: str) -> None:
+    source, channel_map = setup(tmp_path, suffix)
+    done = import_file(source, channel_map, tmp_path / "made.mcap")
+    run = read_run(tmp_path / "made.mcap")
+    assert len(run.sensors) == 200
+    assert done.rows == 4000
+    assert run.sensors["t_ns"][0] == 10_000_000
+    assert run.sensors["drive_force_N"].ravel() == pytest.approx(0.5 * raw()["F"][:4000] + 1.0, rel=1e-6)
+    assert (run.sensors["mass_position_m"] == 0).all()
+    assert json.loads(run.headers["import"]["missing"]) == ["base_accel_mps2", "mass_position_m", "drive_position_m"]
+    # channels that were never there are not reported as dead
+    assert check_log(tmp_path / "made.mcap").findings == []
+
+
+def test_a_log_of_uneven_time_is_interpolated_and_says_so(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    data = raw()
+    data["time"] += np.random.default_rng(1).uniform(-0.1, 0.1, ROWS)
+    write_raw(source, data)
+    done = import_file(source, channel_map, tmp_path / "made.mcap")
+    assert "uneven" in {finding.kind: finding.text for finding in done.findings}["time"]
+
+
+def test_time_from_the_rate(tmp_path: Path) -> None:
+    text = MAP.replace('t_s = { column = "time", scale = 1e-3 }\n', "")
+    source, channel_map = setup(tmp_path, ".csv", text + "[source]\nsample_rate_Hz = 2000.0\n")
+    import_file(source, channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].t_s == pytest.approx(raw()["time"] * 1e-3)
+    source, channel_map = setup(tmp_path, ".tdms", text)  # says its rate itself
+    import_file(source, channel_map, tmp_path / "other")
+    assert load_evidence(tmp_path / "other").runs[0].t_s == pytest.approx(raw()["time"] * 1e-3)
+
+
+def test_a_csv_file_of_another_country(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv", MAP + '[source]\ndelimiter = ";"\ndecimal = ","\nskip_rows = 2\n')
+    data = raw()
+    lines = [";".join(f"{data[name][row]:.9g}".replace(".", ",") for name in data) for row in range(ROWS)]
+    source.write_text("DAQ 7\n12.05.2024\n" + ";".join(data) + "\n" + "\n".join(lines) + "\n")
+    import_file(source, channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].columns["drive_force_N"] == pytest.approx(0.5 * data["F"] + 1)
+
+
+def test_what_was_exported_can_be_imported(tmp_path: Path) -> None:
+    log, channel_map = tmp_path / "run.mcap", tmp_path / "map.toml"
+    log.write_bytes(short_log())
+    export(log, tmp_path / "run.mat", ["sensors", "trace"])
+    channel_map.write_text(
+        '[channels]\nt_s = { column = "sensors.t_s" }\ndrive_force_N = { column = "sensors.drive_force_N" }\n'
+    )
+    import_file(tmp_path / "run.mat", channel_map, tmp_path / "again.mcap")
+    assert (read_run(tmp_path / "again.mcap").sensors["drive_force_N"] == read_run(log).sensors["drive_force_N"]).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('"F"', '"Force"', "measured.csv: column Force: not in the file; known here: F, acc, note, time"),
+        ("drive_force_N =", "force =", "map.toml: channels.force: unknown key; known here: t_s,"),
+        ("offset = 1.0", "offset = true", "map.toml: channels.drive_force_N.offset = True"),
+        ("scale = 0.5", "scale = 0.0", "map.toml: channels.drive_force_N: scale = 0: must not be 0"),
+        ("mass_kg = 1.5", "", "map.toml: rig: mass_kg: missing"),
+        ("[rig]", "[source]\nsample_rate_Hz = 2000.0\n[rig]", "source.sample_rate_Hz: there is a channel t_s too"),
+        ('"time", scale = 1e-3', '"acc"', "measured.parquet: t_s: "),
+        ("scale = 0.5", "scale = 0.5e6", "drive_force_N"),
+    ],
+)
+def test_a_bad_map_is_one_clear_line_and_leaves_nothing(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    source, channel_map = setup(tmp_path, ".csv", MAP.replace(old, new))
+    if "0.5e6" in new:
+        channel_map.write_text(channel_map.read_text().replace("mass_accel_mps2 =", "base_accel_mps2 ="))
+    with pytest.raises(Fault) as caught:
+        import_file(source, channel_map, tmp_path / "evidence")
+    assert expected in caught.value.line
+    assert caught.value.kind.exit_status == 2
+    assert not (tmp_path / "evidence").exists()
+
+
+def test_a_log_needs_a_clock_that_goes_forward(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    data = raw()
+    data["time"][123] = 0.0
+    write_raw(source, data)
+    with pytest.raises(Fault, match=r"measured\.csv: t_s: row 124"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
+    assert not list(tmp_path.glob("made*"))
+
+
+def test_the_command(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".mat")
+    arguments = ["import", str(source), "--map", str(channel_map), "--out", str(tmp_path / "evidence"), "--json"]
+    result = CliRunner().invoke(log_app, arguments)
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["file"] == "measured.parquet"
+    result = CliRunner().invoke(log_app, arguments)
+    assert result.exit_code == 2
+    assert json.loads(result.stdout)["fault"] == "BAD_EVIDENCE"
