@@ -1,7 +1,7 @@
 """What crosses a process border, and the only input and output of the project.
 
-Messages (`stickslip.proto`, `messages`), the table of topics (`topics`), the Zenoh link (`zenoh_link`), the run log
-(`runlog` writes, `logfile` reads, `recorder` is the process), real-time scheduling (`realtime`), strict configuration
-(`config`), faults with their codes (`faults`) and the kernel compiler (`kernel`). `PROTOCOL.md` describes the wire well
-enough to write a client from that page alone.
+on the wire   stickslip.proto, messages, topics, zenoh_link; PROTOCOL.md describes it for other languages
+in the log    mcap_chunks and runlog write, recorder is the process, log_reader and logfile read, whole or cut
+as tables     export, table_writers, matfile write; tables reads CSV, Parquet, MATLAB and TDMS; units names units
+for everyone  config (strict TOML), faults (codes and help), kernel (compiled code), realtime (scheduling)
 """

@@ -11,6 +11,7 @@ from google.protobuf.message import DecodeError, Message
 
 from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
+from bridge.kernel import kernel
 from bridge.log_reader import (
     CHANNEL,
     END,
@@ -88,16 +89,30 @@ def parsed(message: type[M], payload: bytes, topic: str) -> M:
     return result
 
 
+@kernel
+def _gather(data: Bytes, starts: npt.NDArray[np.int64], template: Bytes, fixed: Bytes, out: Bytes) -> bool:
+    """Copy messages of the template's length into `out`; False when one does not have the template's tags."""
+    size = template.shape[0]
+    for row in range(starts.shape[0]):
+        start, to = starts[row], row * size
+        for i in range(size):
+            value = data[start + i]
+            if fixed[i] != 0 and value != template[i]:
+                return False
+            out[to + i] = value
+    return True
+
+
 def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> bytes:
     """The payloads of one topic, one behind the other, each with every field written and in order."""
     if (rows[:, END] - rows[:, START] == layout.size).all():
-        matrix = data[rows[:, START, None] + np.arange(layout.size)]
         template = np.frombuffer(layout.blank().tobytes(), np.uint8)
-        fixed = np.ones(layout.size, np.bool_)
+        fixed = np.ones(layout.size, np.uint8)
         for field in (layout.dtype.fields or {}).values():
-            fixed[field[1] : field[1] + field[0].itemsize] = False
-        if (matrix[:, fixed] == template[fixed]).all():
-            return matrix.tobytes()
+            fixed[field[1] : field[1] + field[0].itemsize] = 0
+        out = np.empty(len(rows) * layout.size, np.uint8)
+        if _gather(data, np.ascontiguousarray(rows[:, START]), template, fixed, out):
+            return out.tobytes()
     return b"".join(layout.canonical(data[row[START] : row[END]].tobytes(), topic) for row in rows)
 
 

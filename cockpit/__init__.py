@@ -1,5 +1,10 @@
-"""What a person touches: the `stickslip` command, runs of several processes, verdicts, plots and pages.
+"""What a person touches: the `stickslip` command. The only package that knows both the controller and the plant.
 
-`cli` the command, `scenario` what a run is made of, `orchestra` the processes of a run, `onboard` a run in one process,
-`verdict` what came of it. The only package that knows both the controller and the plant.
+cli, log_commands                the commands
+scenario, running, verdict       what a run is made of, one run, what came of it
+orchestra, processes, live       a run of several processes, how each behaves, its progress line
+onboard                          a run in one process
+replaying, to_bus                a log replayed, a log back on the bus
+run_plot, stability_map          pictures
+reproduce, reproduce_*           the paper redone
 """

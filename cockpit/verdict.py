@@ -11,6 +11,7 @@ from diagnosis.cycles import Cycles, find_cycles
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
 _ALARM_RATIO = 1.05
+_RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
 
 
 class Phase(NamedTuple):
@@ -84,9 +85,7 @@ def judge_run(run: RunData) -> Verdict:
     cycles = find_cycles(sample_s, force_N.ravel()) if blocks else None
     mean_N = force_N.mean(axis=1) if blocks else force_N
     trace = run.trace
-    excited = (trace["mode"] == wire.EXCITE) & (
-        trace["t_ns"] * 1e-9 > in_charge_s + (0.5 if enabled_from_s == 0 else 0.0)
-    )
+    excited = _vibrating(trace, block_s) & (trace["t_ns"] * 1e-9 > in_charge_s)
     ratio = trace["vibration_velocity_mps"][excited] / np.maximum(trace["drive_velocity_mps"][excited], 1e-9)
     faults = [
         f"{event.code}: {event.text}" for event in run.events if event.code in {"GAP", "DROPPED", "PLANT_LOST", "STALE"}
@@ -105,6 +104,14 @@ def judge_run(run: RunData) -> Verdict:
         latency=_latency(run),
         faults=faults,
     )
+
+
+def _vibrating(trace: Any, block_s: float) -> Any:
+    """Rows in EXCITE, but for the ramp at its start, when v_a is on its way up."""
+    excited = trace["mode"] == wire.EXCITE
+    starts = np.where(excited & ~np.concatenate([[False], excited[:-1]]), np.arange(len(excited)), 0)
+    since = np.arange(len(excited)) - np.maximum.accumulate(starts)
+    return excited & (since * block_s > _RAMP_S)
 
 
 def _lost(run: RunData) -> int:

@@ -52,7 +52,7 @@ def step(
         if gap_blocks > 0:  # the rings hold blocks one period apart: a slope across a gap would be wrong
             s.force_count = 0
             s.position_count = 0
-        measure(p, s, block.base_accel_mps2, scratch)
+        measure(p, s, block.base_accel_mps2)
         drive_velocity(p, s, position_m)
         contact(p, s, force_N, burst(p, s, block.mass_accel_mps2, scratch))
         decide(p, s, t_ns, force_N)

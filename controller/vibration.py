@@ -8,39 +8,48 @@ TWO_PI = 2.0 * math.pi
 
 
 @kernel
-def _line(samples: Record, residual: Record, step_rad: float, start_rad: float) -> tuple[float, float]:
-    """Fit a cos + b sin at one frequency to `samples` by least squares; `residual` gets the rest.
+def _fit(samples: Record, step_rad: float, start_rad: float) -> tuple[float, float]:
+    """Fit a cos + b sin at one frequency to `samples` by least squares.
 
-    Exact for a pure sine however many periods a block holds, where a plain correlation leaks.
+    Exact for a pure sine however many periods a block holds, where a plain correlation leaks. The angle is turned from
+    sample to sample: two sines a block instead of forty, which is what a replay's speed hangs on.
     """
+    c, sn = math.cos(start_rad), math.sin(start_rad)
+    turn_c, turn_sn = math.cos(step_rad), math.sin(step_rad)
     cos_cos, cos_sin, sin_sin, with_cos, with_sin = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(samples.shape[0]):
-        angle = start_rad + step_rad * i
-        c, sn = math.cos(angle), math.sin(angle)
         value = float(samples[i])
         cos_cos += c * c
         cos_sin += c * sn
         sin_sin += sn * sn
         with_cos += value * c
         with_sin += value * sn
+        c, sn = c * turn_c - sn * turn_sn, sn * turn_c + c * turn_sn
     determinant = cos_cos * sin_sin - cos_sin * cos_sin
     if determinant < 1e-9:
-        a, b = 0.0, 0.0
-    else:
-        a = (with_cos * sin_sin - with_sin * cos_sin) / determinant
-        b = (with_sin * cos_cos - with_cos * cos_sin) / determinant
-    for i in range(samples.shape[0]):
-        angle = start_rad + step_rad * i
-        residual[i] = float(samples[i]) - a * math.cos(angle) - b * math.sin(angle)
+        return 0.0, 0.0
+    a = (with_cos * sin_sin - with_sin * cos_sin) / determinant
+    b = (with_sin * cos_cos - with_cos * cos_sin) / determinant
     return a, b
 
 
 @kernel
-def measure(p: Record, s: Record, base_accel_mps2: Record, scratch: Record) -> None:
+def _remove_line(samples: Record, step_rad: float) -> None:
+    """Take the best fitting line at one frequency out of `samples`, in place."""
+    a, b = _fit(samples, step_rad, 0.0)
+    c, sn = 1.0, 0.0
+    turn_c, turn_sn = math.cos(step_rad), math.sin(step_rad)
+    for i in range(samples.shape[0]):
+        samples[i] -= a * c + b * sn
+        c, sn = c * turn_c - sn * turn_sn, sn * turn_c + c * turn_sn
+
+
+@kernel
+def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
     """Demodulate the base accelerometer at the commanded frequency into v_a = a / (2 pi f).
 
     Args:
-        base_accel_mps2: [samples]; scratch: [samples], overwritten.
+        base_accel_mps2: [samples].
 
     """
     frequency_Hz = s.allowed_Hz
@@ -48,7 +57,7 @@ def measure(p: Record, s: Record, base_accel_mps2: Record, scratch: Record) -> N
         s.vibration_velocity_mps = 0.0
         return
     step_rad = TWO_PI * frequency_Hz * p.sample_s
-    a, b = _line(base_accel_mps2, scratch, step_rad, s.phase_rad)
+    a, b = _fit(base_accel_mps2, step_rad, s.phase_rad)
     s.phase_rad = (s.phase_rad + step_rad * p.samples_per_block) % TWO_PI
     if s.demodulated_Hz != frequency_Hz:
         s.demodulated_Hz = frequency_Hz
@@ -67,8 +76,8 @@ def burst(p: Record, s: Record, mass_accel_mps2: Record, scratch: Record) -> flo
         scratch[i] = float(mass_accel_mps2[i])
     if s.allowed_m > 0.0:
         step_rad = TWO_PI * s.allowed_Hz * p.sample_s
-        _line(scratch, scratch, step_rad, 0.0)
-        _line(scratch, scratch, 2.0 * step_rad, 0.0)
+        _remove_line(scratch, step_rad)
+        _remove_line(scratch, 2.0 * step_rad)
     total = 0.0
     for i in range(scratch.shape[0]):
         total += scratch[i] * scratch[i]

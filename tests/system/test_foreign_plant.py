@@ -23,8 +23,6 @@ FOREIGN_PLANT = ROOT / "tests" / "system" / "foreign_plant.py"
 BLOCKS = 7000
 # the rig slips every 0.3 s, at 2.78 s for the eighth time: now it sticks, and is far from its next slip
 ENABLED_FROM_S = 2.85
-    2.85  # the rig slips every 0.3 s, at 2.78 for the eighth time: it sticks, and is far from the next slip
-)
 
 Start = Callable[..., subprocess.Popen[str]]
 

@@ -21,10 +21,9 @@ def _measured(frequency_Hz: float, velocity_mps: float, offset: float, blocks: i
     t_s = np.arange(blocks * 20) / 20000.0
     rolled_off = 1 / math.sqrt(1 + (frequency_Hz / 10000.0) ** 2)
     accel = (velocity_mps * omega * rolled_off * np.cos(omega * t_s + offset)).astype(np.float32)
-    scratch = np.empty(20)
     for block in range(blocks):
         samples = accel[20 * block : 20 * block + 20]
-        measure(p, s, samples, scratch)
+        measure(p, s, samples)
     return p, s, samples
 
 

@@ -1,0 +1,36 @@
+"""How fast a log is replayed, reading included."""
+
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+
+from bridge.logfile import read_run
+from cockpit.onboard import run_onboard
+from cockpit.replaying import changes_of
+from cockpit.scenario import load_scenario
+from controller.replay import replay
+
+SECONDS = 60.0
+REPETITIONS = 5
+
+
+def bench() -> bool:
+    """Print the figure; whether the bar is kept."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.mcap"
+        run_onboard(load_scenario("paper-c45-c45", [f"duration_s={SECONDS}"]), path, {})
+        reading_s: list[float] = []
+        total_s: list[float] = []
+        for _ in range(REPETITIONS + 1):  # the first one loads the kernels
+            started_s = time.perf_counter()
+            run = read_run(path)
+            reading_s.append(time.perf_counter() - started_s)
+            result = replay(run, changes_of(run, []))
+            total_s.append(time.perf_counter() - started_s)
+        speed = SECONDS / median(total_s[1:])
+        kept = result.identical and speed >= 200.0
+        print(f"\nreplay of a {SECONDS:g} s log, median of {REPETITIONS}: {speed:.0f} times real time (bar 200)")
+        share = 100 * median(reading_s[1:]) / median(total_s[1:])
+        print(f"  of which reading {share:.0f} %; identical: {result.identical}; {'PASS' if kept else 'FAIL'}")
+        return kept

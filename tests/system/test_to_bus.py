@@ -1,0 +1,49 @@
+"""A log played back on the bus can be held and goes on without a loss."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from bridge import stickslip_pb2 as wire
+from bridge.topics import PLANT_EVENT, SENSORS
+from bridge.zenoh_link import Bus, BusConfig, Inbox
+from tests.golden.bless import FOLDER
+from tests.system.ports import free_endpoint
+
+
+def test_pause_and_go_on() -> None:
+    log: Path = FOLDER / "from-the-start.mcap"
+    endpoint = free_endpoint()
+    player = subprocess.Popen(
+        [sys.executable, "-m", "cockpit", "replay", str(log), "--to-bus", "--speed", "0.5", "--endpoint", endpoint]
+    )
+    try:
+        with Bus(BusConfig(endpoint=endpoint), "viewer", lockstep=False) as bus:
+            inbox = Inbox(10_000)
+            bus.listen(SENSORS, inbox.push)
+            bus.listen(PLANT_EVENT, inbox.push)
+            received = [inbox.get(30.0)]
+            assert received[0] is not None
+            player.send_signal(signal.SIGUSR1)
+            time.sleep(0.3)
+            while inbox.get_nowait() is not None:
+                pass
+            assert inbox.get(0.5) is None  # held
+            player.send_signal(signal.SIGUSR1)
+            numbers: list[int] = []
+            while True:
+                message = inbox.get(10.0)
+                assert message is not None
+                if message.topic is PLANT_EVENT:
+                    if wire.Event.FromString(message.payload).code == "END":
+                        break
+                else:
+                    numbers.append(wire.SensorBlock.FromString(message.payload).sequence)
+        assert numbers == list(range(numbers[0], 1500))
+        assert player.wait(10) == 0
+    finally:
+        if player.poll() is None:
+            player.kill()
+            player.wait()
