@@ -3,11 +3,10 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from google.protobuf.message import DecodeError, Message
 
 from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
@@ -23,7 +22,7 @@ from bridge.log_reader import (
     MessageRows,
 )
 from bridge.mcap_chunks import ChunkWriter
-from bridge.messages import APPLIED, COMMAND, STATE, TRACE, Layout, Records, file_descriptor_set, sensor_block
+from bridge.messages import APPLIED, COMMAND, STATE, TRACE, Layout, Records, file_descriptor_set, parsed, sensor_block
 from bridge.runlog import LIBRARY
 from bridge.topics import BY_NAME
 
@@ -33,7 +32,6 @@ STREAMING = ("sensors", "applied", "command", "trace", "state")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE}
 _DEFAULT_SAMPLES = 20
 _UINT64 = 2**64 - 1
-M = TypeVar("M", bound=Message)
 
 
 class Piece(NamedTuple):
@@ -76,17 +74,6 @@ def iter_tables(path: Path) -> Iterator[tuple[str, Records]]:
 def _samples(payload: bytes) -> int:
     """How many samples a channel the sensor blocks of a log have, as its first one says."""
     return len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES
-
-
-def parsed(message: type[M], payload: bytes, topic: str) -> M:
-    """A message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
-    result = message()
-    try:
-        result.ParseFromString(payload)
-    except DecodeError:
-        line = f"{topic}: {len(payload)} bytes are no {message.DESCRIPTOR.name}; see bridge/PROTOCOL.md for its fields"
-        raise Fault("BAD_MESSAGE", line) from None
-    return result
 
 
 @kernel

@@ -5,7 +5,7 @@ over those places: filling in the record is the encoding, and a topic of a log i
 leaves zeros out or changes the order are first brought into this form by the protobuf library.
 """
 
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ SCHEMA_VERSION = 1
 NO_BLOCK = 2**64 - 1
 
 Records = npt.NDArray[Any]
+M = TypeVar("M", bound=Message)
 
 _SCALARS = {
     FieldDescriptor.TYPE_DOUBLE: ("<f8", 1),
@@ -132,13 +133,23 @@ def sensor_block(samples: int) -> Layout:
     return _sensor_layouts[samples]
 
 
+def parsed(message: type[M], payload: bytes, topic: str) -> M:
+    """A message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
+    result = message()
+    try:
+        result.ParseFromString(payload)
+    except DecodeError:
+        line = f"{topic}: {len(payload)} bytes are no {message.DESCRIPTOR.name}; see bridge/PROTOCOL.md for its fields"
+        raise Fault("BAD_MESSAGE", line) from None
+    return result
+
+
 def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]:
     """Sequence and t_ns of any message that has them, at no more than a look where the bytes are canonical."""
     if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:
         return int.from_bytes(payload[1:9], "little"), int.from_bytes(payload[10:18], "little", signed=True)
-    parsed: Any = message()
-    parsed.ParseFromString(payload)
-    return parsed.sequence, parsed.t_ns
+    whole: Any = parsed(message, payload, message.DESCRIPTOR.name)
+    return whole.sequence, whole.t_ns
 
 
 def file_descriptor_set() -> bytes:

@@ -7,6 +7,7 @@ from pathlib import Path
 from bridge import realtime
 from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
+from bridge.messages import parsed
 from bridge.runlog import RunLog
 from bridge.topics import TOPICS
 from bridge.zenoh_link import Bus, BusConfig, Inbox
@@ -45,7 +46,7 @@ def run(
         log.add_metadata("run", about)
         for role in sorted(headers):
             log.add_header(headers[role])
-        realtime.claim(None, realtime.RECORDER_PRIORITY)
+        realtime.claim(1 if lockstep else None, realtime.RECORDER_PRIORITY)
         bus.announce()
         lost_plant = _record(log, bus, inbox, stop)
         if inbox.dropped:
@@ -66,11 +67,16 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
         if received is not None:
             heard_s = time.monotonic()
             started = True
-            log.write(received.topic, received.payload)
-            if received.topic.name.startswith("event/"):
-                event = wire.Event.FromString(received.payload)
-                if event.code == "END":
-                    ended.add(event.source)
+            try:
+                log.write(received.topic, received.payload)
+                if received.topic.name.startswith("event/"):
+                    event = parsed(wire.Event, received.payload, received.topic.name)
+                    if event.code == "END":
+                        ended.add(event.source)
+            except Fault as fault:
+                if fault.kind.code != "BAD_MESSAGE":
+                    raise
+                log.add_event("BAD_MESSAGE", fault.line)  # one client's rubbish must not end the record of the others
             continue
         log.flush_when_due()
         quiet_s = time.monotonic() - heard_s

@@ -19,6 +19,7 @@ from pydantic import Field
 from bridge import stickslip_pb2 as wire
 from bridge.config import Strict
 from bridge.faults import Fault
+from bridge.messages import parsed
 from bridge.topics import Topic
 
 
@@ -187,7 +188,7 @@ class Bus:
         while missing and time.monotonic() < until_s and not stop.is_set():
             for reply in self._session.get(self._key("header/*"), timeout=0.5):
                 if reply.ok is not None:
-                    header = wire.Header.FromString(reply.ok.payload.to_bytes())
+                    header = parsed(wire.Header, reply.ok.payload.to_bytes(), "header")
                     found[header.role] = header
                     missing.discard(header.role)
             if missing:

@@ -127,6 +127,10 @@ def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> in
     run = read_run(path)
     changes = changes_of(run, settings)
     plant = run.configuration("plant")
+    missing = [key for key in ("rig", "seed", "duration_s") if key not in plant]
+    if missing:
+        line = f"{path}: its plant says nothing of {', '.join(missing)}: only the log of our own plant can be simulated again"
+        raise Fault("BAD_LOG", line)
     table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": plant["duration_s"]}
     table["controller"] = changes[0].config.model_dump(mode="json")
     scenario = validate(Scenario, table, path.name)

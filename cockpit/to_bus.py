@@ -62,7 +62,8 @@ def publish_log(
         pause.clear() if pause.is_set() else pause.set()
 
     signal.signal(signal.SIGUSR1, toggle)
-    with Bus(bus_config, "plant", lockstep=False) as bus, _keys(toggle, stop):
+    # as in lockstep nothing is dropped: a record can wait, a rig cannot
+    with Bus(bus_config, "plant", lockstep=True) as bus, _keys(toggle, stop):
         for role in ("plant", "controller") if everything else ("plant",):
             if role in run.headers:
                 bus.serve_header(_header(run, role))

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from bridge import stickslip_pb2 as wire
 from bridge.export import CHANNELS
 from bridge.faults import Fault
-from bridge.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces, parsed
-from bridge.messages import SCHEMA_VERSION
+from bridge.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
+from bridge.messages import SCHEMA_VERSION, parsed
 from bridge.topics import BY_NAME
 from diagnosis.findings import Finding
 from diagnosis.signal_checks import Signal, SignalLook

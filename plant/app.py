@@ -18,6 +18,7 @@ PEER_TIMEOUT_S = 30.0  # a first start compiles the controller's kernels
 _ANSWER_TIMEOUT_S = 5.0
 _GOODBYE_S = 3.0
 _ROUND_TRIPS_KEPT = 1024
+_LATE_NS = 1_000_000
 
 
 def run(
@@ -100,18 +101,19 @@ class _Process:
             tick += 1
             commands: list[bytes] = []
             round_trip_ns = 0
+            late_commands = 0
             while self._commands:
                 received = self._commands.popleft()
                 commands.append(received.payload)
-                if len(received.payload) == COMMAND_LAYOUT.size:
-                    answered = int(COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0].block)
-                    if node.block - answered <= _ROUND_TRIPS_KEPT:
-                        round_trip_ns = received.arrival_ns - sent_ns[answered % _ROUND_TRIPS_KEPT]
+                answered = int(COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0].block)
+                if 0 < node.block - answered <= _ROUND_TRIPS_KEPT:
+                    round_trip_ns = received.arrival_ns - sent_ns[answered % _ROUND_TRIPS_KEPT]
+                    late_commands += round_trip_ns > _LATE_NS
             if stop.is_set():
                 node.let_go()
                 commands = []
                 fading += 1
-            sensors, applied = node.advance(commands, round_trip_ns, late_ns)
+            sensors, applied = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
             self._send_sensors(sensors.payload)
             self._send_applied(applied.payload)

@@ -41,11 +41,13 @@ class PlantNode:
     def warm_up(self) -> None:
         """Compile or load the kernel on copies, so that the first block is not late."""
         step(
-            self._params, self._state.copy(), 0.0, self._command, 0, np.zeros_like(self._noise[0]), 0, 0,
+            self._params, self._state.copy(), 0.0, self._command, 0, np.zeros_like(self._noise[0]), 0, 0, 0,
             self._analogue, self.truth, sensor_block(self._noise.shape[2]).blank(), APPLIED_LAYOUT.blank(),
         )  # fmt: skip
 
-    def advance(self, commands: list[bytes], round_trip_ns: int = 0, late_ns: int = 0) -> tuple[Outgoing, Outgoing]:
+    def advance(
+        self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
+    ) -> tuple[Outgoing, Outgoing]:
         """One block of the rig under the newest of `commands`: the sensor block, then what was applied.
 
         Raises Fault BAD_MESSAGE when the command cannot be read.
@@ -59,7 +61,7 @@ class PlantNode:
             self._velocity_mps = drive_velocity_mps(self._config, blocks * self._config.solver.block_s)
         step(
             self._params, self._state, self._velocity_mps[at], self._command, len(commands), self._noise[at],
-            round_trip_ns, late_ns, self._analogue, self.truth, self._sensors, self._applied,
+            commands_late, round_trip_ns, late_ns, self._analogue, self.truth, self._sensors, self._applied,
         )  # fmt: skip
         self.block += 1
         return Outgoing(SENSORS, self._sensors.tobytes()), Outgoing(APPLIED, self._applied.tobytes())

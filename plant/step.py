@@ -19,6 +19,7 @@ def step(
     command: npt.NDArray[Any],
     commands: int,
     noise: npt.NDArray[Any],
+    commands_late: int,
     round_trip_ns: int,
     late_ns: int,
     analogue: npt.NDArray[Any],
@@ -33,7 +34,7 @@ def step(
         drive_velocity_mps: held over the block.
         command: the newest command; not looked at when `commands`, how many came since the last block, is 0.
         noise: standard normal numbers, [5, samples].
-        round_trip_ns, late_ns: noted in `applied`.
+        commands_late, round_trip_ns, late_ns: noted in `applied`.
         analogue, truth: filled, as `plant.core.advance` says.
         sensors, applied: one message record each.
 
@@ -66,4 +67,5 @@ def step(
     a.fallback = 0 if usable else 1
     a.round_trip_ns = round_trip_ns
     a.late_ns = late_ns
+    a.commands_late = commands_late
     s.block += 1

@@ -9,6 +9,8 @@ import numpy as np
 
 from bridge import stickslip_pb2 as wire
 from bridge.logfile import read_run
+from bridge.topics import OPERATOR, STATE
+from bridge.zenoh_link import Bus, BusConfig
 from tests.system.ports import free_endpoint
 
 COMMAND = [sys.executable, "-m", "cockpit"]
@@ -56,3 +58,29 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
     assert data.trace["vibration_velocity_mps"][stopped][300:].max() < 1e-5
     assert data.trace["mode"][-1] != wire.STOPPED
     assert [event.code for event in data.events if event.source == "controller"].count("OPERATOR") == 2
+
+
+def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
+    log, endpoint = tmp_path / "run.mcap", free_endpoint()
+    run = subprocess.Popen(
+        [*COMMAND, "run", "--set", "duration_s=5.0", "--endpoint", endpoint, "--log", str(log)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        until_s = time.monotonic() + 60
+        while (not log.exists() or log.stat().st_size < 300_000) and time.monotonic() < until_s:
+            time.sleep(0.05)
+        with Bus(BusConfig(endpoint=endpoint), "stranger", lockstep=False) as bus:
+            for topic, payload in ((OPERATOR, b"\x08\x07"), (OPERATOR, b"\xff\xff"), (STATE, b"\xff\xff\xff")):
+                bus.publisher(topic)(payload)
+            time.sleep(0.5)
+        run.communicate(timeout=60)
+    finally:
+        if run.poll() is None:
+            run.kill()
+            run.communicate()
+    data = read_run(log)
+    assert len(data.trace) == 5000
+    texts = [f"{event.code} {event.text}" for event in data.events]
+    assert sum(text.startswith("OPERATOR ignored") for text in texts) == 2
+    assert sum(text.startswith("BAD_MESSAGE") for text in texts) == 1
