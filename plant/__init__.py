@@ -11,7 +11,8 @@ Symbols that appear here and nowhere else, as in the paper (A. Leus et al., long
     k_d  drive stiffness [N/m]              phi  phase of the vibration [rad]
     h_d  drive damping [N s/m]              g    steady friction force at a velocity [N]
 
-`config` is what a rig file says, `pairs` the friction pairs, `records` the derived numbers and the state, `contact` one step of
-`core` one block of all of it, `sensors` what the channels make of the truth, `simulate` a run without a bus, `node` the rig
-as a participant of the bus, `app` the process.
+`config` is what a rig file says, `pairs` the friction pairs, `records` the derived numbers and the state. `contact` is one
+step of friction and slide, `core` one block of it with the piezo and the sensors' filters, `sensors` what the channels make
+of that, `step` the whole block with its messages, `simulate` a run without a bus, `stability` the linearised slider, `node`
+the rig as a participant of the bus, `app` the process.
 """
