@@ -57,7 +57,7 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
         if path.suffix == ".mat":
             return Table(path, _mat(path))
         return _tdms(path)
-    except NotImplementedError:
+    except NotImplementedError:  # what scipy raises for the HDF5 of MATLAB v7.3
         line = f"{path.name}: a MATLAB v7.3 file: must be v5 to v7; save it in MATLAB with -v7"
         raise Fault("BAD_TABLE", line) from None
     except (pa.ArrowException, MatReadError, OSError, ValueError, KeyError, TypeError, IndexError, EOFError) as error:

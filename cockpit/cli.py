@@ -296,7 +296,9 @@ def replay_command(
         from cockpit import replaying
 
         if closed_loop:
-            return max(replaying.closed_loop(path, settings, out, as_json) for path in logs)
+            if len(logs) != 1:
+                raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")
+            return replaying.closed_loop(logs[0], settings, out, as_json)
         return replaying.replay_logs(logs, from_s, settings, as_json)
 
     sys.exit(guarded(work, as_json))

@@ -45,6 +45,11 @@ def replay_logs(paths: list[Path], from_s: float, settings: list[str], as_json: 
         if not len(run.trace):
             raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded, so nothing can be replayed")
         result = replay(run, changes_of(run, settings), from_s)
+        if result.compared == 0:
+            line = (
+                f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
+            )
+            raise Fault("BAD_LOG", f"{line}; use an earlier --from")
         results.append(_row(run, result, settings))
         if not as_json:
             print("\n".join(_lines(run, result, settings)))
@@ -67,7 +72,9 @@ def _row(run: RunData, result: Replay, settings: list[str]) -> dict[str, Any]:
 
 def _lines(run: RunData, result: Replay, settings: list[str]) -> list[str]:
     skipped = (
-        f"; {result.skipped} steps could not be rebuilt, their blocks are not in the log" if result.skipped else ""
+        f"; {result.skipped} steps could not be rebuilt, their block or the memory before them is not in the log"
+        if result.skipped
+        else ""
     )
     if result.difference is None:
         return [f"{run.path}: identical, {result.compared} steps, every command and trace bit for bit{skipped}"]

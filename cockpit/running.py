@@ -33,9 +33,16 @@ def run_scenario(
     interrupted = False
     try:
         if in_process:
+            from rich.console import Console
+            from rich.progress import Progress
+
             from cockpit.onboard import run_onboard
 
-            run_onboard(scenario, path, about_run(scenario, lockstep=True))
+            with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bar:
+                task = bar.add_task("simulating", total=scenario.duration_s)
+                run_onboard(
+                    scenario, path, about_run(scenario, lockstep=True), lambda t_s: bar.update(task, completed=t_s)
+                )
         else:
             from cockpit.live import follower
             from cockpit.orchestra import run_processes

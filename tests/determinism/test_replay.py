@@ -166,3 +166,9 @@ def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path
     assert now.sensors.tobytes() == was.sensors.tobytes()
     for field in ("mode", "score", "wanted_amplitude_m", "vibration_velocity_mps"):
         assert np.array_equal(now.trace[field], was.trace[field]), field
+
+
+def test_nothing_to_compare_is_no_success(log: Path) -> None:
+    result = CliRunner().invoke(app, ["replay", str(log), "--from", "99s"])
+    assert result.exit_code == 7
+    assert "99 s" in result.stderr
