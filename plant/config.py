@@ -2,11 +2,12 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from bridge.config import Strict, Two, read_toml, validate
+from plant.effects import checked
 from plant.pairs import PAIRS
 
 Positive = Annotated[float, Field(gt=0)]
@@ -23,6 +24,12 @@ class ContactConfig(Strict):
     coulomb_force_N: Positive
     static_force_N: Positive
     stribeck_velocity_mps: Positive = 0.0005  # [15] in the paper; the same for every pair
+    backbone: Literal["lugre", "elasto-plastic"] = "lugre"
+    elastic_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.7  # elasto-plastic: elastic up to this share of its reach
+    # a rough surface: friction scatters along the track with this rms, a new value every length, another track every seed
+    roughness_ratio: Annotated[float, Field(ge=0, le=0.3)] = 0.0
+    roughness_length_m: Positive = 2e-4
+    roughness_seed: Annotated[int, Field(ge=0, le=1_000_000)] = 0
 
     @model_validator(mode="before")
     @classmethod
@@ -118,6 +125,12 @@ class RigConfig(Strict):
     piezo: PiezoConfig = PiezoConfig()
     sensors: SensorsConfig = SensorsConfig()
     solver: SolverConfig = SolverConfig()
+    effects: dict[str, dict[str, float | str]] = {}  # [effects.NAME] as in plant/effects.py; none: the nominal rig
+
+    @field_validator("effects")
+    @classmethod
+    def _effects_are_known(cls, effects: dict[str, dict[str, float | str]]) -> dict[str, dict[str, float | str]]:
+        return {name: checked(name, table) for name, table in effects.items()}
 
     @model_validator(mode="after")
     def _steps_fit(self) -> "RigConfig":

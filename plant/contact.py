@@ -22,34 +22,33 @@ def step(
     k_t: float,
     h_t: float,
     h_v: float,
-    F_c: float,
-    F_s: float,
-    per_v_s: float,
+    g: float,
+    sliding_share: float,
     pull_N: float,
     drive_velocity: float,
-    base_velocity: float,
     base_velocity_mid: float,
     v: float,
+    v_r: float,
     z: float,
     v_r_before: float,
     g_before: float,
-) -> tuple[float, float, float, float, float]:
+) -> tuple[float, float, float]:
     """Advance one step; all SI.
 
     Args:
-        per_v_s: 1 / Stribeck velocity.
+        g: steady friction force at the velocity of now, which the bristle moves towards.
+        sliding_share: 1 for LuGre; less, above 0, where the bristle is still elastic, in the elasto-plastic contact.
         z_dt: how far the bristle moves: dt, half of it in the very first step.
         pull_N: spring force of the drive in the middle of the step.
-        base_velocity, base_velocity_mid: of the base now and in the middle of the step.
+        base_velocity_mid: of the base in the middle of the step.
+        v_r, v_r_before, g_before: relative velocity now; it and g in the step before.
 
     Returns:
-        v after the step, its mean over the step, z after, v_r and g now (to be handed in again next time).
+        v after the step, its mean over the step, z after.
 
     """
-    v_r = v - base_velocity
-    q = v_r * per_v_s
-    g = F_c + (F_s - F_c) * math.exp(-q * q)
-    decay = k_t * math.fabs(v_r) / g * z_dt
+    g_end = g / sliding_share
+    decay = k_t * math.fabs(v_r) / g_end * z_dt
     if decay < 0.03:
         # exp(-decay) - 1 by its series, to 1e-14 of itself here; in pairs, because the step waits for this line
         square = decay * decay
@@ -57,8 +56,8 @@ def step(
         gone = -decay * pairs
     else:
         gone = math.exp(-decay) - 1.0
-    z_end = g / k_t if v_r > 0.0 else -g / k_t
-    per_g_mid = k_t / (1.5 * g - 0.5 * g_before)
+    z_end = g_end / k_t if v_r > 0.0 else -g_end / k_t
+    per_g_mid = sliding_share * k_t / (1.5 * g - 0.5 * g_before)
     if 1.5 * v_r - 0.5 * v_r_before < 0.0:
         per_g_mid = -per_g_mid
     z += (z - z_end) * gone
@@ -68,4 +67,4 @@ def step(
     v_mid = (v + half * (pull_N + h_d * drive_velocity - k_t * z + damping * base_velocity_mid)) / (
         1.0 + half * (h_d + damping)
     )
-    return 2.0 * v_mid - v, v_mid, z, v_r, g
+    return 2.0 * v_mid - v, v_mid, z

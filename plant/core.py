@@ -1,122 +1,233 @@
-"""One block of the rig: physics and the analogue half of the sensors. No clock, no bus, no randomness in here."""
+"""One block of the rig: physics and the analogue half of the sensors. No clock, no bus, no randomness in here.
+
+Compiled twice from one source: `advance`, the nominal rig, in which the compiler drops every branch of the effects, and
+`advance_disturbed`, which has them all and is as fast as those that are switched on allow.
+"""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from plant.contact import step as contact_step
+from plant.disturb import ageing_N, elasto_plastic_share, level, spring_N
 from plant.piezo import accepted, delivered_share
+from plant.records import DELAY_LINE
 
 TWO_PI = 2.0 * math.pi
 
 
 @kernel
-def advance(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    drive_velocity_mps: float,
-    frequency_Hz: float,
-    amplitude_m: float,
-    analogue: npt.NDArray[Any],
-    truth: npt.NDArray[Any],
-) -> None:
-    """Advance the rig by one block, in place.
+def _force_reading(p: Record, s: Record, force_N: float, t_s: float) -> float:
+    """What the force sensor's faults make of its signal; once a sample."""
+    if p.force_lag_s > 0.0:
+        share = 1.0 - math.exp(-p.dt_s * p.steps_per_sample / p.force_lag_s)
+        s.force_lag_1 += share * (force_N - s.force_lag_1)
+        force_N = s.force_lag_1
+        if p.force_lag_order == 2.0:
+            s.force_lag_2 += share * (force_N - s.force_lag_2)
+            force_N = s.force_lag_2
+    if p.force_delay_s > 0.0:
+        s.delay_line[s.delay_at] = force_N
+        back = p.force_delay_s / (p.dt_s * p.steps_per_sample)
+        whole = math.floor(back)
+        newer = s.delay_line[(s.delay_at - int(whole)) % DELAY_LINE]
+        older = s.delay_line[(s.delay_at - int(whole) - 1) % DELAY_LINE]
+        force_N = newer + (back - whole) * (older - newer)
+        s.delay_at = (s.delay_at + 1) % DELAY_LINE
+    if p.force_settling_s > 0.0:
+        force_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
+    return force_N * (1.0 + p.force_ratio) + p.force_bias_N + p.force_drift_N_per_s * t_s
 
-    Args:
-        params, state: records of `plant.records.PARAMS` and `STATE`, one element each.
-        drive_velocity_mps: held over the block.
-        frequency_Hz, amplitude_m: the command to the piezo, held over the block.
-        analogue: filled with the sensors before noise and digitising, float64 [5, samples], rows as CHANNELS.
-        truth: filled with what no sensor sees, float64 [5, samples], rows as TRUTH.
 
-    """
-    p: Record = params[0]
-    s: Record = state[0]
-    # into locals: through the record every store to an output array would force a reload (183 -> 2xx x real time)
-    dt, m, k_d, h_d = p.dt_s, p.m, p.k_d, p.h_d
-    k_t, h_t, h_v, F_c, F_s, per_v_s = p.k_t, p.h_t, p.h_v, p.F_c, p.F_s, 1.0 / p.v_s
-    force_share, accel_share = 1.0 - p.force_keep, 1.0 - p.accel_keep
-    position_share, slow_share = 1.0 - p.position_keep, 1.0 - p.accel_highpass_keep
-    steps_per_sample, samples = p.steps_per_sample, p.samples_per_block
-    frequency, target_m = accepted(p, frequency_Hz, amplitude_m)
-    if s.amplitude_m == 0.0 and target_m > 0.0:
-        s.phi = 0.0
-    if s.amplitude_m == 0.0 or target_m > 0.0:
-        s.frequency_Hz = frequency  # an exciter that fades out keeps its frequency
-    share = delivered_share(p, s.frequency_Hz)
-    omega = TWO_PI * s.frequency_Hz
-    u0 = s.amplitude_m
-    u0_step = p.amplitude_slew_m_per_s * dt
-    vibrating = u0 > 0.0 or target_m > 0.0
-    cos_phi, sin_phi = math.cos(s.phi), math.sin(s.phi)
-    cos_half, sin_half = math.cos(0.5 * omega * dt), math.sin(0.5 * omega * dt)
-    base_velocity = 0.0
-    base_velocity_mid = 0.0
-    base_accel = 0.0
-    base_ramp = 0.0
-    accel = 0.0
-    x, v, z, v_r, g, s_d = s.x, s.v, s.z, s.v_r, s.g, s.s_d
-    force_f, position_f, drive_f = s.force_f, s.mass_position_f, s.drive_position_f
-    mass_f, mass_slow_f = s.mass_accel_f, s.mass_accel_slow_f
-    base_f, base_slow_f = s.base_accel_f, s.base_accel_slow_f
-    z_dt = dt if s.steps > 0 else 0.5 * dt
+def _compiled(disturbed: bool) -> Callable[..., None]:
+    @kernel
+    def advance(
+        params: npt.NDArray[Any],
+        state: npt.NDArray[Any],
+        drive: float,
+        frequency_Hz: float,
+        amplitude_m: float,
+        analogue: npt.NDArray[Any],
+        truth: npt.NDArray[Any],
+    ) -> None:
+        """Advance the rig by one block, in place.
 
-    for sample in range(samples):
-        for _ in range(steps_per_sample):
-            if vibrating:
-                u0_before = u0
-                if u0_step == 0.0:
-                    u0 = target_m
-                elif u0 < target_m:
-                    u0 = min(u0 + u0_step, target_m)
-                elif u0 > target_m:
-                    u0 = max(u0 - u0_step, target_m)
-                base_ramp = share * (u0 - u0_before) / dt if u0_step > 0.0 else 0.0
-                peak = share * u0 * omega
-                base_velocity = peak * cos_phi + base_ramp * sin_phi
-                base_accel = 2.0 * base_ramp * omega * cos_phi - peak * omega * sin_phi
-                cos_mid = cos_phi * cos_half - sin_phi * sin_half
-                sin_mid = sin_phi * cos_half + cos_phi * sin_half
-                base_velocity_mid = peak * cos_mid + base_ramp * sin_mid
-                cos_phi = cos_mid * cos_half - sin_mid * sin_half
-                sin_phi = sin_mid * cos_half + cos_mid * sin_half
-            pull_N = k_d * (s_d + 0.5 * dt * drive_velocity_mps - x - 0.5 * dt * v)
-            v_before = v
-            v, v_mid, z, v_r, g = contact_step(
-                dt, z_dt, m, h_d, k_t, h_t, h_v, F_c, F_s, per_v_s,
-                pull_N, drive_velocity_mps, base_velocity, base_velocity_mid, v, z, v_r, g,
-            )  # fmt: skip
-            z_dt = dt
-            x += dt * v_mid
-            s_d += dt * drive_velocity_mps
-            # the sensors' analogue filters, each driven by its signal at the end of the step
-            force_N = k_d * (s_d - x) + h_d * (drive_velocity_mps - v)
-            accel = (v - v_before) / dt
-            force_f += force_share * (force_N - force_f)
-            position_f += position_share * (x - position_f)
-            drive_f += position_share * (s_d - drive_f)
-            mass_f += accel_share * (accel - mass_f)
-            base_f += accel_share * (base_accel - base_f)
-            mass_slow_f += slow_share * (mass_f - mass_slow_f)
-            base_slow_f += slow_share * (base_f - base_slow_f)
-        analogue[0, sample] = force_f
-        analogue[1, sample] = mass_f - mass_slow_f
-        analogue[2, sample] = base_f - base_slow_f
-        analogue[3, sample] = position_f
-        analogue[4, sample] = drive_f
-        truth[0, sample] = k_d * (s_d - x) + h_d * (drive_velocity_mps - v)
-        truth[1, sample] = truth[0, sample] - m * accel
-        truth[2, sample] = v
-        truth[3, sample] = z
-        truth[4, sample] = x
+        Args:
+            params, state: records of `plant.records.PARAMS` and `STATE`, one element each.
+            drive: velocity of the drive [m/s], held over the block; with `force_driven` the force on the slide [N].
+            frequency_Hz, amplitude_m: the command to the piezo, held over the block.
+            analogue: filled with the sensors before noise and digitising, float64 [5, samples], rows as CHANNELS.
+            truth: filled with what no sensor sees, float64 [5, samples], rows as TRUTH.
 
-    steps = samples * steps_per_sample
-    s.steps += steps
-    s.x, s.v, s.z, s.v_r, s.g, s.s_d = x, v, z, v_r, g, s_d
-    s.amplitude_m = u0
-    s.phi = (s.phi + omega * dt * steps) % TWO_PI if vibrating else 0.0
-    s.force_f, s.mass_position_f, s.drive_position_f = force_f, position_f, drive_f
-    s.mass_accel_f, s.mass_accel_slow_f = mass_f, mass_slow_f
-    s.base_accel_f, s.base_accel_slow_f = base_f, base_slow_f
+        """
+        p: Record = params[0]
+        s: Record = state[0]
+        # into locals: through the record every store to an output array would force a reload (183 -> 2xx x real time)
+        dt, m, k_d, h_d = p.dt_s, p.m, p.k_d, p.h_d
+        k_t, h_t, h_v, F_c, F_s, per_v_s = p.k_t, p.h_t, p.h_v, p.F_c, p.F_s, 1.0 / p.v_s
+        force_share, accel_share = 1.0 - p.force_keep, 1.0 - p.accel_keep
+        position_share, slow_share = 1.0 - p.position_keep, 1.0 - p.accel_highpass_keep
+        steps_per_sample, samples = p.steps_per_sample, p.samples_per_block
+        frequency, target_m = accepted(p, frequency_Hz, amplitude_m)
+        if s.amplitude_m == 0.0 and target_m > 0.0:
+            s.phi = 0.0
+        if s.amplitude_m == 0.0 or target_m > 0.0:
+            s.frequency_Hz = frequency  # an exciter that fades out keeps its frequency
+        share = delivered_share(p, s.frequency_Hz)
+        omega = TWO_PI * s.frequency_Hz
+        u0 = s.amplitude_m
+        u0_step = p.amplitude_slew_m_per_s * dt
+        vibrating = u0 > 0.0 or target_m > 0.0
+        cos_phi, sin_phi = math.cos(s.phi), math.sin(s.phi)
+        cos_half, sin_half = math.cos(0.5 * omega * dt), math.sin(0.5 * omega * dt)
+        base_velocity = 0.0
+        base_velocity_mid = 0.0
+        base_accel = 0.0
+        base_ramp = 0.0
+        accel = 0.0
+        drive_velocity_mps = drive
+        h_d_now, F_c_now, F_s_now, sliding_share = h_d, F_c, F_s, 1.0
+        force_N = s.drive_N
+        # only the disturbed kernel looks at what follows
+        t_s = s.steps * dt
+        frame_m, frame_mps, base_m, base_mps, yield_mps2 = s.frame_m, s.frame_mps, s.base_m, s.base_mps, 0.0
+        age_s, v_lag = s.age_s, s.v_lag
+        lag_share = 1.0 - math.exp(-dt / p.lag_s) if p.lag_s > 0.0 else 1.0
+        frame_omega, base_omega = TWO_PI * p.frame_Hz, TWO_PI * p.base_Hz
+        vibrating_s = s.vibrating_s + samples * steps_per_sample * dt if vibrating else 0.0
+        heat_share = 1.0
+        if disturbed and p.sag_settling_s > 0.0:
+            heat_share -= p.sag_ratio * (1.0 - math.exp(-vibrating_s / p.sag_settling_s))
+        if disturbed and p.force_driven:
+            drive_velocity_mps = 0.0
+        x, v, z, v_r, g, s_d = s.x, s.v, s.z, s.v_r, s.g, s.s_d
+        force_f, position_f, drive_f = s.force_f, s.mass_position_f, s.drive_position_f
+        mass_f, mass_slow_f = s.mass_accel_f, s.mass_accel_slow_f
+        base_f, base_slow_f = s.base_accel_f, s.base_accel_slow_f
+        z_dt = dt if s.steps > 0 else 0.5 * dt
+
+        for sample in range(samples):
+            for _ in range(steps_per_sample):
+                if vibrating:
+                    u0_before = u0
+                    if u0_step == 0.0:
+                        u0 = target_m
+                    elif u0 < target_m:
+                        u0 = min(u0 + u0_step, target_m)
+                    elif u0 > target_m:
+                        u0 = max(u0 - u0_step, target_m)
+                    base_ramp = share * (u0 - u0_before) / dt if u0_step > 0.0 else 0.0
+                    peak = share * u0 * omega
+                    if disturbed and p.sag_ratio != 0.0:
+                        peak *= heat_share if p.sag_settling_s > 0.0 else 1.0 - p.sag_ratio * math.fabs(force_N) / p.F_s
+                    base_velocity = peak * cos_phi + base_ramp * sin_phi
+                    base_accel = 2.0 * base_ramp * omega * cos_phi - peak * omega * sin_phi
+                    cos_mid = cos_phi * cos_half - sin_phi * sin_half
+                    sin_mid = sin_phi * cos_half + cos_phi * sin_half
+                    base_velocity_mid = peak * cos_mid + base_ramp * sin_mid
+                    cos_phi = cos_mid * cos_half - sin_mid * sin_half
+                    sin_phi = sin_mid * cos_half + cos_mid * sin_half
+                if disturbed:
+                    if p.ripple_ratio != 0.0:
+                        turns = p.ripple_frequency_Hz * t_s
+                        if p.ripple_wavelength_m > 0.0:
+                            turns = s_d / p.ripple_wavelength_m
+                        drive_velocity_mps = drive * (
+                            1.0 + p.ripple_ratio * math.sin(TWO_PI * turns + p.ripple_phase_rad)
+                        )
+                    anchor_mps = drive_velocity_mps - frame_mps
+                    extension_m = s_d - frame_m - x
+                    pull_N = drive if p.force_driven else spring_N(p, extension_m + 0.5 * dt * (anchor_mps - v))
+                    h_d_now = 0.0 if math.fabs(extension_m) < 0.5 * p.gap_m else h_d  # a slack drive damps nothing
+                else:
+                    anchor_mps = drive_velocity_mps
+                    pull_N = k_d * (s_d + 0.5 * dt * drive_velocity_mps - x - 0.5 * dt * v)
+                v_r_before, g_before, v_before = v_r, g, v
+                v_r = v - base_velocity
+                v_g = v_r
+                base_mid_mps = base_velocity_mid
+                if disturbed:
+                    v_r -= base_mps
+                    base_mid_mps += base_mps
+                    friction = level(p, t_s, x, v_r)
+                    v_lag += lag_share * (v_r - v_lag)
+                    v_g = v_lag
+                    age_s = (age_s + dt) / (1.0 + math.fabs(v_r) / p.age_length_m * dt)
+                    F_c_now = F_c * friction
+                    F_s_now = F_s * friction
+                    if p.age_growth_N != 0.0:
+                        F_s_now += ageing_N(p, age_s)
+                    damping = h_v + p.quadratic_Ns2_per_m2 * math.fabs(v_r)
+                else:
+                    damping = h_v
+                q = v_g * per_v_s
+                g = F_c_now + (F_s_now - F_c_now) * math.exp(-q * q)
+                if disturbed and p.elasto_plastic:
+                    sliding_share = elasto_plastic_share(z, v_r, g, k_t, p.elastic_ratio)
+                v, v_mid, z = contact_step(
+                    dt, z_dt, m, h_d_now, k_t, h_t, damping, g, sliding_share,
+                    pull_N, anchor_mps, base_mid_mps, v, v_r, z, v_r_before, g_before,
+                )  # fmt: skip
+                z_dt = dt
+                x += dt * v_mid
+                s_d += dt * drive_velocity_mps
+                accel = (v - v_before) / dt
+                # the sensors' analogue filters, each driven by its signal at the end of the step
+                if disturbed:
+                    t_s += dt
+                    spring_force_N = spring_N(p, s_d - frame_m - x) + h_d_now * (anchor_mps - v)
+                    force_N = drive if p.force_driven else spring_force_N
+                    if p.frame_m_per_N != 0.0:  # m q'' = F_d - q / c - damping, m = 1 / (c omega^2)
+                        pushed = force_N * p.frame_m_per_N - frame_m
+                        frame_mps += dt * frame_omega * (frame_omega * pushed - 2.0 * p.frame_damping_ratio * frame_mps)
+                        frame_m += dt * frame_mps
+                    if p.base_m_per_N != 0.0:  # the same under the friction force
+                        pushed = (force_N - m * accel) * p.base_m_per_N - base_m
+                        yield_mps2 = base_omega * (base_omega * pushed - 2.0 * p.base_damping_ratio * base_mps)
+                        base_mps += dt * yield_mps2
+                        base_m += dt * base_mps
+                else:
+                    force_N = k_d * (s_d - x) + h_d * (drive_velocity_mps - v)
+                force_f += force_share * (force_N - force_f)
+                position_f += position_share * (x - position_f)
+                drive_f += position_share * (s_d - drive_f)
+                mass_f += accel_share * (accel - mass_f)
+                base_f += accel_share * (base_accel + yield_mps2 - base_f)
+                mass_slow_f += slow_share * (mass_f - mass_slow_f)
+                base_slow_f += slow_share * (base_f - base_slow_f)
+            if disturbed:
+                analogue[0, sample] = _force_reading(p, s, force_f, t_s)
+                analogue[1, sample] = (1.0 + p.mass_accel_ratio) * (mass_f - mass_slow_f)
+                analogue[2, sample] = (1.0 + p.base_accel_ratio) * (base_f - base_slow_f)
+            else:
+                analogue[0, sample] = force_f
+                analogue[1, sample] = mass_f - mass_slow_f
+                analogue[2, sample] = base_f - base_slow_f
+            analogue[3, sample] = position_f
+            analogue[4, sample] = drive_f
+            truth[0, sample] = force_N
+            truth[1, sample] = truth[0, sample] - m * accel
+            truth[2, sample] = v
+            truth[3, sample] = z
+            truth[4, sample] = x
+
+        steps = samples * steps_per_sample
+        s.steps += steps
+        s.x, s.v, s.z, s.v_r, s.g, s.s_d = x, v, z, v_r, g, s_d
+        s.amplitude_m = u0
+        s.phi = (s.phi + omega * dt * steps) % TWO_PI if vibrating else 0.0
+        s.force_f, s.mass_position_f, s.drive_position_f = force_f, position_f, drive_f
+        s.mass_accel_f, s.mass_accel_slow_f = mass_f, mass_slow_f
+        s.base_accel_f, s.base_accel_slow_f = base_f, base_slow_f
+        if disturbed:
+            s.frame_m, s.frame_mps, s.base_m, s.base_mps = frame_m, frame_mps, base_m, base_mps
+            s.age_s, s.v_lag, s.vibrating_s, s.drive_N = age_s, v_lag, vibrating_s, force_N
+
+    return advance
+
+
+advance = _compiled(disturbed=False)
+advance_disturbed = _compiled(disturbed=True)

@@ -17,6 +17,9 @@ def delivered_share(p: Record, frequency_Hz: float) -> float:
         r = frequency_Hz / p.mount_resonance_Hz
         damped = 2.0 * p.mount_damping_ratio * r
         share /= math.sqrt((1.0 - r * r) * (1.0 - r * r) + damped * damped)
+    if p.rolloff_Hz > 0.0:
+        r = frequency_Hz / p.rolloff_Hz
+        share /= math.sqrt(1.0 + r * r) if p.rolloff_order == 1.0 else 1.0 + r * r
     return share
 
 

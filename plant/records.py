@@ -31,11 +31,39 @@ PARAMS = np.dtype(
             *("force_gain", "force_range_N", "force_noise_N", "force_resolution_N"),
             *("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"),
             *("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"),
+            # the effects of `plant.effects`, all 0 in the nominal rig
+            *("age_growth_N", "age_scale_s", "age_exponent", "age_length_m", "lag_s", "quadratic_Ns2_per_m2"),
+            *("position_ratio", "position_wavelength_m", "position_phase_rad", "forward_ratio", "backward_ratio"),
+            *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_seed"),
+            *("drift_per_s", "drift_ratio", "drift_settling_s"),
+            *("roughness_ratio", "roughness_length_m", "roughness_seed", "elastic_ratio"),
+            *("hardening_per_m2", "knee_m", "knee_ratio", "gap_m"),
+            *("ripple_ratio", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
+            *("frame_m_per_N", "frame_Hz", "frame_damping_ratio", "base_m_per_N", "base_Hz", "base_damping_ratio"),
+            *("rolloff_Hz", "rolloff_order", "sag_ratio", "sag_settling_s"),
+            *("force_lag_s", "force_lag_order", "force_delay_s", "force_ratio", "force_bias_N"),
+            *("force_drift_N_per_s", "force_drift_N", "force_settling_s", "mass_accel_ratio", "base_accel_ratio"),
         )
     ]
-    + [(name, "i8") for name in ("samples_per_block", "steps_per_sample", "block_ns", "command_timeout_blocks")],
+    + [
+        (name, "i8")
+        for name in (
+            *("samples_per_block", "steps_per_sample", "block_ns", "command_timeout_blocks"),
+            *("disturbed", "elasto_plastic", "force_driven"),
+        )
+    ],
     align=True,
 )
+
+# an effect that runs in the kernel is off while its switch is 0
+_SWITCHES = (
+    *("age_growth_N", "lag_s", "quadratic_Ns2_per_m2", "position_ratio", "forward_ratio", "backward_ratio"),
+    *("load_ratio", "drift_per_s", "drift_ratio", "roughness_ratio", "hardening_per_m2", "knee_ratio", "gap_m"),
+    *("ripple_ratio", "frame_m_per_N", "base_m_per_N", "sag_ratio", "force_lag_s", "force_delay_s", "force_ratio"),
+    *("force_bias_N", "force_drift_N_per_s", "force_drift_N", "mass_accel_ratio", "base_accel_ratio"),
+)
+
+DELAY_LINE = 256  # samples; 12.8 ms at 20 kHz, above the longest delay that a rig file may ask for
 
 # x and z are kept half a step before v: the leapfrog of `contact`. `_f` marks what a sensor's filter remembers.
 STATE = np.dtype(
@@ -47,8 +75,12 @@ STATE = np.dtype(
             *("amplitude_m", "frequency_Hz", "phi", "commanded_m", "commanded_Hz"),
             *("force_f", "mass_accel_f", "mass_accel_slow_f", "base_accel_f", "base_accel_slow_f"),
             *("mass_position_f", "drive_position_f"),
+            # what the effects remember
+            *("age_s", "v_lag", "frame_m", "frame_mps", "base_m", "base_mps", "vibrating_s", "drive_N"),
+            *("force_lag_1", "force_lag_2"),
         )
-    ],
+    ]
+    + [("delay_line", "f8", (DELAY_LINE,)), ("delay_at", "i8")],
     align=True,
 )
 
@@ -98,8 +130,92 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         p[name] = getattr(sensors, name)
     for name in ("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"):
         p[name] = getattr(sensors, name)
+    _add_effects(p, config)
     state = record(STATE)
     state[0].g = p.F_s
     state[0].frequency_Hz = p.frequency_max_Hz
     state[0].command_block = NO_COMMAND
     return params, state
+
+
+def _add_effects(p: Any, config: RigConfig) -> None:
+    """Fold the effects that only change a number into it; hand the others to the kernel."""
+    contact = config.contact
+    p.elasto_plastic = contact.backbone == "elasto-plastic"
+    for name in ("elastic_ratio", "roughness_ratio", "roughness_length_m", "roughness_seed"):
+        p[name] = getattr(contact, name)
+    p.load_seed = -1.0
+    p.age_scale_s = 1.0
+    # ten reaches of the bristle: creep before breakaway leaves the contact its age, a slip of any size takes it
+    p.age_length_m = 10.0 * contact.static_force_N / contact.stiffness_N_per_m
+    for name, table in config.effects.items():
+        _add_effect(p, name, str(table["form"]), {key: float(value) for key, value in table.items() if key != "form"})
+    p.disturbed = p.elasto_plastic or any(p[name] != 0.0 for name in _SWITCHES)
+
+
+def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
+    if name == "static-friction-ageing":
+        p.age_growth_N = value["ratio"] * p.F_s
+        p.age_scale_s, p.age_exponent = value.get("age_scale_s", 1.0), value.get("exponent", 0.0)
+    elif name == "frictional-lag":
+        p.lag_s = value["lag_s"]
+    elif name == "viscous-friction":
+        p.h_v += value.get("damping_Ns_per_m", 0.0)
+        p.quadratic_Ns2_per_m2 = value.get("damping_Ns2_per_m2", 0.0)
+    elif name == "position-dependent-friction":
+        p.position_ratio, p.position_wavelength_m = value["ratio"], value["wavelength_m"]
+        p.position_phase_rad = value["phase_rad"]
+    elif name == "direction-dependent-friction":
+        both = form == "both"
+        p.forward_ratio = 0.5 * value["ratio"] if both else 0.0
+        p.backward_ratio = -0.5 * value["ratio"] if both else value["ratio"]
+    elif name == "normal-load-fluctuation":
+        p.load_ratio, p.load_frequency_Hz = value["ratio"], value["frequency_Hz"]
+        p.load_phase_rad, p.load_seed = value.get("phase_rad", 0.0), value.get("seed", -1.0)
+    elif name == "friction-drift":
+        p.drift_per_s = value.get("rate_per_s", 0.0)
+        p.drift_ratio, p.drift_settling_s = value.get("ratio", 0.0), value.get("settling_s", 0.0)
+    elif name == "coulomb-level":
+        p.F_c *= 1.0 + value["ratio"]
+    elif name == "static-level":
+        p.F_s *= 1.0 + value["ratio"]
+    elif name == "stribeck-velocity":
+        p.v_s *= 1.0 + value["ratio"]
+    elif name == "drive-damping":
+        p.h_d += value["damping_Ns_per_m"]
+    elif name == "drive-stiffness":
+        p.k_d *= 1.0 + value["ratio"]
+    elif name == "drive-hardening":
+        p.hardening_per_m2 = value["ratio"] * 1e6 if form == "cubic" else 0.0
+        p.knee_m, p.knee_ratio = value.get("knee_m", 0.0), value["ratio"] if form == "bilinear" else 0.0
+    elif name == "drive-backlash":
+        p.gap_m = value["gap_m"]
+    elif name == "drive-speed-ripple":
+        p.ripple_ratio, p.ripple_phase_rad = value["ratio"], value["phase_rad"]
+        p.ripple_wavelength_m, p.ripple_frequency_Hz = value.get("wavelength_m", 0.0), value.get("frequency_Hz", 0.0)
+    elif name == "frame-compliance":
+        p.frame_m_per_N = value["ratio"] / p.k_d
+        p.frame_Hz, p.frame_damping_ratio = value["frequency_Hz"], value["damping_ratio"]
+    elif name == "base-compliance":
+        p.base_m_per_N = value["compliance_m_per_N"]
+        p.base_Hz, p.base_damping_ratio = value["frequency_Hz"], value["damping_ratio"]
+    elif name == "piezo-roll-off":
+        p.rolloff_Hz, p.rolloff_order = value["corner_Hz"], 1.0 if form == "first-order" else 2.0
+    elif name == "piezo-resonance":
+        p.mount_resonance_Hz, p.mount_damping_ratio = value["resonance_Hz"], value["damping_ratio"]
+    elif name == "piezo-sag":
+        p.sag_ratio, p.sag_settling_s = value["ratio"], value.get("settling_s", 0.0)
+    elif name == "force-sensor-gain":
+        p.force_ratio = value["ratio"]
+    elif name == "force-sensor-bias":
+        p.force_bias_N = value["bias_N"]
+    elif name == "force-sensor-drift":
+        p.force_drift_N_per_s = value.get("rate_N_per_s", 0.0)
+        p.force_drift_N, p.force_settling_s = value.get("drift_N", 0.0), value.get("settling_s", 0.0)
+    elif name == "force-sensor-lag":
+        p.force_lag_s, p.force_lag_order = value["lag_s"], 1.0 if form == "first-order" else 2.0
+    elif name == "force-sensor-delay":
+        p.force_delay_s = value["delay_s"]
+    elif name == "accelerometer-gain":
+        p.mass_accel_ratio = 0.0 if form == "base" else value["ratio"]
+        p.base_accel_ratio = 0.0 if form == "mass" else value["ratio"]

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from bridge.kernel import kernel
 from plant.config import RigConfig
-from plant.core import advance
+from plant.core import advance, advance_disturbed
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -37,7 +37,12 @@ def _run(
 ) -> None:
     samples = truth.shape[1]
     for block in range(drive_velocity_mps.shape[0]):
-        advance(params, state, drive_velocity_mps[block], frequency_Hz[block], amplitude_m[block], analogue, truth)
+        if params[0].disturbed:
+            advance_disturbed(
+                params, state, drive_velocity_mps[block], frequency_Hz[block], amplitude_m[block], analogue, truth
+            )
+        else:
+            advance(params, state, drive_velocity_mps[block], frequency_Hz[block], amplitude_m[block], analogue, truth)
         for sample in range(samples):
             for row in range(truth.shape[0]):
                 out[row, block * samples + sample] = truth[row, sample]

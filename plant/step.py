@@ -6,7 +6,7 @@ from typing import Any
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
-from plant.core import advance
+from plant.core import advance, advance_disturbed
 from plant.records import NO_COMMAND
 from plant.sensors import digitise
 
@@ -48,10 +48,11 @@ def step(
         s.command_block = c.block
     fresh = s.command_block != NO_COMMAND and s.block - s.command_block <= p.command_timeout_blocks
     usable = fresh and math.isfinite(s.commanded_Hz) and math.isfinite(s.commanded_m)
-    if usable:
-        advance(params, state, drive_velocity_mps, s.commanded_Hz, s.commanded_m, analogue, truth)
+    frequency_Hz, amplitude_m = (s.commanded_Hz, s.commanded_m) if usable else (s.frequency_Hz, 0.0)
+    if p.disturbed:
+        advance_disturbed(params, state, drive_velocity_mps, frequency_Hz, amplitude_m, analogue, truth)
     else:
-        advance(params, state, drive_velocity_mps, s.frequency_Hz, 0.0, analogue, truth)
+        advance(params, state, drive_velocity_mps, frequency_Hz, amplitude_m, analogue, truth)
     t_ns = (s.block + 1) * p.block_ns
     block: Record = sensors[0]
     block.sequence = s.block

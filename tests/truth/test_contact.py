@@ -105,12 +105,13 @@ def test_the_bristle_follows_its_closed_form_at_constant_velocity(v_r):
     """z = z_end (1 - exp(-k_t |v_r| t / g)); a mass of 1e12 kg keeps the velocity constant."""
     contact = rig().contact
     k_t, F_c, F_s = contact.stiffness_N_per_m, contact.coulomb_force_N, contact.static_force_N
-    dt, z, v, before, g = 1e-5, 0.0, v_r, v_r, F_s
-    for _ in range(500):
-        v, _, z, before, g = step(
-            dt, dt, 1e12, 0.0, k_t, 0.0, 0.0, F_c, F_s, 1 / 5e-4, 0.0, 0.0, 0.0, 0.0, v, z, before, g
-        )
     steady_N = F_c + (F_s - F_c) * math.exp(-((v_r / 5e-4) ** 2))
+    dt, z, v, before = 1e-5, 0.0, v_r, v_r
+    for _ in range(500):
+        g_before = steady_N
+        now = v
+        v, _, z = step(dt, dt, 1e12, 0.0, k_t, 0.0, 0.0, steady_N, 1.0, 0.0, 0.0, 0.0, v, now, z, before, g_before)
+        before = now
     z_end = math.copysign(steady_N / k_t, v_r)
     assert z == pytest.approx(z_end * (1 - math.exp(-k_t * abs(v_r) * 500 * dt / steady_N)), rel=1e-9)
 

@@ -1,0 +1,152 @@
+"""What a diagnosis says, and its JSON form (`diagnosis/1`, fixed by the evidence contract)."""
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.findings import Finding
+
+Floats = npt.NDArray[np.float64]
+FORMAT = "diagnosis/1"
+
+
+class Estimate(NamedTuple):
+    """A fitted number and the interval that holds it with 90 % probability."""
+
+    value: float
+    interval_90: tuple[float, float]
+
+
+class Candidate(NamedTuple):
+    """One explanation: an effect of the library, `none` or `unexplained`."""
+
+    effect: str
+    probability: float
+    form: str = ""  # which formula of the effect fitted best
+    parameters: dict[str, Estimate] = {}  # names carry their units
+
+
+class Cell(NamedTuple):
+    """One place where the gap lies; the shares of all cells add up to 1."""
+
+    signal: str
+    regime: str  # stick, breakaway, slip, restick, steady
+    band_Hz: tuple[float, float]
+    run: str
+    share: float
+
+
+class Shrinkage(NamedTuple):
+    """How far one explanation closes the gap on held-out runs: (retuned - gap) / (retuned - floor)."""
+
+    who: str  # the effect or effects, "parameters alone", "flexible residual"
+    gap: float
+    shrinkage: float | None  # None: there was no gap to close
+    interval_90: tuple[float, float] | None
+
+
+class Gap(NamedTuple):
+    """The gap on held-out runs, in noise floors; 1.0 is a perfect model."""
+
+    definition: str
+    runs: tuple[str, ...]  # files of the held-out runs
+    nominal: float
+    retuned: float
+    with_effect: float
+    floor: float
+    shrinkage: float | None
+    interval_90: tuple[float, float] | None
+    compared: tuple[Shrinkage, ...]  # best effect, runner-up, parameters alone, flexible residual
+
+
+class Parameter(NamedTuple):
+    """A number of the rig table: as described, and as refitted inside its tolerance."""
+
+    name: str
+    described: float
+    retuned: float
+    tolerance: float  # one standard deviation, relative; 0: known exactly
+
+
+class Experiment(NamedTuple):
+    """What to measure next."""
+
+    what: str
+    why: str
+    gain: float | None  # how far apart the leading candidates would then be, in standard deviations
+
+
+class Curve(NamedTuple):
+    """A line or a cloud of a picture."""
+
+    label: str
+    x: Floats
+    y: Floats
+    style: Literal["measured", "nominal", "retuned", "effect", "points"]
+
+
+class Picture(NamedTuple):
+    """One picture of the report. `kind`: a cycle laid over its prediction, or a residual over what explains it."""
+
+    kind: Literal["cycle", "residual"]
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+
+
+class Diagnosis(NamedTuple):
+    """The whole answer."""
+
+    verdict: Literal["effect", "no-gap", "unexplained"]
+    effects: tuple[str, ...]
+    summary: tuple[str, ...]  # the answer in plain words, the first sentence first
+    candidates: tuple[Candidate, ...]  # most probable first; every effect of the library, none and unexplained
+    not_distinguishable: tuple[tuple[str, ...], ...]
+    where: tuple[Cell, ...]  # largest share first
+    gap: Gap
+    next_experiment: Experiment
+    rig: tuple[Parameter, ...]
+    findings: tuple[Finding, ...]
+    pictures: tuple[Picture, ...]
+    elapsed_s: float
+
+
+def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The JSON object of the contract, with `summary`, `rig` and `findings` besides; without the pictures."""
+    return {
+        "format": FORMAT,
+        "verdict": diagnosis.verdict,
+        "effects": list(diagnosis.effects),
+        "summary": list(diagnosis.summary),
+        "candidates": [_candidate(candidate) for candidate in diagnosis.candidates],
+        "not_distinguishable": [list(group) for group in diagnosis.not_distinguishable],
+        "where": [{**cell._asdict(), "band_Hz": list(cell.band_Hz)} for cell in diagnosis.where],
+        "gap": {
+            **diagnosis.gap._asdict(),
+            "runs": list(diagnosis.gap.runs),
+            "interval_90": _listed(diagnosis.gap.interval_90),
+            "compared": [{**one._asdict(), "interval_90": _listed(one.interval_90)} for one in diagnosis.gap.compared],
+        },
+        "next_experiment": diagnosis.next_experiment._asdict(),
+        "rig": [parameter._asdict() for parameter in diagnosis.rig],
+        "findings": [finding._asdict() for finding in diagnosis.findings],
+        "elapsed_s": round(diagnosis.elapsed_s, 2),
+    }
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    result: dict[str, Any] = {"effect": candidate.effect, "probability": candidate.probability}
+    if candidate.form:
+        result["form"] = candidate.form
+    if candidate.parameters:
+        result["parameters"] = {
+            name: {"value": estimate.value, "interval_90": list(estimate.interval_90)}
+            for name, estimate in candidate.parameters.items()
+        }
+    return result
+
+
+def _listed(interval: tuple[float, float] | None) -> list[float] | None:
+    return None if interval is None else list(interval)

@@ -1,0 +1,79 @@
+"""The formulas of the effects that run inside the kernel. Symbols as in the package note; `p` is the record PARAMS."""
+
+import math
+
+from bridge.kernel import Record, kernel
+
+TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def _value(index: float, seed: float) -> float:
+    """A number of unit variance that belongs to a lattice point: the same on every machine, no generator needed."""
+    mixed = math.sin(index * 12.9898 + seed * 78.233) * 43758.5453
+    return (mixed - math.floor(mixed) - 0.5) * math.sqrt(12.0)
+
+
+@kernel
+def smooth_noise(at: float, seed: float) -> float:
+    """Noise with mean 0 and variance 1, smooth, with a new value at every whole number."""
+    index = math.floor(at)
+    share = at - index
+    share = share * share * (3.0 - 2.0 * share)
+    # the mean of (1 - share)^2 + share^2 over a cell is 26/35
+    return (_value(index, seed) * (1.0 - share) + _value(index + 1.0, seed) * share) / math.sqrt(26.0 / 35.0)
+
+
+@kernel
+def level(p: Record, t_s: float, x: float, v_r: float) -> float:
+    """What the friction is multiplied by, here and now."""
+    result = 1.0 + p.drift_per_s * t_s
+    if p.drift_settling_s > 0.0:
+        result += p.drift_ratio * (1.0 - math.exp(-t_s / p.drift_settling_s))
+    if p.position_ratio != 0.0:
+        result *= 1.0 + p.position_ratio * math.sin(TWO_PI * x / p.position_wavelength_m + p.position_phase_rad)
+    if p.load_ratio != 0.0:
+        turns = p.load_frequency_Hz * t_s
+        if p.load_seed < 0.0:
+            result *= 1.0 + p.load_ratio * math.sin(TWO_PI * turns + p.load_phase_rad)
+        else:
+            result *= 1.0 + p.load_ratio * smooth_noise(2.0 * turns, p.load_seed)
+    if p.roughness_ratio != 0.0:
+        result *= 1.0 + p.roughness_ratio * smooth_noise(x / p.roughness_length_m, p.roughness_seed)
+    # noise has no bound: a slide that lifts off is not this model's
+    return max(result * (1.0 + (p.forward_ratio if v_r >= 0.0 else p.backward_ratio)), 0.01)
+
+
+@kernel
+def ageing_N(p: Record, age_s: float) -> float:
+    """How much the static friction has grown at this age of the contact."""
+    if p.age_exponent > 0.0:
+        return p.age_growth_N * age_s**p.age_exponent
+    return p.age_growth_N * math.log(1.0 + age_s / p.age_scale_s)
+
+
+@kernel
+def spring_N(p: Record, extension_m: float) -> float:
+    """Force of the drive's spring with backlash, hardening and a knee."""
+    slack = 0.5 * p.gap_m
+    e = extension_m - min(max(extension_m, -slack), slack)
+    force_N = p.k_d * e * (1.0 + p.hardening_per_m2 * e * e)
+    if p.knee_ratio != 0.0:
+        force_N += p.knee_ratio * p.k_d * (e - min(max(e, -p.knee_m), p.knee_m))
+    return force_N
+
+
+@kernel
+def elasto_plastic_share(z: float, v_r: float, g: float, k_t: float, breakaway_ratio: float) -> float:
+    """Share alpha of sliding in the bristle's motion: elastic, then a sine, 1 as in LuGre (Dupont et al. 2002, eq. 14)."""
+    elastic = 1e-6  # of 0, which the contact divides by
+    if z * v_r <= 0.0:
+        return elastic
+    reach = math.fabs(z) * k_t / g  # 1 in steady sliding
+    if reach <= breakaway_ratio:
+        return elastic
+    if reach >= 1.0:
+        return 1.0
+    return elastic + (1.0 - elastic) * (
+        0.5 + 0.5 * math.sin(math.pi * (reach - 0.5 * (1.0 + breakaway_ratio)) / (1.0 - breakaway_ratio))
+    )

@@ -1,0 +1,255 @@
+"""What a real rig does and the nominal one does not: one row an effect, off unless a rig file switches it on.
+
+A name means a mechanism; a form is one formula for it. `[effects.NAME]` in a rig file holds `form` (the first one if left
+out) and the form's parameters. Off is bit-identical to the nominal rig: effects that only change a number of the rig are
+folded into it by `plant.records.build`, the others run in a kernel of their own (`plant.core.advance_disturbed`).
+
+Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; lag: Hess & Soom 1990;
+log and power ageing, hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994.
+"""
+
+import math
+from typing import Final, Literal, NamedTuple
+
+
+class Parameter(NamedTuple):
+    """A number of a form; `low` and `high` are what a rig file may say, ends included."""
+
+    name: str  # carries its unit; `ratio` is relative to the nominal value
+    low: float
+    high: float
+    default: float
+
+
+class Form(NamedTuple):
+    """One formula of an effect."""
+
+    formula: str
+    parameters: tuple[Parameter, ...]
+
+
+class Effect(NamedTuple):
+    """A row of the library."""
+
+    acts_on: Literal["friction", "drive", "structure", "piezo", "sensor"]
+    forms: dict[str, Form]
+    drives: tuple[str, ...] = ("spring", "force")  # kinds of drive that can have it
+
+
+_TAU = 2.0 * math.pi
+_SPRING = ("spring",)
+_PHASE = Parameter("phase_rad", -_TAU, _TAU, 0.0)
+
+
+def _ratio(default: float, low: float = -0.9, high: float = 10.0) -> Parameter:
+    return Parameter("ratio", low, high, default)
+
+
+def _one(formula: str, *parameters: Parameter) -> dict[str, Form]:
+    return {"": Form(formula, parameters)}
+
+
+EFFECTS: Final[dict[str, Effect]] = {
+    "static-friction-ageing": Effect(
+        "friction",
+        {
+            "log": Form(
+                "F_s grows by ratio F_s ln(1 + age / age_scale_s)",
+                (_ratio(0.02, 0.0, 1.0), Parameter("age_scale_s", 1e-4, 100.0, 0.1)),
+            ),
+            "power": Form(
+                "F_s grows by ratio F_s (age / 1 s)^exponent",
+                (_ratio(0.04, 0.0, 1.0), Parameter("exponent", 0.05, 1.0, 0.3)),
+            ),
+        },
+    ),
+    "frictional-lag": Effect(
+        "friction", _one("the Stribeck curve sees v_r through a first-order lag", Parameter("lag_s", 0.0, 1.0, 2e-3))
+    ),
+    "viscous-friction": Effect(
+        "friction",
+        {
+            "linear": Form("F_f grows by damping v_r", (Parameter("damping_Ns_per_m", 0.0, 1e5, 5.0),)),
+            "quadratic": Form("F_f grows by damping v_r |v_r|", (Parameter("damping_Ns2_per_m2", 0.0, 1e7, 200.0),)),
+        },
+    ),
+    "position-dependent-friction": Effect(
+        "friction",
+        _one(
+            "friction times 1 + ratio sin(2 pi x / wavelength_m + phase)",
+            _ratio(0.03, 0.0, 0.9),
+            Parameter("wavelength_m", 1e-5, 1.0, 4e-3),
+            _PHASE,
+        ),
+    ),
+    "direction-dependent-friction": Effect(
+        "friction",
+        {
+            "backward": Form("friction times 1 + ratio where v_r < 0", (_ratio(0.1),)),
+            "both": Form(
+                "friction times 1 + ratio / 2 where v_r > 0, 1 - ratio / 2 where v_r < 0", (_ratio(0.1, -0.9, 0.9),)
+            ),
+        },
+    ),
+    "normal-load-fluctuation": Effect(
+        "friction",
+        {
+            "sine": Form(
+                "friction times 1 + ratio sin(2 pi frequency_Hz t + phase)",
+                (_ratio(0.03, 0.0, 0.9), Parameter("frequency_Hz", 1e-3, 1e3, 3.0), _PHASE),
+            ),
+            "random": Form(
+                "friction times 1 + ratio n(t), n smooth noise of unit rms, a new value every 1 / (2 frequency_Hz)",
+                (_ratio(0.03, 0.0, 0.9), Parameter("frequency_Hz", 1e-3, 1e3, 3.0), Parameter("seed", 0, 1e6, 1)),
+            ),
+        },
+    ),
+    "friction-drift": Effect(
+        "friction",
+        {
+            "linear": Form("friction times 1 + rate_per_s t", (Parameter("rate_per_s", -0.1, 0.1, 2e-3),)),
+            "settling": Form(
+                "friction times 1 + ratio (1 - exp(-t / settling_s))",
+                (_ratio(0.05, -0.9, 0.9), Parameter("settling_s", 0.1, 1e4, 5.0)),
+            ),
+        },
+    ),
+    "coulomb-level": Effect("friction", _one("F_c times 1 + ratio", _ratio(0.1))),
+    "static-level": Effect("friction", _one("F_s times 1 + ratio", _ratio(0.1))),
+    "stribeck-velocity": Effect("friction", _one("v_s times 1 + ratio", _ratio(0.5))),
+    "drive-damping": Effect(
+        "drive", _one("h_d grows by damping", Parameter("damping_Ns_per_m", 0.0, 1e6, 10.0)), _SPRING
+    ),
+    "drive-stiffness": Effect("drive", _one("k_d times 1 + ratio", _ratio(0.1)), _SPRING),
+    "drive-hardening": Effect(
+        "drive",
+        {
+            "cubic": Form("k_d e (1 + ratio (e / 1 mm)^2)", (_ratio(0.05, -0.2, 10.0),)),
+            "bilinear": Form(
+                "k_d e, beyond |e| = knee_m with the stiffness k_d (1 + ratio)",
+                (_ratio(0.2), Parameter("knee_m", 1e-6, 1.0, 1e-3)),
+            ),
+        },
+        _SPRING,
+    ),
+    "drive-backlash": Effect(
+        "drive", _one("no force over a gap of gap_m around e = 0", Parameter("gap_m", 0.0, 0.1, 1e-4)), _SPRING
+    ),
+    "drive-speed-ripple": Effect(
+        "drive",
+        {
+            "screw": Form(
+                "drive velocity times 1 + ratio sin(2 pi s_d / wavelength_m + phase)",
+                (_ratio(0.05, 0.0, 0.95), Parameter("wavelength_m", 1e-5, 1.0, 1e-3), _PHASE),
+            ),
+            "time": Form(
+                "drive velocity times 1 + ratio sin(2 pi frequency_Hz t + phase)",
+                (_ratio(0.05, 0.0, 0.95), Parameter("frequency_Hz", 1e-3, 1e3, 1.0), _PHASE),
+            ),
+        },
+        _SPRING,
+    ),
+    "frame-compliance": Effect(
+        "structure",
+        _one(
+            "what holds the drive yields: stiffness k_d / ratio, its own frequency and damping ratio",
+            _ratio(0.1, 0.0, 10.0),
+            Parameter("frequency_Hz", 5.0, 2000.0, 80.0),
+            Parameter("damping_ratio", 0.0, 2.0, 0.05),
+        ),
+        _SPRING,
+    ),
+    "base-compliance": Effect(
+        "structure",
+        _one(
+            "what holds the base yields under the friction force, with its own frequency and damping ratio",
+            Parameter("compliance_m_per_N", 0.0, 1e-3, 1e-6),
+            Parameter("frequency_Hz", 5.0, 2000.0, 150.0),
+            Parameter("damping_ratio", 0.0, 2.0, 0.05),
+        ),
+    ),
+    "piezo-roll-off": Effect(
+        "piezo",
+        {
+            "first-order": Form(
+                "amplitude / sqrt(1 + (f / corner_Hz)^2)", (Parameter("corner_Hz", 50.0, 1e7, 3000.0),)
+            ),
+            "second-order": Form("amplitude / (1 + (f / corner_Hz)^2)", (Parameter("corner_Hz", 50.0, 1e7, 5000.0),)),
+        },
+    ),
+    "piezo-resonance": Effect(
+        "piezo",
+        _one(
+            "amplitude times the gain of a mass on a spring",
+            Parameter("resonance_Hz", 100.0, 1e6, 8000.0),
+            Parameter("damping_ratio", 0.005, 2.0, 0.05),
+        ),
+    ),
+    "piezo-sag": Effect(
+        "piezo",
+        {
+            "load": Form("amplitude times 1 - ratio |F_d| / F_s", (_ratio(0.2, -0.9, 0.9),)),
+            "heat": Form(
+                "amplitude times 1 - ratio (1 - exp(-t / settling_s)), t since the piezo was switched on",
+                (_ratio(0.2, -0.9, 0.9), Parameter("settling_s", 0.05, 1e4, 3.0)),
+            ),
+        },
+    ),
+    "force-sensor-gain": Effect("sensor", _one("reading times 1 + ratio", _ratio(0.05))),
+    "force-sensor-bias": Effect("sensor", _one("reading plus bias_N", Parameter("bias_N", -1e5, 1e5, 0.5))),
+    "force-sensor-drift": Effect(
+        "sensor",
+        {
+            "linear": Form("reading plus rate t", (Parameter("rate_N_per_s", -1e3, 1e3, 0.05),)),
+            "settling": Form(
+                "reading plus drift_N (1 - exp(-t / settling_s))",
+                (Parameter("drift_N", -1e5, 1e5, 0.5), Parameter("settling_s", 0.1, 1e4, 5.0)),
+            ),
+        },
+    ),
+    "force-sensor-lag": Effect(
+        "sensor",
+        {
+            "first-order": Form("reading through a first-order low-pass", (Parameter("lag_s", 0.0, 1.0, 1e-3),)),
+            "second-order": Form("reading through two equal low-passes", (Parameter("lag_s", 0.0, 1.0, 5e-4),)),
+        },
+    ),
+    "force-sensor-delay": Effect("sensor", _one("reading comes delay_s later", Parameter("delay_s", 0.0, 0.012, 1e-3))),
+    "accelerometer-gain": Effect(
+        "sensor",
+        {
+            "both": Form("both accelerations times 1 + ratio", (_ratio(0.05),)),
+            "mass": Form("acceleration of the mass times 1 + ratio", (_ratio(0.05),)),
+            "base": Form("acceleration of the base times 1 + ratio", (_ratio(0.05),)),
+        },
+    ),
+}
+
+
+def first_form(name: str) -> str:
+    """The form that is meant when a rig file names none."""
+    return next(iter(EFFECTS[name].forms))
+
+
+def checked(name: str, table: dict[str, float | str]) -> dict[str, float | str]:
+    """One `[effects.NAME]` table with its form and every parameter filled in. Raises ValueError: key, value, rule, remedy."""
+    if name not in EFFECTS:
+        raise ValueError(f"effects.{name}: unknown effect; known: {', '.join(EFFECTS)}")
+    forms = EFFECTS[name].forms
+    form = table.get("form", first_form(name))
+    if form not in forms:
+        known = ", ".join(f'"{known}"' for known in forms if known) or "none; leave it out"
+        raise ValueError(f"effects.{name}.form = {form!r}: unknown form; known: {known}")
+    rows = {row.name: row for row in forms[str(form)].parameters}
+    filled: dict[str, float | str] = {"form": str(form)}
+    for key, value in table.items():
+        if key != "form" and key not in rows:
+            raise ValueError(f"effects.{name}.{key}: unknown key; known here: form, {', '.join(rows)}")
+        if key != "form" and not isinstance(value, int | float):
+            raise ValueError(f"effects.{name}.{key} = {value!r}: must be a number")
+    for row in rows.values():
+        value = float(table.get(row.name, row.default))
+        if not row.low <= value <= row.high:
+            raise ValueError(f"effects.{name}.{row.name} = {value:g}: must be from {row.low:g} to {row.high:g}")
+        filled[row.name] = value
+    return filled
