@@ -60,7 +60,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             drive: velocity of the drive [m/s], held over the block; with `force_driven` the force on the slide [N].
             frequency_Hz, amplitude_m: the command to the piezo, held over the block.
             analogue: filled with the sensors before noise and digitising, float64 [5, samples], rows as CHANNELS.
-            truth: filled with what no sensor sees, float64 [5, samples], rows as TRUTH.
+            truth: filled with what no sensor sees, float64 [6, samples], rows as TRUTH.
 
         """
         p: Record = params[0]
@@ -213,6 +213,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             truth[2, sample] = v
             truth[3, sample] = z
             truth[4, sample] = x
+            truth[5, sample] = s_d
 
         steps = samples * steps_per_sample
         s.steps += steps

@@ -18,6 +18,7 @@ TRUTH = (
     "true_velocity_mps",
     "true_bristle_m",
     "true_position_m",
+    "true_drive_position_m",
 )
 
 PARAMS = np.dtype(

@@ -25,27 +25,34 @@ class Simulation(NamedTuple):
 
 
 @kernel
-def _run(
+def run_blocks(
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],
-    drive_velocity_mps: Floats,
+    drive: Floats,
     frequency_Hz: Floats,
     amplitude_m: Floats,
     analogue: Floats,
     truth: Floats,
-    out: Floats,
 ) -> None:
-    samples = truth.shape[1]
-    for block in range(drive_velocity_mps.shape[0]):
+    """Advance a rig by many blocks.
+
+    Args:
+        params, state: one record each of `plant.records.PARAMS` and `STATE`.
+        drive, frequency_Hz, amplitude_m: what `plant.core.advance` takes, one value a block, [blocks].
+        analogue, truth: filled, [rows, blocks * samples], rows as CHANNELS and TRUTH.
+
+    """
+    samples = params[0].samples_per_block
+    for block in range(drive.shape[0]):
+        rows = slice(block * samples, (block + 1) * samples)
         if params[0].disturbed:
             advance_disturbed(
-                params, state, drive_velocity_mps[block], frequency_Hz[block], amplitude_m[block], analogue, truth
+                params, state, drive[block], frequency_Hz[block], amplitude_m[block], analogue[:, rows], truth[:, rows]
             )
         else:
-            advance(params, state, drive_velocity_mps[block], frequency_Hz[block], amplitude_m[block], analogue, truth)
-        for sample in range(samples):
-            for row in range(truth.shape[0]):
-                out[row, block * samples + sample] = truth[row, sample]
+            advance(
+                params, state, drive[block], frequency_Hz[block], amplitude_m[block], analogue[:, rows], truth[:, rows]
+            )
 
 
 def simulate(
@@ -68,13 +75,11 @@ def simulate(
     velocity_mps = drive_velocity_mps(config, t_block_s)
     on = np.arange(blocks) >= round(vibration_from_s / block_s)
     samples = solver.samples_per_block
-    out = np.empty((len(TRUTH), blocks * samples))
-    analogue = np.empty((len(CHANNELS), samples))
-    truth = np.empty((len(TRUTH), samples))
-    _run(params, state, velocity_mps, on * frequency_Hz, on * amplitude_m, analogue, truth, out)
+    truth = np.empty((len(TRUTH), blocks * samples))
+    analogue = np.empty((len(CHANNELS), blocks * samples))
+    run_blocks(params, state, velocity_mps, on * frequency_Hz, on * amplitude_m, analogue, truth)
     t_s = (np.arange(blocks * samples) + 1) * (block_s / samples)
-    drive_m = out[4] + out[0] / config.drive.stiffness_N_per_m
-    return Simulation(t_s, out[0], out[1], out[2], out[4], drive_m)
+    return Simulation(t_s, truth[0], truth[1], truth[2], truth[4], truth[5])
 
 
 def drive_velocity_mps(config: RigConfig, t_s: Floats) -> Floats:

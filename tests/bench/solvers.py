@@ -10,7 +10,7 @@ from scipy.integrate import odeint, solve_ivp
 from bridge.kernel import kernel
 from plant.config import RigConfig
 from plant.records import CHANNELS, TRUTH, build
-from plant.simulate import _run
+from plant.simulate import run_blocks
 from tests.bench import case as paper
 from tests.bench.case import Case, Floats, derivatives
 
@@ -54,13 +54,12 @@ def ours(case: Case, step_s: float) -> Run:
         each * case.frequency_Hz,
         each * case.amplitude_m,
     )
-    out = np.zeros((len(TRUTH), blocks * samples))
-    analogue, truth = np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples))
+    analogue, truth = (np.empty((len(rows), blocks * samples)) for rows in (CHANNELS, TRUTH))
     begin = time.perf_counter()
-    _run(params, state, drive, frequency, amplitude, analogue, truth, out)
+    run_blocks(params, state, drive, frequency, amplitude, analogue, truth)
     wall_s = time.perf_counter() - begin
     t_s = case.from_s + (np.arange(blocks * samples) + 1) * (BLOCK_S / samples)
-    return Run(wall_s, t_s, out[TRUTH.index("true_velocity_mps")])
+    return Run(wall_s, t_s, truth[TRUTH.index("true_velocity_mps")])
 
 
 @kernel
