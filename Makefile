@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check bench bless lock proto clean
+.PHONY: demo test check bench campaign bless lock proto clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -20,6 +20,9 @@ check: $(READY)
 
 bench: $(VENV)/.ready-bench
 	@$(BIN)/python -m tests.bench
+
+campaign: $(READY) ## hours; what has a result in OUT is not done again: make campaign OUT=runs/campaign ARGS="--cases 5"
+	@$(BIN)/python -m tests.campaign --out $(or $(OUT),runs/campaign) $(ARGS)
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v >= (3, 11) else f"$(PYTHON) is {v[0]}.{v[1]}: stickslip needs Python 3.11 or later; try make PYTHON=python3.11")'

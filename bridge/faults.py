@@ -30,7 +30,8 @@ FAULTS = {
             "NO_PEER",
             4,
             "A process waited for its peer on the bus and nobody came, or the peer went away. Check that the plant runs, "
-            "that every process names the same --endpoint and --prefix, and look at the peer's own last line.",
+            "that every process names the same --endpoint and --prefix, and look at the peer's own last line. With "
+            "--cluster: no Dask scheduler answers at that address, or it has no worker.",
         ),
         FaultKind(
             "LOG_WRITE",
@@ -76,6 +77,13 @@ FAULTS = {
             "A file of measured data cannot be read as a table, lacks a column that the channel map names, or is too "
             "large for the format that was asked for. The line names the file, the column and the row. Nothing was "
             "written.",
+        ),
+        FaultKind(
+            "DIAGNOSIS_BROKE",
+            10,
+            "The diagnosis of one folder among many ended in an error of the program itself; the line says which and where. "
+            "The other folders are not concerned. `stickslip diagnose` on that folder alone shows the whole error; please "
+            "report it together with the evidence.",
         ),
         FaultKind(
             "INTERRUPTED",

@@ -27,7 +27,7 @@ def _cache_folder() -> Path:
     """
     root = Path(__file__).parent.parent
     digest = hashlib.sha256()
-    for package in ("bridge", "controller", "plant"):
+    for package in ("bridge", "controller", "plant", "diagnosis"):
         for path in sorted((root / package).glob("*.py")):
             digest.update(path.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")

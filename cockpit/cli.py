@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from bridge.faults import FAULTS, Fault
+from cockpit.diagnose_command import diagnose
 from cockpit.log_commands import log_app
 from cockpit.processes import guarded, stop_event
 
@@ -333,6 +334,7 @@ def scenarios(as_json: Json = False) -> None:
     print("rigs: " + ", ".join(rigs))
 
 
+app.command()(diagnose)
 app.add_typer(log_app, name="log")
 
 

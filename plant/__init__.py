@@ -11,8 +11,14 @@ Symbols that appear here and nowhere else, as in the paper (A. Leus et al., long
     k_d  drive stiffness [N/m]              phi  phase of the vibration [rad]
     h_d  drive damping [N s/m]              g    steady friction force at a velocity [N]
 
-`config` is what a rig file says, `pairs` the friction pairs, `records` the derived numbers and the state. `contact` is one
-step of friction and slide, `core` one block of it with the piezo and the sensors' filters, `sensors` what the channels make
-of that, `step` the whole block with its messages, `simulate` a run without a bus, `stability` the linearised slider, `node`
-the rig as a participant of the bus, `app` the process.
+and, for what a real rig adds to that:
+
+    e      extension of the drive's spring, s_d - q - x [m]      v_lag  v_r as a lagging Stribeck curve sees it [m/s]
+    q      displacement of the frame that holds the drive [m]    age    how long the contact has been at rest [s]
+
+`config` is what a rig file says, `pairs` the friction pairs, `effects` the library of what a real rig does and the nominal
+one does not, `records` the derived numbers and the state. `contact` is one step of friction and slide, `disturb` the formulas
+of the effects, `core` one block of all that with the piezo and the sensors' filters (`advance`, the nominal rig, and
+`advance_disturbed`), `sensors` what the channels make of that, `step` the whole block with its messages, `simulate` a run
+without a bus, `stability` the linearised slider, `node` the rig as a participant of the bus, `app` the process.
 """

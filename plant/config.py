@@ -1,13 +1,14 @@
 """What a rig file may say, in human terms, with the paper's rig as the default of everything but the contact."""
 
+import math
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from bridge.config import Strict, Two, read_toml, validate
-from plant.effects import checked
+from plant.effects import LONGEST_DELAY, checked
 from plant.pairs import PAIRS
 
 Positive = Annotated[float, Field(gt=0)]
@@ -127,10 +128,13 @@ class RigConfig(Strict):
     solver: SolverConfig = SolverConfig()
     effects: dict[str, dict[str, float | str]] = {}  # [effects.NAME] as in plant/effects.py; none: the nominal rig
 
-    @field_validator("effects")
+    # before pydantic: for a value that is neither a number nor a word it has two lines
+    @model_validator(mode="before")
     @classmethod
-    def _effects_are_known(cls, effects: dict[str, dict[str, float | str]]) -> dict[str, dict[str, float | str]]:
-        return {name: checked(name, table) for name, table in effects.items()}
+    def _effects_are_known(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or not isinstance(table.get("effects"), dict):
+            return table
+        return table | {"effects": {name: checked(name, values) for name, values in table["effects"].items()}}
 
     @model_validator(mode="after")
     def _steps_fit(self) -> "RigConfig":
@@ -152,6 +156,29 @@ class RigConfig(Strict):
             raise ValueError(
                 f"solver.block_s = {solver.block_s:g}: must hold a whole number of steps between its "
                 f"{solver.samples_per_block} samples; with step_s = {solver.step_s:g} there are {steps:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _effects_fit(self) -> "RigConfig":
+        solver = self.solver
+        longest_s = LONGEST_DELAY * solver.block_s / solver.samples_per_block
+        delay_s = float(self.effects.get("force-sensor-delay", {}).get("delay_s", 0.0))
+        if delay_s > longest_s * (1.0 + 1e-9):
+            raise ValueError(
+                f"effects.force-sensor-delay.delay_s = {delay_s:g}: must not be above {LONGEST_DELAY} samples, here "
+                f"{longest_s:g}; shorten it or lower solver.samples_per_block"
+            )
+        base = self.effects.get("base-compliance", {})
+        compliance_m_per_N, frequency_Hz = base.get("compliance_m_per_N", 0.0), base.get("frequency_Hz", 0.0)
+        per_kg = float(compliance_m_per_N) * (2.0 * math.pi * float(frequency_Hz)) ** 2
+        # the bristle between two masses is stable up to four times this
+        lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
+        if per_kg * lightest_kg > 1.0:
+            raise ValueError(
+                f"effects.base-compliance.frequency_Hz = {frequency_Hz:g}: with compliance_m_per_N = "
+                f"{compliance_m_per_N:g} the base weighs {1.0 / per_kg:.2g} kg, 1 / (compliance (2 pi f)^2); must be at least "
+                f"{lightest_kg:.2g} kg with solver.step_s = {solver.step_s:g}; lower one of the three"
             )
         return self
 

@@ -24,6 +24,8 @@ def step(
     h_v: float,
     g: float,
     sliding_share: float,
+    base_give: float,
+    guarded: bool,
     pull_N: float,
     drive_velocity: float,
     base_velocity_mid: float,
@@ -38,9 +40,11 @@ def step(
     Args:
         g: steady friction force at the velocity of now, which the bristle moves towards.
         sliding_share: 1 for LuGre; less, above 0, where the bristle is still elastic, in the elasto-plastic contact.
+        base_give: mean velocity that the base gains over the step for every newton of friction [m/(N s)]; 0 if it is rigid.
+        guarded: friction may change by much of itself within a step, as it does on no rig without effects.
         z_dt: how far the bristle moves: dt, half of it in the very first step.
         pull_N: spring force of the drive in the middle of the step.
-        base_velocity_mid: of the base in the middle of the step.
+        base_velocity_mid: of the base in the middle of the step, without what it gains from friction.
         v_r, v_r_before, g_before: relative velocity now; it and g in the step before.
 
     Returns:
@@ -60,11 +64,21 @@ def step(
     per_g_mid = sliding_share * k_t / (1.5 * g - 0.5 * g_before)
     if 1.5 * v_r - 0.5 * v_r_before < 0.0:
         per_g_mid = -per_g_mid
-    z += (z - z_end) * gone
+    moved = (z - z_end) * gone
+    z += moved
     share = 1.0 - per_g_mid * z
+    if guarded and decay > 1.0:
+        # the bristle follows g at once: what it has moved, not a small difference of two that are extrapolated
+        share = moved / (v_r * z_dt)
     damping = h_t * share + h_v
+    bristle_N = k_t * z
+    if base_give > 0.0:
+        # friction moves the base while it acts: one equation for both, or the stiff damping of the contact would blow up
+        yielding = 1.0 / (1.0 + damping * base_give)
+        bristle_N *= yielding
+        damping *= yielding
     half = 0.5 * dt / m
-    v_mid = (v + half * (pull_N + h_d * drive_velocity - k_t * z + damping * base_velocity_mid)) / (
+    v_mid = (v + half * (pull_N + h_d * drive_velocity - bristle_N + damping * base_velocity_mid)) / (
         1.0 + half * (h_d + damping)
     )
     return 2.0 * v_mid - v, v_mid, z

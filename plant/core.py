@@ -37,9 +37,10 @@ def _force_reading(p: Record, s: Record, force_N: float, t_s: float) -> float:
         older = s.delay_line[(s.delay_at - int(whole) - 1) % DELAY_LINE]
         force_N = newer + (back - whole) * (older - newer)
         s.delay_at = (s.delay_at + 1) % DELAY_LINE
+    offset_N = p.force_bias_N + p.force_drift_N_per_s * t_s
     if p.force_settling_s > 0.0:
-        force_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
-    return force_N * (1.0 + p.force_ratio) + p.force_bias_N + p.force_drift_N_per_s * t_s
+        offset_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
+    return force_N * (1.0 + p.force_ratio) + offset_N
 
 
 def _compiled(disturbed: bool) -> Callable[..., None]:
@@ -87,20 +88,29 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         base_velocity_mid = 0.0
         base_accel = 0.0
         base_ramp = 0.0
+        base_free_mps = 0.0
         accel = 0.0
         drive_velocity_mps = drive
-        h_d_now, F_c_now, F_s_now, sliding_share = h_d, F_c, F_s, 1.0
+        h_d_now, F_c_now, F_s_now, sliding_share, base_give = h_d, F_c, F_s, 1.0, 0.0
         force_N = s.drive_N
         # only the disturbed kernel looks at what follows
-        t_s = s.steps * dt
+        t_s = s.t_s
         frame_m, frame_mps, base_m, base_mps, yield_mps2 = s.frame_m, s.frame_mps, s.base_m, s.base_mps, 0.0
         age_s, v_lag = s.age_s, s.v_lag
         lag_share = 1.0 - math.exp(-dt / p.lag_s) if p.lag_s > 0.0 else 1.0
         frame_omega, base_omega = TWO_PI * p.frame_Hz, TWO_PI * p.base_Hz
-        vibrating_s = s.vibrating_s + samples * steps_per_sample * dt if vibrating else 0.0
-        heat_share = 1.0
-        if disturbed and p.sag_settling_s > 0.0:
-            heat_share -= p.sag_ratio * (1.0 - math.exp(-vibrating_s / p.sag_settling_s))
+        frame_loss, base_loss = p.frame_damping_ratio * frame_omega * dt, p.base_damping_ratio * base_omega * dt
+        if disturbed and p.base_m_per_N != 0.0:  # of a mass of 1 / (compliance omega^2)
+            base_give = 0.5 * dt * p.base_m_per_N * base_omega * base_omega / (1.0 + base_loss)
+        # where friction falls at once the bristle's damper pushes: more than this, and the step would be unstable
+        least_N_per_m = k_t / (1.0 + 1.0 / (dt * h_t * (1.0 / m + 2.0 * base_give / dt))) if h_t > 0.0 else 0.0
+        block_s = samples * steps_per_sample * dt
+        vibrating_s = s.vibrating_s if vibrating else 0.0
+        heat_share, sag_per_N = 1.0, 0.0
+        if p.sag_settling_s == 0.0:
+            sag_per_N = p.sag_ratio / F_s
+        else:
+            heat_share -= p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * block_s) / p.sag_settling_s))
         if disturbed and p.force_driven:
             drive_velocity_mps = 0.0
         x, v, z, v_r, g, s_d = s.x, s.v, s.z, s.v_r, s.g, s.s_d
@@ -119,10 +129,11 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                         u0 = min(u0 + u0_step, target_m)
                     elif u0 > target_m:
                         u0 = max(u0 - u0_step, target_m)
-                    base_ramp = share * (u0 - u0_before) / dt if u0_step > 0.0 else 0.0
-                    peak = share * u0 * omega
+                    share_now = share
                     if disturbed and p.sag_ratio != 0.0:
-                        peak *= heat_share if p.sag_settling_s > 0.0 else 1.0 - p.sag_ratio * math.fabs(force_N) / p.F_s
+                        share_now *= heat_share * max(1.0 - sag_per_N * math.fabs(force_N), 0.0)
+                    base_ramp = share_now * (u0 - u0_before) / dt if u0_step > 0.0 else 0.0
+                    peak = share_now * u0 * omega
                     base_velocity = peak * cos_phi + base_ramp * sin_phi
                     base_accel = 2.0 * base_ramp * omega * cos_phi - peak * omega * sin_phi
                     cos_mid = cos_phi * cos_half - sin_phi * sin_half
@@ -132,7 +143,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     sin_phi = sin_mid * cos_half + cos_mid * sin_half
                 if disturbed:
                     if p.ripple_ratio != 0.0:
-                        turns = p.ripple_frequency_Hz * t_s
+                        turns = p.ripple_frequency_Hz * (t_s + 0.5 * dt)
                         if p.ripple_wavelength_m > 0.0:
                             turns = s_d / p.ripple_wavelength_m
                         drive_velocity_mps = drive * (
@@ -141,7 +152,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     anchor_mps = drive_velocity_mps - frame_mps
                     extension_m = s_d - frame_m - x
                     pull_N = drive if p.force_driven else spring_N(p, extension_m + 0.5 * dt * (anchor_mps - v))
-                    h_d_now = 0.0 if math.fabs(extension_m) < 0.5 * p.gap_m else h_d  # a slack drive damps nothing
+                    # a slack drive damps nothing, and a force has none
+                    h_d_now = 0.0 if p.force_driven or math.fabs(extension_m) < 0.5 * p.gap_m else h_d
                 else:
                     anchor_mps = drive_velocity_mps
                     pull_N = k_d * (s_d + 0.5 * dt * drive_velocity_mps - x - 0.5 * dt * v)
@@ -151,24 +163,31 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 base_mid_mps = base_velocity_mid
                 if disturbed:
                     v_r -= base_mps
-                    base_mid_mps += base_mps
-                    friction = level(p, t_s, x, v_r)
+                    if p.base_m_per_N != 0.0:
+                        spring_mps2 = base_omega * base_omega * (base_m + 0.5 * dt * base_mps)
+                        base_free_mps = (base_mps - 0.5 * dt * spring_mps2) / (1.0 + base_loss)
+                        base_mid_mps += base_free_mps
+                    friction = level(p, t_s, x - base_m, v_r)
                     v_lag += lag_share * (v_r - v_lag)
-                    v_g = v_lag
+                    v_g = v_lag if p.lag_s > 0.0 else v_r
                     age_s = (age_s + dt) / (1.0 + math.fabs(v_r) / p.age_length_m * dt)
                     F_c_now = F_c * friction
                     F_s_now = F_s * friction
                     if p.age_growth_N != 0.0:
-                        F_s_now += ageing_N(p, age_s)
+                        F_s_now += ageing_N(p, age_s) * friction
                     damping = h_v + p.quadratic_Ns2_per_m2 * math.fabs(v_r)
                 else:
                     damping = h_v
                 q = v_g * per_v_s
                 g = F_c_now + (F_s_now - F_c_now) * math.exp(-q * q)
+                if disturbed:
+                    least_N = least_N_per_m * math.fabs(z)
+                    g = max(g, least_N)
+                    g_before = min(g_before, 3.0 * g - 2.0 * max(least_N, 0.5 * g))  # keeps g in mid-step above both
                 if disturbed and p.elasto_plastic:
                     sliding_share = elasto_plastic_share(z, v_r, g, k_t, p.elastic_ratio)
                 v, v_mid, z = contact_step(
-                    dt, z_dt, m, h_d_now, k_t, h_t, damping, g, sliding_share,
+                    dt, z_dt, m, h_d_now, k_t, h_t, damping, g, sliding_share, base_give, disturbed,
                     pull_N, anchor_mps, base_mid_mps, v, v_r, z, v_r_before, g_before,
                 )  # fmt: skip
                 z_dt = dt
@@ -178,17 +197,20 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 # the sensors' analogue filters, each driven by its signal at the end of the step
                 if disturbed:
                     t_s += dt
+                    if p.base_m_per_N != 0.0:
+                        base_gain_mps = base_give * (pull_N + h_d_now * (anchor_mps - v_mid) - m * accel)
+                        base_mean_mps = base_free_mps + base_gain_mps
+                        base_m += dt * base_mean_mps
+                        yield_mps2 = 2.0 * (base_mean_mps - base_mps) / dt
+                        base_mps = 2.0 * base_mean_mps - base_mps
+                    frame_m += dt * frame_mps  # its velocity is that of the middle of the step
                     spring_force_N = spring_N(p, s_d - frame_m - x) + h_d_now * (anchor_mps - v)
                     force_N = drive if p.force_driven else spring_force_N
                     if p.frame_m_per_N != 0.0:  # m q'' = F_d - q / c - damping, m = 1 / (c omega^2)
-                        pushed = force_N * p.frame_m_per_N - frame_m
-                        frame_mps += dt * frame_omega * (frame_omega * pushed - 2.0 * p.frame_damping_ratio * frame_mps)
-                        frame_m += dt * frame_mps
-                    if p.base_m_per_N != 0.0:  # the same under the friction force
-                        pushed = (force_N - m * accel) * p.base_m_per_N - base_m
-                        yield_mps2 = base_omega * (base_omega * pushed - 2.0 * p.base_damping_ratio * base_mps)
-                        base_mps += dt * yield_mps2
-                        base_m += dt * base_mps
+                        per_m = dt * frame_omega * frame_omega
+                        gain_mps = per_m * (force_N * p.frame_m_per_N - frame_m) - 2.0 * frame_loss * frame_mps
+                        # implicit, as a light frame on a strong damper would blow up
+                        frame_mps += gain_mps / (1.0 + frame_loss + per_m * p.frame_m_per_N * h_d_now)
                 else:
                     force_N = k_d * (s_d - x) + h_d * (drive_velocity_mps - v)
                 force_f += force_share * (force_N - force_f)
@@ -225,7 +247,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         s.base_accel_f, s.base_accel_slow_f = base_f, base_slow_f
         if disturbed:
             s.frame_m, s.frame_mps, s.base_m, s.base_mps = frame_m, frame_mps, base_m, base_mps
-            s.age_s, s.v_lag, s.vibrating_s, s.drive_N = age_s, v_lag, vibrating_s, force_N
+            s.t_s, s.age_s, s.v_lag, s.drive_N = t_s, age_s, v_lag, force_N
+            s.vibrating_s = vibrating_s + block_s if vibrating else 0.0
 
     return advance
 

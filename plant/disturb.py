@@ -57,6 +57,10 @@ def spring_N(p: Record, extension_m: float) -> float:
     """Force of the drive's spring with backlash, hardening and a knee."""
     slack = 0.5 * p.gap_m
     e = extension_m - min(max(extension_m, -slack), slack)
+    if p.hardening_per_m2 < 0.0:
+        # beyond its largest force a softening spring would push instead of pull, the further the harder
+        yield_m = math.sqrt(-1.0 / (3.0 * p.hardening_per_m2))
+        e = min(max(e, -yield_m), yield_m)
     force_N = p.k_d * e * (1.0 + p.hardening_per_m2 * e * e)
     if p.knee_ratio != 0.0:
         force_N += p.knee_ratio * p.k_d * (e - min(max(e, -p.knee_m), p.knee_m))

@@ -9,7 +9,7 @@ log and power ageing, hardening and ripple as in Armstrong-Helouvry, Dupont & Ca
 """
 
 import math
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 
 class Parameter(NamedTuple):
@@ -35,6 +35,8 @@ class Effect(NamedTuple):
     forms: dict[str, Form]
     drives: tuple[str, ...] = ("spring", "force")  # kinds of drive that can have it
 
+
+LONGEST_DELAY = 254  # samples; 12.7 ms at 20 kHz
 
 _TAU = 2.0 * math.pi
 _SPRING = ("spring",)
@@ -124,7 +126,10 @@ EFFECTS: Final[dict[str, Effect]] = {
     "drive-hardening": Effect(
         "drive",
         {
-            "cubic": Form("k_d e (1 + ratio (e / 1 mm)^2)", (_ratio(0.05, -0.2, 10.0),)),
+            "cubic": Form(
+                "k_d e (1 + ratio (e / 1 mm)^2); a softening one yields at its largest force",
+                (_ratio(0.05, -0.2, 10.0),),
+            ),
             "bilinear": Form(
                 "k_d e, beyond |e| = knee_m with the stiffness k_d (1 + ratio)",
                 (_ratio(0.2), Parameter("knee_m", 1e-6, 1.0, 1e-3)),
@@ -180,7 +185,7 @@ EFFECTS: Final[dict[str, Effect]] = {
     "piezo-resonance": Effect(
         "piezo",
         _one(
-            "amplitude times the gain of a mass on a spring",
+            "amplitude times the gain of a mass on a spring, instead of what the rig's own mount does",
             Parameter("resonance_Hz", 100.0, 1e6, 8000.0),
             Parameter("damping_ratio", 0.005, 2.0, 0.05),
         ),
@@ -231,10 +236,12 @@ def first_form(name: str) -> str:
     return next(iter(EFFECTS[name].forms))
 
 
-def checked(name: str, table: dict[str, float | str]) -> dict[str, float | str]:
+def checked(name: str, table: Any) -> dict[str, float | str]:
     """One `[effects.NAME]` table with its form and every parameter filled in. Raises ValueError: key, value, rule, remedy."""
     if name not in EFFECTS:
         raise ValueError(f"effects.{name}: unknown effect; known: {', '.join(EFFECTS)}")
+    if not isinstance(table, dict):
+        raise ValueError(f"effects.{name} = {table!r}: must be a table; write [effects.{name}] and its keys below it")
     forms = EFFECTS[name].forms
     form = table.get("form", first_form(name))
     if form not in forms:
@@ -245,7 +252,7 @@ def checked(name: str, table: dict[str, float | str]) -> dict[str, float | str]:
     for key, value in table.items():
         if key != "form" and key not in rows:
             raise ValueError(f"effects.{name}.{key}: unknown key; known here: form, {', '.join(rows)}")
-        if key != "form" and not isinstance(value, int | float):
+        if key != "form" and (isinstance(value, bool) or not isinstance(value, int | float)):
             raise ValueError(f"effects.{name}.{key} = {value!r}: must be a number")
     for row in rows.values():
         value = float(table.get(row.name, row.default))

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from bridge.kernel import record
 from plant.config import RigConfig
+from plant.effects import LONGEST_DELAY
 
 # Rows of the array that a block fills, one column a sample. The first five are the sensors of the rig, in the order of
 # the wire; the others are what no sensor sees.
@@ -64,7 +65,7 @@ _SWITCHES = (
     *("force_bias_N", "force_drift_N_per_s", "force_drift_N", "mass_accel_ratio", "base_accel_ratio"),
 )
 
-DELAY_LINE = 256  # samples; 12.8 ms at 20 kHz, above the longest delay that a rig file may ask for
+DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the one before it, the one of now
 
 # x and z are kept half a step before v: the leapfrog of `contact`. `_f` marks what a sensor's filter remembers.
 STATE = np.dtype(
@@ -77,7 +78,7 @@ STATE = np.dtype(
             *("force_f", "mass_accel_f", "mass_accel_slow_f", "base_accel_f", "base_accel_slow_f"),
             *("mass_position_f", "drive_position_f"),
             # what the effects remember
-            *("age_s", "v_lag", "frame_m", "frame_mps", "base_m", "base_mps", "vibrating_s", "drive_N"),
+            *("age_s", "v_lag", "frame_m", "frame_mps", "base_m", "base_mps", "vibrating_s", "drive_N", "t_s"),
             *("force_lag_1", "force_lag_2"),
         )
     ]
@@ -149,9 +150,12 @@ def _add_effects(p: Any, config: RigConfig) -> None:
     p.age_scale_s = 1.0
     # ten reaches of the bristle: creep before breakaway leaves the contact its age, a slip of any size takes it
     p.age_length_m = 10.0 * contact.static_force_N / contact.stiffness_N_per_m
-    for name, table in config.effects.items():
+    # in whatever order the file names them: others are relative to these two
+    first = ("static-level", "drive-stiffness")
+    for name, table in sorted(config.effects.items(), key=lambda item: item[0] not in first):
         _add_effect(p, name, str(table["form"]), {key: float(value) for key, value in table.items() if key != "form"})
-    p.disturbed = p.elasto_plastic or any(p[name] != 0.0 for name in _SWITCHES)
+    # friction that falls below a third within a step needs the guard that only that kernel has
+    p.disturbed = p.elasto_plastic or p.F_s > 3.0 * p.F_c or any(p[name] != 0.0 for name in _SWITCHES)
 
 
 def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:

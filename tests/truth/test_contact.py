@@ -110,7 +110,9 @@ def test_the_bristle_follows_its_closed_form_at_constant_velocity(v_r):
     for _ in range(500):
         g_before = steady_N
         now = v
-        v, _, z = step(dt, dt, 1e12, 0.0, k_t, 0.0, 0.0, steady_N, 1.0, 0.0, 0.0, 0.0, v, now, z, before, g_before)
+        v, _, z = step(
+            dt, dt, 1e12, 0.0, k_t, 0.0, 0.0, steady_N, 1.0, 0.0, False, 0.0, 0.0, 0.0, v, now, z, before, g_before
+        )
         before = now
     z_end = math.copysign(steady_N / k_t, v_r)
     assert z == pytest.approx(z_end * (1 - math.exp(-k_t * abs(v_r) * 500 * dt / steady_N)), rel=1e-9)

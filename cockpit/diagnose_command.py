@@ -1,0 +1,189 @@
+"""`stickslip diagnose`: what makes a rig differ from its description; for one evidence folder or for many."""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Generator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from bridge.faults import FAULTS, Fault
+from cockpit.processes import guarded
+
+if TYPE_CHECKING:
+    from diagnosis.evidence import Evidence
+    from diagnosis.many import Outcome, Source
+    from diagnosis.result import Diagnosis
+
+_STDOUT = Path("-")
+
+
+class _Wishes(NamedTuple):
+    """What the command line asks for."""
+
+    json: Path | None
+    report: Path | None
+    apply: Path | None
+    jobs: int
+    cluster: str
+
+
+def diagnose(
+    evidence: Annotated[
+        list[Path], typer.Argument(help="Evidence folders with a manifest.toml, or a folder that holds such folders.")
+    ],
+    as_json: Annotated[Path | None, typer.Option("--json", help="Write the result here as JSON; - for stdout.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write a report, one HTML file; for many folders a folder of them.")
+    ] = None,
+    apply: Annotated[
+        Path | None, typer.Option(help="Write a rig file, .toml, that has the effect that was found.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
+    cluster: Annotated[
+        str, typer.Option(help="Dask scheduler, e.g. tcp://127.0.0.1:8786; its workers read the folders themselves.")
+    ] = "",
+) -> None:
+    """Say what makes a rig differ from its description: the effect, how sure, how much of the gap it closes."""
+
+    def work() -> int:
+        from joblib import cpu_count
+
+        from diagnosis.many import find_sources
+
+        # killed politely is like Ctrl-C: the workers end too
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster)
+        sources = find_sources(evidence)
+        one = len(evidence) == 1 and sources[0].folder == evidence[0].resolve()
+        _check_destinations(wishes, one)
+        return _diagnose_one(sources[0], wishes) if one else _diagnose_many(sources, wishes)
+
+    sys.exit(guarded(work, as_json == _STDOUT))
+
+
+def _check_destinations(wishes: _Wishes, one: bool) -> None:
+    """Refuse now what could not be written after minutes of work. Raises Fault CONFIG or LOG_WRITE."""
+    if wishes.apply is not None and not one:
+        raise Fault(
+            "CONFIG", f"--apply {wishes.apply}: takes one evidence folder; a rig file has the effects of one rig"
+        )
+    for option, path in (("--json", wishes.json), ("--report", wishes.report), ("--apply", wishes.apply)):
+        if path is None or path == _STDOUT:
+            continue
+        folder_wanted = option == "--report" and not one
+        if path.exists() and path.is_dir() != folder_wanted:
+            rule = "must be a folder, one report for each evidence" if folder_wanted else "must be a file, not a folder"
+            raise Fault("CONFIG", f"{option} {path}: {rule}; choose another")
+        above = next(parent for parent in (path, *path.absolute().parents) if parent.exists())
+        if not os.access(above, os.W_OK) or (above != path and not above.is_dir()):
+            raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {above} does not allow it; choose another")
+
+
+def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
+    from cockpit.diagnose_output import in_words, watched
+    from diagnosis.evidence import load_evidence
+    from diagnosis.report import write_report
+    from diagnosis.result import to_json
+
+    evidence = load_evidence(source.folder)
+    with watched() as progress:
+        diagnosis = _result(source, evidence, wishes, progress)
+    written: list[str] = []
+    with _writing():
+        if wishes.json is not None:
+            _write_json(wishes.json, to_json(diagnosis))
+        if wishes.report is not None:
+            write_report(diagnosis, source.name, wishes.report)
+            written.append(f"report     {wishes.report}")
+    if wishes.json != _STDOUT:
+        print("\n".join(in_words(diagnosis) + written))
+    if wishes.apply is not None:
+        from diagnosis.apply import write_rig
+
+        with _writing():
+            write_rig(diagnosis, evidence, wishes.apply)
+        if wishes.json != _STDOUT:
+            print(f"rig file   {wishes.apply}")
+    return 0
+
+
+def _result(
+    source: "Source", evidence: "Evidence", wishes: _Wishes, progress: Callable[[str, float], None]
+) -> "Diagnosis":
+    from diagnosis import many
+
+    if not wishes.cluster:
+        return many.real_diagnose(evidence, progress, wishes.jobs)
+    with closing(many.diagnose_many([source], 1, wishes.cluster, many.real_diagnose)) as outcomes:
+        outcome = next(outcomes)
+    if outcome.diagnosis is None:
+        raise Fault(*(outcome.fault or ("PEER_DIED", "")))
+    return outcome.diagnosis
+
+
+def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
+    from cockpit.diagnose_output import in_a_line, many_as_json, watched
+    from diagnosis import many
+    from diagnosis.report import write_report
+
+    found: dict[str, Outcome] = {}
+    with (
+        watched() as progress,
+        closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, many.real_diagnose)) as outcomes,
+    ):
+        for outcome in outcomes:
+            name = outcome.source.name
+            if outcome.diagnosis is not None and wishes.report is not None:
+                with _writing():
+                    write_report(outcome.diagnosis, name, wishes.report / f"{_file_name(name)}.html")
+            found[name] = _without_pictures(outcome)
+            progress(f"{len(found)} of {len(sources)}: {in_a_line(outcome)}", len(found) / len(sources))
+    results = [found[source.name] for source in sources]
+    if wishes.json is not None:
+        with _writing():
+            _write_json(wishes.json, many_as_json(results))
+    if wishes.json != _STDOUT:
+        print("\n".join(in_a_line(outcome) for outcome in results))
+        if wishes.report is not None:
+            print(f"reports    {wishes.report}")
+    codes = [outcome.fault[0] for outcome in results if outcome.fault is not None]
+    # bad evidence first: that is what the person who called can mend
+    return min((FAULTS[code].exit_status for code in codes), default=0)
+
+
+def _without_pictures(outcome: "Outcome") -> "Outcome":
+    """Pictures are by far the largest part, and hundreds of folders are meant to fit into memory."""
+    return outcome._replace(diagnosis=outcome.diagnosis and outcome.diagnosis._replace(pictures=()))
+
+
+def _file_name(name: str) -> str:
+    """A name that is a path, because several folders have the same, as the name of a file."""
+    return name.strip("/").replace("/", "_")
+
+
+def _write_json(path: Path, value: dict[str, Any]) -> None:
+    from cockpit.diagnose_output import strict_json
+    from diagnosis.report import write_whole
+
+    text = json.dumps(strict_json(value), allow_nan=False, indent=1)
+    if path == _STDOUT:
+        print(text)
+    else:
+        write_whole(path, text + "\n")
+
+
+@contextmanager
+def _writing() -> Generator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise Fault(
+            "LOG_WRITE", f"{error.filename}: cannot be written: {error.strerror}; choose another place"
+        ) from None

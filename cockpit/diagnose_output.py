@@ -1,0 +1,92 @@
+"""What `stickslip diagnose` shows and writes: progress, the answer in words, one line a folder, strict JSON."""
+
+import math
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from diagnosis import wording
+from diagnosis.result import to_json
+
+if TYPE_CHECKING:
+    from diagnosis.many import Outcome
+    from diagnosis.result import Diagnosis
+
+MANY_FORMAT = "diagnoses/1"
+_SHOWN_CANDIDATES = 3
+
+
+def in_words(diagnosis: "Diagnosis") -> list[str]:
+    """The verdict first, then the leading candidates, the gap, and what to measure next."""
+    gap, after = diagnosis.gap, diagnosis.next_experiment
+    lines = [wording.headline(diagnosis), *diagnosis.summary]
+    for label, one in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
+        sizes = "; ".join(wording.estimate_in_words(*item) for item in one.parameters.items())
+        lines.append(f"{label:<10} {one.effect:<28} {wording.percent(one.probability):>8}   {sizes}".rstrip())
+    shrinkage = "" if gap.shrinkage is None else f"; {wording.percent(gap.shrinkage)} of the gap closed"
+    lines.append(
+        f"gap        {wording.times(gap.nominal)} as described, {wording.times(gap.retuned)} retuned, "
+        f"{wording.times(gap.with_effect)} with the best explanation; perfect is {wording.times(gap.floor)}{shrinkage}"
+    )
+    return [*lines, f"next       {after.what} {after.why}"]
+
+
+def in_a_line(outcome: "Outcome") -> str:
+    """What became of one folder among many."""
+    if outcome.diagnosis is not None:
+        return f"{outcome.source.name}: {wording.headline(outcome.diagnosis)}"
+    code, line = outcome.fault or ("", "")
+    return f"{outcome.source.name}: {code}: {line}"
+
+
+def many_as_json(outcomes: "list[Outcome]") -> dict[str, Any]:
+    """The JSON object for many folders, in the order given."""
+    return {"format": MANY_FORMAT, "results": [_as_json(outcome) for outcome in outcomes]}
+
+
+def _as_json(outcome: "Outcome") -> dict[str, Any]:
+    if outcome.diagnosis is not None:
+        return {"evidence": outcome.source.name, "diagnosis": to_json(outcome.diagnosis)}
+    code, line = outcome.fault or ("", "")
+    return {"evidence": outcome.source.name, "fault": {"fault": code, "line": line}}
+
+
+def strict_json(value: Any) -> Any:
+    """`value` with null for NaN and infinity, which JSON does not know."""
+    if isinstance(value, dict):
+        return {key: strict_json(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict_json(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@contextmanager
+def watched() -> Generator[Callable[[str, float], None]]:
+    """What is known so far, line by line on stderr, with a bar below for a person who watches."""
+    last = ""
+    if not sys.stderr.isatty():
+
+        def to_file(text: str, _share: float) -> None:
+            nonlocal last
+            if text != last:
+                print(text, file=sys.stderr, flush=True)
+            last = text
+
+        yield to_file
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def to_terminal(text: str, share: float) -> None:
+            nonlocal last
+            if text != last:
+                bar.console.print(text, markup=False, highlight=False)
+            last = text
+            bar.update(task, completed=share)
+
+        yield to_terminal

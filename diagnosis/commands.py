@@ -1,0 +1,134 @@
+"""What the rig was told: drive and vibration on the 1 ms grid, and the segments in which neither changes.
+
+The drive is taken as even between changes of speed: an uneven drive is a gap, not an input. Where the manifest gives no
+velocity, it is read from the drive position as pieces of constant velocity.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.evidence import Run
+from diagnosis.manifest import RigTable
+from diagnosis.reduced import BLOCK_S
+
+Floats = npt.NDArray[np.float64]
+_WINDOW = 100  # blocks: 0.1 s, over which a velocity is read from a position with noise
+# A change of speed is one when it is larger than this share of the faster speed; a ripple of a screw stays below.
+_SMALLEST_CHANGE = 0.35
+_SHORTEST_S = 0.3
+
+
+class Segment(NamedTuple):
+    """Blocks [first, last) of constant drive and vibration."""
+
+    first: int
+    last: int
+    drive_velocity_mps: float  # 0 with a force drive
+    frequency_Hz: float
+    amplitude_m: float
+    settled: int = 0  # block from which levels count: behind the first slip of a run, whose climb is the start's
+
+    @property
+    def at_the_edge(self) -> bool:
+        """Whether v_a is within a tenth of v_d, where stick-slip is about to end and every detail decides."""
+        v_a = 2.0 * np.pi * self.frequency_Hz * self.amplitude_m
+        return abs(v_a - abs(self.drive_velocity_mps)) < 0.1 * abs(self.drive_velocity_mps)
+
+    @property
+    def sign(self) -> float:
+        """Direction of the drive."""
+        return -1.0 if self.drive_velocity_mps < 0.0 else 1.0
+
+
+class Commands(NamedTuple):
+    """One value a block, and the segments in time order."""
+
+    drive: Floats  # velocity [m/s], or force [N] with a force drive
+    frequency_Hz: Floats
+    amplitude_m: Floats
+    segments: tuple[Segment, ...]
+
+
+def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands:
+    """The commands of a run, from its columns and the velocity that the manifest states."""
+    blocks = len(next(iter(reduced.values())))
+    t_s = run.t_s[0] + (np.arange(blocks) + 0.5) * BLOCK_S
+    frequency_Hz, amplitude_m = np.zeros(blocks), np.zeros(blocks)
+    if "vibration_frequency_Hz" in run.columns and "vibration_amplitude_m" in run.columns:
+        at = np.minimum(np.searchsorted(run.t_s, t_s), len(run.t_s) - 1)
+        amplitude_m = run.columns["vibration_amplitude_m"][at]
+        frequency_Hz = np.where(amplitude_m > 0.0, run.columns["vibration_frequency_Hz"][at], 0.0)
+        amplitude_m = np.where(frequency_Hz > 0.0, amplitude_m, 0.0)
+    if rig.drive == "force":
+        drive = reduced["drive_force_N"]
+        return Commands(drive, frequency_Hz, amplitude_m, (Segment(0, blocks, 0.0, 0.0, 0.0),))
+    if run.drive_velocity_mps is not None:
+        drive = np.full(blocks, run.drive_velocity_mps)
+    else:
+        drive = _pieces(reduced["drive_position_m"])
+    change = (np.diff(drive) != 0.0) | (np.diff(frequency_Hz) != 0.0) | (np.diff(amplitude_m) != 0.0)
+    edges = [0, *(np.flatnonzero(change) + 1).tolist(), blocks]
+    segments = tuple(
+        Segment(first, last, float(drive[first]), float(frequency_Hz[first]), float(amplitude_m[first]))
+        for first, last in pairwise(edges)
+        if (last - first) * BLOCK_S >= _SHORTEST_S
+    )
+    return Commands(drive, frequency_Hz, amplitude_m, segments)
+
+
+def _pieces(position_m: Floats) -> Floats:
+    """Velocity [m/s] a block: constant between changes of speed."""
+    blocks = len(position_m)
+    if blocks < 4 * _WINDOW:
+        return np.full(blocks, _slope(position_m))
+    windows = blocks // _WINDOW
+    velocity = np.array([_slope(position_m[i * _WINDOW : (i + 1) * _WINDOW]) for i in range(windows)])
+    edges = [0, *_changes(velocity, 0, windows, float(np.abs(velocity).max())), windows]
+    knots = [0]
+    lines: list[tuple[float, float]] = []
+    for first, last in pairwise(edges):
+        # the outer windows of a piece may hold the change itself
+        inner = slice(
+            (first + (first > 0)) * _WINDOW, (last - (last < windows)) * _WINDOW if last < windows else blocks
+        )
+        at = np.arange(blocks)[inner]
+        slope, offset = np.polyfit(at, position_m[inner], 1)
+        if lines:
+            before_slope, before_offset = lines[-1]
+            crossing = (offset - before_offset) / (before_slope - slope)
+            knots.append(round(float(np.clip(crossing, (first - 1) * _WINDOW, (first + 1) * _WINDOW))))
+        lines.append((float(slope), float(offset)))
+    knots.append(blocks)
+    result = np.empty(blocks)
+    for (slope, _), first, last in zip(lines, knots[:-1], knots[1:], strict=True):
+        result[first:last] = slope / BLOCK_S
+    return result
+
+
+def _changes(velocity: Floats, first: int, last: int, fastest: float) -> list[int]:
+    """Binary segmentation: windows at which the mean velocity changes for good."""
+    shortest = 3
+    if last - first < 2 * shortest:
+        return []
+    best, best_gain = 0, 0.0
+    total = velocity[first:last]
+    for cut in range(first + shortest, last - shortest + 1):
+        left, right = velocity[first:cut], velocity[cut:last]
+        gain = total.var() * len(total) - left.var() * len(left) - right.var() * len(right)
+        if gain > best_gain:
+            best, best_gain = cut, float(gain)
+    if best == 0:
+        return []
+    left = float(np.median(velocity[first:best]))
+    right = float(np.median(velocity[best:last]))
+    # a window on the change itself spoils neither median; a stop counts against the fastest speed of the run
+    if abs(left - right) < max(_SMALLEST_CHANGE * max(abs(left), abs(right)), 0.01 * fastest):
+        return []
+    return [*_changes(velocity, first, best, fastest), best, *_changes(velocity, best, last, fastest)]
+
+
+def _slope(values: Floats) -> float:
+    return float(np.polyfit(np.arange(len(values)), values, 1)[0]) / BLOCK_S

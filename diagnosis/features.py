@@ -1,0 +1,303 @@
+"""What a run looks like, in numbers that do not depend on when its slips happen.
+
+Everything is taken per segment of constant command: means and trends over the cycles, shapes aligned at the middle of a
+slip, the level over time where nothing slips, the vibration that arrives; and per run the parity relations between channels
+that need no friction model. A measured and a predicted run pass through the same code; a feature that one of them does not
+have is NaN.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import lfilter
+
+from diagnosis.commands import Commands, Segment
+from diagnosis.cycles import turning_points
+from diagnosis.reduced import BLOCK_S
+
+Floats = npt.NDArray[np.float64]
+Signals = dict[str, Floats]
+Band = tuple[float, float]
+LOW: Band = (0.0, 5.0)
+MIDDLE: Band = (5.0, 50.0)
+HIGH: Band = (50.0, 500.0)
+# instants of a slip at which its shape is read, in half periods of the mass on its spring after the middle of the fall
+SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
+_SETTLING_BLOCKS = 100  # after a change of command: 0.1 s, in which a drive or a piezo may still be moving
+_LEVELS = 8  # bins of a segment without slips
+_BREAKAWAY_WAVES = 5
+_DRIVE_WAVES = 24
+
+
+class Feature(NamedTuple):
+    """What a number of the vector is, and where it belongs."""
+
+    name: str
+    signal: str
+    regime: str  # stick, breakaway, slip, restick, steady
+    band_Hz: Band
+    segment: int  # of the run; -1: the whole run
+
+
+class Scales(NamedTuple):
+    """Typical numbers of a rig, by which windows are sized and logarithms kept finite."""
+
+    force_N: float  # static friction
+    slip_s: float  # half a period of the mass on its spring
+    drop_N: float  # smallest fall of the force that is a slip
+    stiffness_N_per_m: float
+
+
+class Features:
+    """Collects features of one run."""
+
+    def __init__(self) -> None:
+        self.labels: list[Feature] = []
+        self.values: list[float] = []
+
+    def add(self, name: str, signal: str, regime: str, band_Hz: Band, segment: int, value: float) -> None:
+        """Append one number; NaN where this run has no such thing."""
+        self.labels.append(Feature(name, signal, regime, band_Hz, segment))
+        self.values.append(value)
+
+
+class _Slips(NamedTuple):
+    """The slips of a segment: blocks of breakaway and re-stick, and where half of the fall is done."""
+
+    tops: npt.NDArray[np.int64]
+    bottoms: npt.NDArray[np.int64]
+    middles: Floats
+
+
+def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Features:
+    """All features of a run with a spring drive; which ones, depends on commands and channels only."""
+    found = Features()
+    for number, segment in enumerate(commands.segments):
+        first = segment.first + (_SETTLING_BLOCKS if segment.first else 0)
+        cut = {
+            name: values[first : segment.last]
+            if name.endswith("shake_mps2")
+            else segment.sign * values[first : segment.last]
+            for name, values in signals.items()
+        }
+        slips = _find_slips(cut, scales)
+        if "drive_force_N" in cut:
+            _cycles(found, number, cut["drive_force_N"], slips)
+            settled = max(segment.settled - first, 0)
+            _level(found, number, cut["drive_force_N"][settled:], slips, segment.at_the_edge)
+        _period(found, number, slips)
+        _shapes(found, number, cut, slips, scales)
+        if segment.frequency_Hz > 0.0:
+            _vibration(found, number, cut)
+    _parity(found, signals, scales)
+    if "drive_position_m" in signals:
+        _drive(found, signals["drive_position_m"], commands)
+    return found
+
+
+def first_restick(signals: Signals, segment: Segment, scales: Scales) -> int:
+    """Block of the first re-stick in a segment, its first block if nothing slips there."""
+    cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
+    slips = _find_slips(cut, scales)
+    return segment.first + int(slips.bottoms[0]) if len(slips.bottoms) else segment.first
+
+
+def _find_slips(cut: Signals, scales: Scales) -> _Slips:
+    if "drive_force_N" in cut:
+        falling = cut["drive_force_N"]
+        tops, bottoms = turning_points(falling, scales.drop_N)
+    else:
+        # no force: the slide's velocity, an integral that leaks over two slips, rises and falls once a slip
+        keep = math.exp(-BLOCK_S / (2.0 * scales.slip_s))
+        falling = -np.asarray(lfilter([BLOCK_S], [1.0, -keep], cut["mass_accel_mps2"]))
+        swing_mps = scales.drop_N / math.sqrt(scales.force_N / 9.81 * scales.stiffness_N_per_m)
+        tops, bottoms = turning_points(falling, max(0.3 * float(np.ptp(falling)), swing_mps))
+    tops = tops[: len(bottoms)]
+    # what takes ten times as long as a slip is a change of level
+    quick = (bottoms - tops) * BLOCK_S < 10.0 * scales.slip_s
+    tops, bottoms = tops[quick], bottoms[quick]
+    middles = np.empty(len(tops))
+    for i, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
+        half = 0.5 * (falling[top] + falling[bottom])
+        under = top + int(np.argmax(falling[top : bottom + 1] <= half))
+        step = falling[under - 1] - falling[under]
+        middles[i] = under - (half - falling[under]) / step if step > 0.0 else under
+    return _Slips(tops, bottoms, middles)
+
+
+def _cycles(found: Features, number: int, force_N: Floats, slips: _Slips) -> None:
+    name = "drive_force_N"
+    for regime, at, waves in (("breakaway", slips.tops, _BREAKAWAY_WAVES), ("restick", slips.bottoms, 3)):
+        values = force_N[at]
+        moments = _moments(values, at / len(force_N), waves)
+        found.add("mean", name, regime, LOW, number, moments[0])
+        for wave, value in enumerate(moments[1:-1], start=1):
+            found.add(f"wave {wave}", name, regime, LOW, number, value)
+        found.add("scatter", name, regime, LOW, number, moments[-1])
+    # the climb between a re-stick and the next breakaway, in three parts
+    rates = np.full(3, np.nan)
+    if len(slips.tops) > 1:
+        start, end = slips.bottoms[:-1], slips.tops[1:]
+        level = [force_N[(start + share * (end - start)).astype(np.int64)] for share in (0.1, 0.4, 0.7, 0.95)]
+        length = (end - start) * BLOCK_S
+        parts = zip(level[:-1], level[1:], (0.3, 0.3, 0.25), strict=True)
+        rates = np.array([float(np.median((high - low) / (share * length))) for low, high, share in parts])
+    for part, rate in zip(("early", "middle", "late"), rates, strict=True):
+        found.add(f"rate {part}", name, "stick", LOW, number, float(rate))
+
+
+def _moments(values: Floats, at: Floats, waves: int) -> list[float]:
+    """Mean, cosine waves over the segment as far as the cycles carry them, and the log scatter of what is left."""
+    n = len(values)
+    result = [math.nan] * (waves + 2)
+    if n == 0:
+        return result
+    result[0] = float(values.mean())
+    carried = min(waves, max(n // 2 - 1, 0)) if n >= 4 else 0
+    columns = np.cos(np.pi * np.outer(at, np.arange(carried + 1)))
+    weights, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    result[1 : 1 + carried] = weights[1:].tolist()
+    if n >= 6:
+        left = values - columns @ weights
+        result[-1] = 0.5 * math.log(float(left @ left) / (n - carried - 1) + 1e-12)
+    return result
+
+
+def _period(found: Features, number: int, slips: _Slips) -> None:
+    periods_s = np.diff(slips.middles) * BLOCK_S
+    found.add(
+        "period", "drive_force_N", "stick", LOW, number, float(np.log(periods_s.mean())) if len(periods_s) else math.nan
+    )
+    some = len(slips.tops) > 0
+    length_s = float((slips.bottoms - slips.tops).mean()) * BLOCK_S if some else math.nan
+    found.add("duration", "drive_force_N", "slip", MIDDLE, number, length_s)
+
+
+def _level(found: Features, number: int, force_N: Floats, slips: _Slips, at_the_edge: bool) -> None:
+    name = "drive_force_N"
+    found.add("mean level", name, "steady", LOW, number, float(force_N.mean()))
+    found.add("deviation", name, "steady", LOW, number, float(force_N.std()))
+    low, high = np.quantile(force_N, (0.05, 0.95))
+    found.add("low level", name, "steady", LOW, number, float(low))
+    found.add("high level", name, "steady", LOW, number, float(high))
+    still = len(slips.tops) == 0 and not at_the_edge
+    edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64)
+    for bin_ in range(_LEVELS):
+        value = float(force_N[edges[bin_] : edges[bin_ + 1]].mean()) if still else math.nan
+        found.add(f"level {bin_}", name, "steady", LOW, number, value)
+    if still:
+        short, long = uniform_filter1d(force_N, 5), uniform_filter1d(force_N, 100)
+        middle, high = (
+            0.5 * math.log(float(np.var(short - long)) + 1e-12),
+            0.5 * math.log(float(np.var(force_N - short)) + 1e-12),
+        )
+    else:
+        middle, high = math.nan, math.nan
+    found.add("ripple", name, "steady", MIDDLE, number, middle)
+    found.add("ripple", name, "steady", HIGH, number, high)
+
+
+def _regime(at: float) -> str:
+    return "breakaway" if at < -0.4 else "slip" if at < 0.6 else "restick"
+
+
+def _shapes(found: Features, number: int, cut: Signals, slips: _Slips, scales: Scales) -> None:
+    width = scales.slip_s / BLOCK_S
+    names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]
+    if not names:
+        return
+    blocks = len(cut[names[0]])
+    inside = (slips.middles + SHAPE_AT[0] * width >= 0) & (slips.middles + SHAPE_AT[-1] * width <= blocks - 1)
+    at = slips.middles[inside, None] + SHAPE_AT * width
+    some = bool(inside.any())
+    for name in names:
+        signal = cut[name]
+        shape = np.full(len(SHAPE_AT), np.nan)
+        ring = math.nan
+        if some:
+            shape = np.interp(at.ravel(), np.arange(blocks), signal).reshape(at.shape).mean(axis=0)
+            fast = signal - uniform_filter1d(signal, 5)
+            near = (slips.middles[inside, None] + np.arange(int(3.0 * width))).astype(np.int64)
+            ring = 0.5 * math.log(float(np.mean(fast[np.minimum(near, blocks - 1)] ** 2)) + 1e-18)
+        if name == "drive_force_N":
+            shape = shape - shape.mean()
+        if name == "mass_position_m":
+            shape = shape - shape[0]
+        for instant, value in zip(SHAPE_AT, shape, strict=True):
+            found.add(f"shape {instant:g}", name, _regime(instant), MIDDLE, number, float(value))
+        found.add("ring", name, "restick", HIGH, number, ring)
+
+
+def _vibration(found: Features, number: int, cut: Signals) -> None:
+    for name, source in (("base_shake_mps2", "base_accel_mps2"), ("mass_shake_mps2", "mass_accel_mps2")):
+        if name not in cut:
+            continue
+        shake = cut[name]
+        mean = float(shake.mean())
+        found.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
+        if source == "base_accel_mps2":
+            time = np.linspace(-1.0, 1.0, len(shake))
+            found.add(
+                "vibration over time", source, "steady", HIGH, number, float(shake @ time) / (mean * len(shake) / 3.0)
+            )
+            if "drive_force_N" in cut:
+                force = cut["drive_force_N"] - cut["drive_force_N"].mean()
+                slope = float(shake @ force) / (mean * (float(force @ force) + 1e-9))
+                found.add("vibration over force", source, "steady", HIGH, number, slope)
+
+
+def _parity(found: Features, signals: Signals, scales: Scales) -> None:
+    """Force against extension, its rate, its cube, the direction and time: a massless linear spring has the first only."""
+    if not {"drive_force_N", "mass_position_m", "drive_position_m"} <= signals.keys():
+        return
+    force_N = signals["drive_force_N"]
+    extension_m = signals["drive_position_m"] - signals["mass_position_m"]
+    extension_m = extension_m - extension_m.mean() + force_N.mean() / scales.stiffness_N_per_m
+    smooth = uniform_filter1d(extension_m, 5)
+    rate_mps = np.gradient(smooth, BLOCK_S)
+    reach_m = scales.force_N / scales.stiffness_N_per_m
+    both = force_N.min() < -0.3 * scales.force_N and force_N.max() > 0.3 * scales.force_N
+    columns = [
+        np.ones_like(force_N),
+        extension_m / reach_m,
+        rate_mps * 1e3,
+        (extension_m / reach_m) ** 3,
+        np.linspace(-1.0, 1.0, len(force_N)),
+    ]
+    if both:
+        columns.append(np.sign(force_N))
+    matrix = np.stack(columns, axis=1)
+    weights, *_ = np.linalg.lstsq(matrix, force_N, rcond=None)
+    left = force_N - matrix @ weights
+    names = ("stiffness", "rate", "cube", "time", "direction")
+    values = [*weights[1:].tolist(), math.nan][: len(names)]
+    for name, value in zip(names, values, strict=True):
+        found.add(f"spring {name}", "drive_force_N", "stick", LOW, -1, value)
+    found.add("spring rest", "drive_force_N", "stick", MIDDLE, -1, 0.5 * math.log(float(left.var()) + 1e-12))
+
+
+def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
+    """Waves of what the drive position does besides its even path."""
+    rest_m = np.zeros_like(position_m)
+    for segment in commands.segments:
+        rows = slice(segment.first, segment.last)
+        rest_m[rows] = _without_line(position_m[rows], segment)
+    time = (np.arange(len(rest_m)) + 0.5) / len(rest_m)
+    for wave in range(1, _DRIVE_WAVES + 1):
+        value = 2.0 * float(rest_m @ np.cos(np.pi * wave * time)) / len(rest_m)
+        found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
+    fast = rest_m - uniform_filter1d(rest_m, 100)
+    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, 0.5 * math.log(float(fast.var()) + 1e-18))
+
+
+def _without_line(position_m: Floats, segment: Segment) -> Floats:
+    at = np.linspace(-1.0, 1.0, segment.last - segment.first)
+    # a bow is the displacement sensor's linearity; the line its zero and the speed
+    bow = at * at - 1.0 / 3.0
+    rest = position_m - position_m.mean()
+    for column in (at, bow):
+        rest = rest - column * (float(rest @ column) / float(column @ column))
+    return rest

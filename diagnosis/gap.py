@@ -1,0 +1,172 @@
+"""The gap, defined once.
+
+A measured run and its prediction are compared feature by feature (`diagnosis.features`), since a sample-by-sample difference of
+two stick-slip records measures their phase: 0.1 % more static friction makes it as large as the signal after a few cycles while
+every cycle looks the same.
+
+Each difference is divided by its floor: the scatter that the feature shows among replicates of the model itself, which differ
+by sensor noise as measured, by the rough surface, and by the age of the contact at the start, and never less than what the
+1 ms grid and ordinary sensors can promise. The gap is the root of the mean square of these over cells of signal x regime x
+band x run, each cell counting alike, so that a shape of 14 points weighs no more than one mean level:
+
+    gap = sqrt(mean over cells of mean over the cell's features of T(difference / floor)^2),  T(z) = 6 asinh(z / 6)
+
+A perfect model shows 1.0, because replicates differ from each other as the rig differs from the model. T is the identity up to
+a few floors and a logarithm beyond: a drive that ripples by 500 floors of a laser-straight position says no more than one that
+ripples by 50, and must not hide everything else.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.features import Feature
+from diagnosis.problem import Draw, Point, Problem
+from diagnosis.twin import Roughness
+
+Floats = npt.NDArray[np.float64]
+DEFINITION = (
+    "root mean square, over cells of signal x regime x band x run, of the differences between measured and predicted "
+    "features (cycle means and trends, slip shapes, levels, vibration, parity relations), each in units of the scatter of "
+    "replicates of the model with measured noise and a rough surface; beyond 6 units logarithmic; 1.0 is a perfect model"
+)
+_KNEE = 6.0
+_MISSING = 4.0  # floors, where the rig shows something that the model does not
+_FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
+CellKey = tuple[str, str, tuple[float, float], str]
+
+
+class Floor(NamedTuple):
+    """What a perfect model would still show, feature by feature. [features] each, of the problem it was made for."""
+
+    bias: Floats  # mean of the replicates less the noise-free prediction
+    scatter: Floats
+    compared: npt.NDArray[np.bool_]
+    whitening: Floats  # [compared, compared]: makes differences of replicates independent
+    cells: tuple[CellKey, ...]  # of every compared feature
+    level: float  # gap of the replicates themselves
+
+
+def compress(z: Floats) -> Floats:
+    """T of the definition."""
+    return _KNEE * np.arcsinh(z / _KNEE)
+
+
+def slope_of_compress(z: Floats) -> Floats:
+    """Its derivative."""
+    return 1.0 / np.sqrt(1.0 + (z / _KNEE) ** 2)
+
+
+def replicates(problem: Problem, point: Point, roughness: Roughness, count: int, seed: int) -> Floats:
+    """Runs of one model on other surfaces with other noise, [count, features]."""
+    drawn: list[Floats] = []
+    for number in range(count):
+        random = np.random.default_rng([seed, number])
+        length_m = float(roughness.length_m * np.exp(random.uniform(-1.0, 1.0)))
+        surface = Roughness(roughness.ratio, length_m, int(random.integers(1_000_000)))
+        drawn.append(problem.predicted(point, Draw(random, surface)))
+    return np.array(drawn)
+
+
+def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
+    """The floor from replicates of the model at `point`, [count, features]."""
+    plain = problem.predicted(point)
+    finite = np.isfinite(drawn)
+    compared = (finite.mean(axis=0) >= _FEWEST_FINITE) & np.isfinite(plain) & np.isfinite(problem.measured)
+    count = np.maximum(finite.sum(axis=0), 1)
+    filled = np.where(finite, drawn, 0.0)
+    mean = filled.sum(axis=0) / count
+    about = np.where(finite, drawn - mean, 0.0)
+    spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
+    labels = problem.labels
+    least = np.array([_least(label, problem) for _, label in labels])
+    scatter = np.hypot(spread, least)
+    z = compress(about[:, compared] / scatter[compared])
+    cells = tuple(
+        (label.signal, label.regime, label.band_Hz, file)
+        for (file, label), use in zip(labels, compared, strict=True)
+        if use
+    )
+    mean = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
+    # the least scatter is as much a part of the floor as the drawn one: what of it the replicates do not show is added
+    promised = (least[compared] / scatter[compared]) ** 2
+    level = np.sqrt(np.mean([_gap_squared(row, cells, promised) for row in z]))
+    return Floor(mean, scatter, compared, _whitening(z, promised), cells, float(level))
+
+
+def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
+    """Measured less predicted in floors, [compared], not compressed."""
+    z = (problem.measured - floor.bias - predicted)[floor.compared] / floor.scatter[floor.compared]
+    return np.where(np.isfinite(z), z, _MISSING)
+
+
+def gap(floor: Floor, z: Floats) -> float:
+    """The gap of differences `z` [compared], 1.0 for a perfect model."""
+    return float(np.sqrt(_gap_squared(compress(z), floor.cells, np.zeros(len(z))))) / floor.level
+
+
+def cell_shares(floor: Floor, z: Floats) -> dict[CellKey, float]:
+    """Share of every cell in what the gap is above the floor; they add up to 1. Empty without a gap."""
+    above: dict[CellKey, float] = {}
+    for key, mean in _cell_means(compress(z), floor.cells).items():
+        if mean > floor.level**2:
+            above[key] = mean - floor.level**2
+    total = sum(above.values())
+    return {key: value / total for key, value in sorted(above.items(), key=lambda item: -item[1])} if total else {}
+
+
+def _cell_means(z: Floats, cells: tuple[CellKey, ...]) -> dict[CellKey, float]:
+    sums: dict[CellKey, list[float]] = {}
+    for key, value in zip(cells, z.tolist(), strict=True):
+        sums.setdefault(key, []).append(value * value)
+    return {key: sum(values) / len(values) for key, values in sums.items()}
+
+
+def _gap_squared(z: Floats, cells: tuple[CellKey, ...], added: Floats) -> float:
+    means = _cell_means(np.sqrt(z * z + added), cells)
+    return sum(means.values()) / len(means) if means else 1.0
+
+
+def _whitening(z: Floats, promised: Floats) -> Floats:
+    """Inverse root of the replicates' correlation, shrunk towards independence (Ledoit and Wolf's intensity)."""
+    count, features = z.shape
+    sample = z.T @ z / count
+    diagonal = np.diag(np.diag(sample))
+    off = sample - diagonal
+    square = z * z
+    noise = float((square.T @ square).sum() / count - (sample**2).sum()) - float(
+        ((square**2).sum(axis=0) / count - np.diag(sample) ** 2).sum()
+    )
+    shrink = float(np.clip(noise / count / max(float((off**2).sum()), 1e-12), 0.05, 1.0))
+    covariance = np.eye(features) * 1.0 + (1.0 - shrink) * off
+    covariance[np.diag_indices(features)] = np.maximum(np.diag(sample) + promised, 0.3)
+    values, vectors = np.linalg.eigh(covariance)
+    return (vectors / np.sqrt(np.maximum(values, 0.05))) @ vectors.T
+
+
+def _least(label: Feature, problem: Problem) -> float:
+    """The scatter that a feature has at least, in its own unit: the grid's resolution and what ordinary sensors promise."""
+    force_N, slip_s, _, stiffness = problem.scales
+    drop_m = 0.3 * force_N / stiffness  # of a slip, for friction that falls by a sixth
+    if label.name in {"scatter", "ripple", "rest"}:
+        return 0.4  # logarithms of small powers, which hum, slow noise and the roughness of one track reach
+    if label.name in {"ring", "spring rest"}:
+        return 0.15
+    if label.name.startswith("spring"):
+        return 1e-3 * force_N
+    if label.name.startswith("vibration"):
+        return 0.003 if label.signal == "base_accel_mps2" else 0.02
+    if label.name == "period":
+        return 0.003
+    if label.name == "duration":
+        return 0.01 * slip_s
+    if label.name.startswith("rate"):
+        return 0.003 * force_N
+    if label.signal == "drive_force_N":
+        return 3e-4 * force_N
+    if label.signal.endswith("accel_mps2"):
+        return 4e-3 * drop_m * (np.pi / slip_s) ** 2
+    if label.signal == "drive_position_m":
+        return 2e-3 * drop_m
+    return 1e-3 * drop_m

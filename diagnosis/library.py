@@ -1,0 +1,165 @@
+"""What is tried on an evidence: every effect of the plant in each of its formulas, with the coordinates and starts of its refit.
+
+Scales come from the rig, so that a step of 1 in a coordinate is an effect that one would notice, on any rig.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.manifest import RigTable
+from diagnosis.problem import Prepared, Problem
+from diagnosis.refit import Axis, Form
+from diagnosis.waves import Wave, drive_waves, friction_waves
+from plant.effects import EFFECTS
+
+Floats = npt.NDArray[np.float64]
+_WAVES = 3  # periods that are tried
+
+
+class Trial(NamedTuple):
+    """A form and where its refit starts."""
+
+    form: Form
+    w: Floats
+
+
+class _Scale(NamedTuple):
+    """How a parameter becomes a coordinate; `logarithmic` ones stay positive."""
+
+    scale: float
+    logarithmic: bool
+    prior: float = 1.0
+
+
+def trials(problem: Problem) -> list[Trial]:
+    """Every form of every effect that this rig can have and these runs could show."""
+    rig, runs = problem.rig, problem.runs
+    frequencies = np.concatenate([run.commands.frequency_Hz for run in runs])
+    highest_Hz = float(frequencies.max())
+    found: list[Trial] = []
+    for name, effect in EFFECTS.items():
+        if rig.drive not in effect.drives or (effect.acts_on == "piezo" and highest_Hz == 0.0):
+            continue
+        for form in effect.forms:
+            if form != "random":  # a random load shows as scatter only, see `scales`
+                found += _starts(name, form, problem, highest_Hz)
+    return found
+
+
+def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[Trial]:
+    rig, runs = problem.rig, problem.runs
+    scale = scales(name, form, rig, runs, highest_Hz)
+    waves: list[Wave] = []
+    if name == "position-dependent-friction":
+        waves = friction_waves(runs, problem.scales, "position", _WAVES)
+    elif name == "normal-load-fluctuation":
+        waves = friction_waves(runs, problem.scales, "time", _WAVES)
+    elif name == "drive-speed-ripple":
+        over = "position" if form == "screw" else "time"
+        waves = drive_waves(runs, over, _WAVES) or friction_waves(runs, problem.scales, over, _WAVES)
+    if "phase_rad" in scale:
+        return [_wave_trial(name, form, scale, wave) for wave in waves]
+    starts: list[dict[str, float]] = [{}]
+    if name == "frame-compliance":
+        starts = [{"frequency_Hz": f} for f in (40.0, 90.0, 200.0)]
+    elif name == "base-compliance":
+        starts = [{"frequency_Hz": f} for f in (50.0, 120.0, 300.0)]
+    elif name == "piezo-resonance":
+        starts = [{"resonance_Hz": share * highest_Hz} for share in (0.7, 1.2, 2.0)]
+    return [_trial(name, form, scale, start) for start in starts]
+
+
+def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, float]) -> Trial:
+    axes: list[Axis] = []
+    for row in EFFECTS[name].forms[form].parameters:
+        if row.name in scale:
+            unit = scale[row.name]
+            size = start.get(row.name, unit.scale)
+            axes.append(Axis(name, row.name, size, unit.logarithmic, unit.prior, row.low, row.high))
+    # a coordinate that may have either sign starts at half a unit; one that stays positive at its scale
+    w = np.array([0.0 if axis.logarithmic else 0.5 for axis in axes])
+    return Trial(Form({name: form}, tuple(axes)), w)
+
+
+def _wave_trial(name: str, form: str, scale: dict[str, _Scale], wave: Wave) -> Trial:
+    axes: list[Axis] = []
+    for row in EFFECTS[name].forms[form].parameters:
+        if row.name == "phase_rad":
+            axes.append(Axis(name, row.name, 1.0, False, 3.0, -20.0, 20.0))
+        elif row.name == "ratio":
+            axes.append(Axis(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
+        else:
+            size = wave.period if row.name == "wavelength_m" else 1.0 / wave.period
+            axes.append(Axis(name, row.name, size, True, scale[row.name].prior, row.low, row.high))
+    w = np.array([wave.phase_rad if axis.name == "phase_rad" else 0.0 for axis in axes])
+    return Trial(Form({name: form}, tuple(axes)), w)
+
+
+def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz: float) -> dict[str, _Scale]:
+    """Free parameters of a form and their scales; what is left out stays at its default."""
+    stiffness = rig.drive_stiffness_N_per_m or rig.contact_stiffness_N_per_m
+    static_N = rig.static_force_N
+    reach_m = static_N / stiffness
+    critical = 2.0 * math.sqrt(stiffness * rig.mass_kg)
+    slip_s = math.pi * math.sqrt(rig.mass_kg / stiffness)
+    slip_mps = 0.3 * static_N / math.sqrt(stiffness * rig.mass_kg)
+    if rig.drive == "force":  # no spring: speeds and times are those of the motion
+        slip_mps = max(20.0 * rig.stribeck_velocity_mps, 0.05)
+        critical = static_N / slip_mps
+        slip_s = 0.05
+    length_s = max(len(run.commands.drive) for run in runs) * 1e-3
+    level = {"ratio": _Scale(0.1, False)}
+    wave = {"ratio": _Scale(0.02, True, 1.5), "phase_rad": _Scale(1.0, False, 3.0)}
+    table: dict[tuple[str, str], dict[str, _Scale]] = {
+        ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)},
+        ("static-friction-ageing", "power"): {"ratio": _Scale(0.04, True, 1.5), "exponent": _Scale(0.3, True, 0.5)},
+        ("frictional-lag", ""): {"lag_s": _Scale(0.06 * slip_s, True, 1.5)},
+        ("viscous-friction", "linear"): {"damping_Ns_per_m": _Scale(0.02 * critical, True, 1.5)},
+        ("viscous-friction", "quadratic"): {"damping_Ns2_per_m2": _Scale(0.02 * critical / slip_mps, True, 1.5)},
+        ("position-dependent-friction", ""): wave | {"wavelength_m": _Scale(1.0, True, 0.2)},
+        ("normal-load-fluctuation", "sine"): wave | {"frequency_Hz": _Scale(1.0, True, 0.2)},
+        ("drive-speed-ripple", "screw"): wave | {"wavelength_m": _Scale(1.0, True, 0.2)},
+        ("drive-speed-ripple", "time"): wave | {"frequency_Hz": _Scale(1.0, True, 0.2)},
+        ("friction-drift", "linear"): {"rate_per_s": _Scale(0.03 / length_s, False)},
+        ("friction-drift", "settling"): {
+            "ratio": _Scale(0.04, False),
+            "settling_s": _Scale(0.3 * length_s, True, 0.7),
+        },
+        ("stribeck-velocity", ""): {"ratio": _Scale(0.5, False)},
+        ("drive-damping", ""): {"damping_Ns_per_m": _Scale(0.03 * critical, True, 1.5)},
+        ("drive-hardening", "cubic"): {"ratio": _Scale(0.1 * (1e-3 / reach_m) ** 2, False)},
+        ("drive-hardening", "bilinear"): {"ratio": _Scale(0.2, False), "knee_m": _Scale(0.75 * reach_m, True, 0.3)},
+        ("drive-backlash", ""): {"gap_m": _Scale(0.05 * reach_m, True, 1.5)},
+        ("frame-compliance", ""): {
+            "ratio": _Scale(0.05, True, 1.5),
+            "frequency_Hz": _Scale(80.0, True, 0.5),
+            "damping_ratio": _Scale(0.05, True, 0.7),
+        },
+        ("base-compliance", ""): {
+            "compliance_m_per_N": _Scale(0.01 / stiffness, True, 1.5),
+            "frequency_Hz": _Scale(150.0, True, 0.5),
+            "damping_ratio": _Scale(0.05, True, 0.7),
+        },
+        ("piezo-roll-off", "first-order"): {"corner_Hz": _Scale(2.0 * max(highest_Hz, 1.0), True, 1.5)},
+        ("piezo-roll-off", "second-order"): {"corner_Hz": _Scale(3.0 * max(highest_Hz, 1.0), True, 1.5)},
+        ("piezo-resonance", ""): {"resonance_Hz": _Scale(1.0, True, 0.7), "damping_ratio": _Scale(0.05, True, 0.7)},
+        ("piezo-sag", "load"): {"ratio": _Scale(0.2, False)},
+        ("piezo-sag", "heat"): {"ratio": _Scale(0.2, False), "settling_s": _Scale(0.2 * length_s, True, 0.7)},
+        ("force-sensor-gain", ""): {"ratio": _Scale(0.05, False)},
+        ("force-sensor-bias", ""): {"bias_N": _Scale(0.03 * static_N, False)},
+        ("force-sensor-drift", "linear"): {"rate_N_per_s": _Scale(0.03 * static_N / length_s, False)},
+        ("force-sensor-drift", "settling"): {
+            "drift_N": _Scale(0.03 * static_N, False),
+            "settling_s": _Scale(0.3 * length_s, True, 0.7),
+        },
+        ("force-sensor-lag", "first-order"): {"lag_s": _Scale(0.02 * slip_s, True, 1.5)},
+        ("force-sensor-lag", "second-order"): {"lag_s": _Scale(0.01 * slip_s, True, 1.5)},
+        ("force-sensor-delay", ""): {"delay_s": _Scale(0.02 * slip_s, True, 1.5)},
+        ("accelerometer-gain", "both"): {"ratio": _Scale(0.05, False)},
+        ("accelerometer-gain", "mass"): {"ratio": _Scale(0.05, False)},
+        ("accelerometer-gain", "base"): {"ratio": _Scale(0.05, False)},
+    }
+    return table.get((name, form), level)

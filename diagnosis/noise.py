@@ -1,0 +1,65 @@
+"""The noise of a run, taken from the run: what is faster than 20 ms where the slide sticks, in pieces as they were measured.
+
+So hum, colour and quantisation come along as they are; no spectrum has to be assumed. Slower noise cannot be told from motion
+and is drawn as a small drift of the force.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from diagnosis.commands import Commands
+from diagnosis.features import Scales, Signals
+
+Floats = npt.NDArray[np.float64]
+_WINDOW = 21  # blocks
+_SLOW_SHARE = 3e-4  # of the static friction: 5 mN on the paper's rig, the drift of a strain gauge within 10 s
+_SLOW_WAVES = 6
+
+
+class Noise(NamedTuple):
+    """By signal: pieces of measured noise; and what an accelerometer shakes by without being shaken."""
+
+    pieces: dict[str, Floats]
+    shake_mps2: dict[str, float]
+    slow_force_N: float
+
+    def drawn(self, name: str, blocks: int, random: np.random.Generator) -> Floats:
+        """A stretch of noise, [blocks]."""
+        piece = self.pieces[name]
+        offset = int(random.integers(len(piece)))
+        result = np.tile(piece, blocks // len(piece) + 2)[offset : offset + blocks]
+        if name == "drive_force_N":
+            time = np.linspace(0.0, np.pi, blocks)
+            weights = random.normal(size=_SLOW_WAVES) * self.slow_force_N / np.sqrt(_SLOW_WAVES)
+            slow = np.cos(np.outer(time, np.arange(1, _SLOW_WAVES + 1))) @ weights
+            result = result + slow
+        return result
+
+
+def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
+    """The noise of a reduced run."""
+    leading = signals.get("drive_force_N", signals.get("mass_accel_mps2"))
+    assert leading is not None, "evidence without force and acceleration is refused when it is read"  # noqa: S101
+    speed = np.abs(leading - uniform_filter1d(leading, _WINDOW))
+    # a slip stands far above the noise; keep three half periods away from it
+    busy = speed > 6.0 * np.median(speed)
+    reach = max(int(3.0 * scales.slip_s * 1e3), _WINDOW)
+    quiet = ~maximum_filter1d(busy, 2 * reach + 1)
+    if quiet.sum() < 500:
+        quiet = speed <= np.quantile(speed, 0.3)
+    pieces: dict[str, Floats] = {}
+    shake: dict[str, float] = {}
+    still = quiet & (commands.frequency_Hz == 0.0)
+    for name, values in signals.items():
+        if name.endswith("shake_mps2"):
+            calm = values[still] if still.any() else np.zeros(1)
+            shake[name] = float(np.median(calm))
+            spread = values - uniform_filter1d(values, _WINDOW)
+            pieces[name] = spread[quiet]
+        else:
+            rest = values - uniform_filter1d(values, _WINDOW)
+            pieces[name] = rest[quiet] * (_WINDOW / (_WINDOW - 1.0)) ** 0.5
+    return Noise(pieces, shake, _SLOW_SHARE * scales.force_N)

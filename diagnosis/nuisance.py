@@ -1,0 +1,57 @@
+"""What may differ from the description without being a gap: the rig's numbers within their tolerances, and ordinary sensors.
+
+All of it is refitted before any effect is judged. An incomplete set makes every effect look alike: what a missing nuisance
+would have taken up, each effect takes up in its own way.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.manifest import RigTable
+from diagnosis.problem import Point
+from diagnosis.sensing import Chain
+from diagnosis.twin import Effects
+
+Floats = npt.NDArray[np.float64]
+# Mean and standard deviation of what no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz displacement by 200 us,
+# an open one by nothing; displacement sensors are linear to 0.2 % of their range, up to 0.8 % in slope; accelerometers of the
+# bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.
+_CHAIN = {
+    "force_delay_s": (4e-5, 4e-5),
+    "position_delay_s": (1e-4, 1e-4),
+    "position_scale": (1.0, 0.004),
+    "accel_lowest_Hz": (0.25, 0.25),
+    "accel_rolled_off": (0.5, 0.5),
+}
+_NOT_NEGATIVE = ("accel_lowest_Hz", "accel_rolled_off")
+
+
+class Nuisances:
+    """The nuisances of a rig as a vector in units of their tolerances, 0 as described. [nuisances]"""
+
+    def __init__(self, rig: RigTable) -> None:
+        known = {name: value for name, value in rig.values().items() if value is not None}
+        # a value of 0 has no relative tolerance
+        self.rig_names = tuple(name for name, share in rig.tolerance.items() if share > 0.0 and known[name] > 0.0)
+        self._described = known
+        self._tolerance = rig.tolerance
+        self.names = (*self.rig_names, *_CHAIN)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def value(self, name: str, deviation: float) -> float:
+        """A number of the rig table at a deviation from its described value; never below a tenth of that."""
+        described = self._described[name]
+        return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
+
+    def point(self, deviations: Floats, effects: Effects) -> Point:
+        """The model at these deviations, with these effects."""
+        own = len(self.rig_names)
+        values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
+        chain: dict[str, float] = {}
+        for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[own:].tolist(), strict=True):
+            chain[name] = mean + spread * deviation
+            if name in _NOT_NEGATIVE:
+                chain[name] = max(chain[name], 0.0)
+        return Point(values, Chain(**chain), effects)

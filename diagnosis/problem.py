@@ -1,0 +1,169 @@
+"""Runs of one evidence made ready for comparison: measured features, and predicted ones for any parameters and effects."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.faults import Fault
+from diagnosis.axis_features import axis_features
+from diagnosis.commands import Commands, commands_of
+from diagnosis.evidence import Evidence, Run
+from diagnosis.features import Feature, Features, Scales, Signals, first_restick, spring_features
+from diagnosis.manifest import RigTable
+from diagnosis.noise import Noise, noise_of
+from diagnosis.reduced import BLOCK_S, reduce_run
+from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed
+from diagnosis.twin import Effects, Roughness, Start, predict, rig_config
+from plant.effects import EFFECTS
+
+Floats = npt.NDArray[np.float64]
+_PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
+_SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
+
+
+class Prepared(NamedTuple):
+    """One run, ready."""
+
+    file: str
+    holdout: bool
+    signals: Signals
+    commands: Commands
+    start: Start
+    noise: Noise
+    clipped: dict[str, tuple[float, float]]  # by signal: limits that the sensor could not pass
+
+
+class Point(NamedTuple):
+    """Where the model is evaluated."""
+
+    values: dict[str, float]  # of the rig table, those that differ from the described ones
+    chain: Chain
+    effects: Effects
+
+
+class Draw(NamedTuple):
+    """What is random about one replicate."""
+
+    random: np.random.Generator
+    roughness: Roughness
+
+
+class Problem:
+    """A set of runs under one rig table. Arrays of features are [features], the runs' features one after the other."""
+
+    def __init__(self, rig: RigTable, runs: list[Prepared]) -> None:
+        self.rig = rig
+        self.runs = runs
+        self.scales = scales_of(rig)
+        self._simulated: dict[object, Signals] = {}
+        self._measured = [self._features(run, run.signals) for run in runs]
+        self.measured = np.concatenate([np.array(found.values) for found in self._measured])
+
+    @property
+    def labels(self) -> list[tuple[str, Feature]]:
+        """File and feature of every entry."""
+        return [
+            (run.file, label) for run, found in zip(self.runs, self._measured, strict=True) for label in found.labels
+        ]
+
+    def predicted(self, point: Point, draw: Draw | None = None) -> Floats:
+        """Features of the model, [features]; with a draw those of one rough and noisy run."""
+        parts: list[float] = []
+        for run in self.runs:
+            parts += self._features(run, self.signals(run, point, draw)).values
+        return np.array(parts)
+
+    def signals(self, run: Prepared, point: Point, draw: Draw | None = None) -> Signals:
+        """Predicted signals of one run, as its sensors would show them."""
+        moving = {name: table for name, table in point.effects.items() if name not in SENSOR_EFFECTS}
+        if not run.commands.frequency_Hz.any():
+            moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
+        start = run.start
+        roughness = None
+        if draw is not None:
+            start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
+            roughness = draw.roughness
+        raw = self._raw(run, point.values, moving, start, roughness)
+        result = sensed(raw, run.commands.frequency_Hz, point.effects, point.chain, run.start.t_s)
+        result = {name: result[name] for name in run.signals}
+        for name in result:
+            if name.endswith("shake_mps2"):
+                result[name] = np.hypot(result[name], run.noise.shake_mps2[name])
+        if draw is not None:
+            result = {name: values + run.noise.drawn(name, len(values), draw.random) for name, values in result.items()}
+        for name, (low, high) in run.clipped.items():
+            result[name] = np.clip(result[name], low, high)
+        return result
+
+    def _raw(
+        self, run: Prepared, values: dict[str, float], effects: Effects, start: Start, roughness: Roughness | None
+    ) -> Signals:
+        force_driven = self.rig.drive == "force"
+        if roughness is not None:
+            return predict(rig_config(self.rig, values, effects, roughness), force_driven, run.commands, start)
+        key = (
+            run.file,
+            tuple(sorted(values.items())),
+            tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(effects.items())),
+        )
+        if key not in self._simulated:
+            if len(self._simulated) > 64:  # of 0.6 MB each
+                self._simulated.pop(next(iter(self._simulated)))
+            self._simulated[key] = predict(
+                rig_config(self.rig, values, effects, None), force_driven, run.commands, start
+            )
+        return self._simulated[key]
+
+    def _features(self, run: Prepared, signals: Signals) -> Features:
+        if self.rig.drive == "force":
+            return axis_features(signals, run.commands, self.rig)
+        return spring_features(signals, run.commands, self.scales)
+
+
+def scales_of(rig: RigTable) -> Scales:
+    """The scales of a rig with a spring drive; with a force drive only the force means something."""
+    stiffness = rig.drive_stiffness_N_per_m or 1.0
+    slip_s = float(np.pi * np.sqrt(rig.mass_kg / stiffness))
+    return Scales(rig.static_force_N, slip_s, _SMALLEST_DROP * rig.static_force_N, stiffness)
+
+
+def prepare(evidence: Evidence) -> list[Prepared]:
+    """Reduce every run and find its commands, start and noise. Raises Fault BAD_EVIDENCE when a run is too short."""
+    return [_prepare(evidence.rig, run) for run in evidence.runs]
+
+
+def _prepare(rig: RigTable, run: Run) -> Prepared:
+    start_s, signals = reduce_run(run)
+    blocks = len(next(iter(signals.values())))
+    if blocks * BLOCK_S < 1.0:
+        line = f"{run.file}: t_s: {blocks * BLOCK_S:.3g} s long: must be 1 s at least; give a longer run"
+        raise Fault("BAD_EVIDENCE", line)
+    commands = commands_of(run, rig, signals)
+    if rig.drive == "spring" and commands.segments:
+        first = commands.segments[0]
+        first = first._replace(settled=first_restick(signals, first, scales_of(rig)))
+        commands = commands._replace(segments=(first, *commands.segments[1:]))
+    noise = noise_of(signals, commands, scales_of(rig))
+    clipped = {
+        name: (float(run.columns[name].min()), float(run.columns[name].max()))
+        for name in run.clipped
+        if name in signals
+    }
+    return Prepared(run.file, run.holdout, signals, commands, _start(rig, signals, start_s), noise, clipped)
+
+
+def _start(rig: RigTable, signals: Signals, start_s: float) -> Start:
+    first = slice(0, 10)
+    if rig.drive == "force":
+        position = signals.get("mass_position_m")
+        at_m = 0.0 if position is None else float(position[0])
+        return Start(start_s, 0.0, at_m)
+    force_N = float(signals["drive_force_N"][first].mean()) if "drive_force_N" in signals else 0.7 * rig.coulomb_force_N
+    if "mass_position_m" in signals:
+        at_m = float(signals["mass_position_m"][first].mean())
+    elif "drive_position_m" in signals:
+        at_m = float(signals["drive_position_m"][first].mean()) - force_N / scales_of(rig).stiffness_N_per_m
+    else:
+        at_m = 0.0
+    return Start(start_s, force_N, at_m)

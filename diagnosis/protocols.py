@@ -1,0 +1,98 @@
+"""What is measured: the runs of an evidence folder that is made from the plant, by name of the protocol.
+
+Two lengths rule a stick-slip run with the paper's pair: turning the spring from +17 N to -17 N takes 2.9 mm of drive
+travel, and one period takes about 0.5 mm. So a dwell lasts 0.25 s at 2 mm/s, 1 s at 0.5 mm/s and 5 s at 0.1 mm/s.
+"""
+
+from typing import Final, NamedTuple
+
+_RAMP_S = 0.05  # a drive that is told another velocity
+_AMPLITUDE_M = 2e-8  # the paper's
+
+
+class Vibration(NamedTuple):
+    """What the piezo is told from a time on; an amplitude of 0 is off."""
+
+    from_s: float
+    frequency_Hz: float
+    amplitude_m: float
+
+
+class RunPlan(NamedTuple):
+    """One run."""
+
+    velocity: tuple[tuple[float, float], ...]  # [s, m/s], linear in between; one point: constant
+    vibration: tuple[Vibration, ...] = ()
+    duration_s: float = 10.0
+    holdout: bool = False
+    track: int = 0  # runs with the same number start at the same place
+
+
+class AxisPlan(NamedTuple):
+    """One run of a force-driven axis: a sum of sines to follow, [amplitude m, frequency Hz]."""
+
+    sines: tuple[tuple[float, float], ...]
+    duration_s: float = 12.0
+    holdout: bool = False
+
+
+def _steps(*steps: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    """A profile that goes to each velocity at its time, over a short ramp."""
+    points = [steps[0]]
+    for time_s, velocity_mps in steps[1:]:
+        points += [(time_s, points[-1][1]), (time_s + _RAMP_S, velocity_mps)]
+    return tuple(points)
+
+
+def _constant(velocity_mps: float) -> tuple[tuple[float, float], ...]:
+    return ((0.0, velocity_mps),)
+
+
+def _vibration(*steps: tuple[float, float]) -> tuple[Vibration, ...]:
+    """The paper's amplitude at these frequencies from these times on; a frequency of 0 is off."""
+    return tuple(Vibration(time_s, f_Hz, _AMPLITUDE_M if f_Hz > 0.0 else 0.0) for time_s, f_Hz in steps)
+
+
+PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
+    # the least that lets ageing, direction, position, piezo and drive be told apart
+    "ladder": (
+        RunPlan(_constant(0.0005), track=0),
+        # 3 mm forward, 5 mm back of which 2.1 mm slide, and 0.9 mm of slow drag with dwells of 3 s
+        RunPlan(_steps((0.0, 0.002), (1.5, -0.002), (4.0, -0.00015)), track=1),
+        RunPlan(_constant(0.0005), _vibration((2.0, 1000.0), (4.0, 2000.0), (6.0, 3000.0), (8.0, 4000.0)), track=2),
+        RunPlan(
+            _steps((0.0, 0.0007), (5.0, -0.002), (7.2, -0.0002)),
+            _vibration((2.5, 2500.0), (5.0, 0.0)),
+            holdout=True,
+            track=3,
+        ),
+    ),
+    "constant": (
+        RunPlan(_constant(0.0005), track=0),
+        RunPlan(_constant(0.002), track=1),
+        RunPlan(_constant(0.0005), _vibration((2.0, 3000.0)), track=2),
+        RunPlan(_constant(0.001), _vibration((2.0, 2000.0)), holdout=True, track=3),
+    ),
+    # on the paper's stand the slide goes back to where it started
+    "paper": (
+        RunPlan(_constant(0.0005)),
+        RunPlan(_constant(0.0005), _vibration((4.0, 2000.0))),
+        RunPlan(_constant(0.0005), _vibration((4.0, 4000.0))),
+        RunPlan(_constant(0.0005), _vibration((4.0, 3000.0)), holdout=True),
+    ),
+    "slow": (
+        RunPlan(_constant(0.0001), duration_s=30.0, track=0),
+        RunPlan(_constant(0.0005), track=1),
+        RunPlan(_constant(0.002), duration_s=6.0, track=2),
+        RunPlan(_constant(0.001), holdout=True, track=3),
+    ),
+}
+
+FORCE_PROTOCOL: Final = "force"
+# fast and long, fast and short, slow with stops of the contact, and a mixture to judge by; peaks of 0.04 to 0.16 m/s
+AXIS_PLANS: Final[tuple[AxisPlan, ...]] = (
+    AxisPlan(((0.1, 0.25),)),
+    AxisPlan(((0.02, 1.0),)),
+    AxisPlan(((0.05, 0.125),)),
+    AxisPlan(((0.07, 0.2), (0.015, 0.7)), holdout=True),
+)

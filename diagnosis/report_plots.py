@@ -1,0 +1,81 @@
+"""The pictures of a diagnosis as PNG inside the page, together small enough to be mailed."""
+
+import base64
+import io
+import math
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from diagnosis.result import Curve, Picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DPI = 110.0
+_ALL_BYTES = 3_500_000  # of base64; the page is to stay under 5 MB
+# the same colours everywhere in the page; told apart by line style as well
+STYLES: Final[dict[str, dict[str, Any]]] = {
+    "measured": {"color": "#1c2833", "linewidth": 1.6},
+    "nominal": {"color": "#808b96", "linewidth": 1.2, "linestyle": ":"},
+    "retuned": {"color": "#ca6f1e", "linewidth": 1.2, "linestyle": "--"},
+    "effect": {"color": "#2471a3", "linewidth": 1.2},
+    "points": {"color": "#1c2833", "linestyle": "", "marker": ".", "markersize": 2.5, "alpha": 0.5},
+}
+
+
+class Drawn(NamedTuple):
+    """One picture of the page: `png` is base64."""
+
+    title: str
+    kind: str
+    png: str
+
+
+def draw(pictures: tuple[Picture, ...]) -> list[Drawn]:
+    """Draw every picture, all of them together in 3.5 MB: with very many, coarser."""
+    dpi = _DPI
+    while True:
+        drawn = [Drawn(picture.title, picture.kind, _png(_figure(picture), dpi)) for picture in pictures]
+        size = sum(len(one.png) for one in drawn)
+        if size <= _ALL_BYTES:
+            return drawn
+        # the size goes a little slower than the number of pixels
+        dpi *= 0.8 * math.sqrt(_ALL_BYTES / size)
+
+
+def _figure(picture: Picture) -> "Figure":
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(5.6, 3.1), layout="constrained")
+    axis = figure.subplots()
+    for curve in picture.curves:
+        x, y = _finite(curve)
+        axis.plot(x, y, label=_plain(curve.label), **STYLES[curve.style])
+    axis.set_xlabel(_plain(picture.x_label), fontsize=9)
+    axis.set_ylabel(_plain(picture.y_label), fontsize=9)
+    axis.tick_params(labelsize=8)
+    axis.grid(alpha=0.25)
+    if picture.kind == "residual":
+        axis.axhline(0.0, color="#808b96", linewidth=0.8)
+    if any(curve.label for curve in picture.curves):
+        # above the curves: inside it could hide them
+        figure.legend(loc="outside upper left", ncols=3, fontsize=8, frameon=False)
+    return figure
+
+
+def _finite(curve: Curve) -> tuple[Any, Any]:
+    """Infinity as NaN, which is drawn as a hole."""
+    x, y = (np.where(np.isfinite(values), values, np.nan) for values in (curve.x, curve.y))
+    return x, y
+
+
+def _plain(text: str) -> str:
+    """Text that is not taken for a formula, nor left out of a legend."""
+    return text.replace("$", r"\$").removeprefix("_")
+
+
+def _png(figure: "Figure", dpi: float) -> str:
+    memory = io.BytesIO()
+    figure.savefig(memory, format="png", dpi=dpi)
+    return base64.b64encode(memory.getvalue()).decode()

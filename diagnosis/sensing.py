@@ -1,0 +1,94 @@
+"""What the sensors make of predicted signals: the faults of the library, and the small lags that no manifest states.
+
+The plant's kernel has the same effects, sample by sample; here they act on the 1 ms grid, after the kernel, so that a fault of a
+sensor costs no simulation. A slip lasts tens of blocks, so the grid resolves a lag far below 1 ms.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import lfilter
+
+from diagnosis.reduced import BLOCK_S
+from diagnosis.twin import Effects
+from plant.effects import EFFECTS
+
+Floats = npt.NDArray[np.float64]
+Signals = dict[str, Floats]
+SENSOR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "sensor")
+
+
+class Chain(NamedTuple):
+    """Unstated but ordinary: what every measuring chain does a little."""
+
+    force_delay_s: float = 0.0
+    position_delay_s: float = 0.0
+    position_scale: float = 1.0
+    accel_lowest_Hz: float = 0.0  # corner of the high-pass that every piezoelectric accelerometer is
+    accel_rolled_off: float = 0.0  # its gain is 1 / sqrt(1 + this (f / 10 kHz)^2)
+
+
+def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chain, start_s: float) -> Signals:
+    """Predicted signals as a chain with these faults would show them; new arrays, the input stays."""
+    result = dict(signals)
+    force_N = result["drive_force_N"]
+    t_s = start_s + (np.arange(len(force_N)) + 0.5) * BLOCK_S
+    delay_s = chain.force_delay_s
+    for name in SENSOR_EFFECTS:
+        if name not in effects:
+            continue
+        form = effects[name]["form"]
+        value = {key: float(number) for key, number in effects[name].items() if key != "form"}
+        if name == "force-sensor-lag":
+            for _ in range(1 if form == "first-order" else 2):
+                force_N = low_pass(force_N, value["lag_s"])
+        elif name == "force-sensor-delay":
+            delay_s += value["delay_s"]
+        elif name == "accelerometer-gain":
+            for which in ("mass", "base") if form == "both" else (str(form),):
+                for signal in (f"{which}_accel_mps2", f"{which}_shake_mps2"):
+                    result[signal] = result[signal] * (1.0 + value["ratio"])
+    force_N = delayed(force_N, delay_s)
+    if "force-sensor-gain" in effects:
+        force_N = force_N * (1.0 + float(effects["force-sensor-gain"]["ratio"]))
+    if "force-sensor-bias" in effects:
+        force_N = force_N + float(effects["force-sensor-bias"]["bias_N"])
+    if "force-sensor-drift" in effects:
+        table = effects["force-sensor-drift"]
+        if table["form"] == "linear":
+            force_N = force_N + float(table["rate_N_per_s"]) * t_s
+        else:
+            force_N = force_N + float(table["drift_N"]) * (1.0 - np.exp(-t_s / float(table["settling_s"])))
+    result["drive_force_N"] = force_N
+    if chain.accel_lowest_Hz > 0.0:
+        memory_s = 0.5 / (np.pi * chain.accel_lowest_Hz)
+        for name in ("mass_accel_mps2", "base_accel_mps2"):
+            result[name] = result[name] - low_pass(result[name], memory_s)
+    gain = 1.0 / np.sqrt(1.0 + chain.accel_rolled_off * (frequency_Hz / 1e4) ** 2)
+    for name in ("mass_shake_mps2", "base_shake_mps2"):
+        result[name] = result[name] * gain
+    for name in ("mass_position_m", "drive_position_m"):
+        result[name] = chain.position_scale * delayed(result[name], chain.position_delay_s)
+    return result
+
+
+def delayed(values: Floats, delay_s: float) -> Floats:
+    """Shifted by a time of any sign, linear between blocks."""
+    if delay_s == 0.0:
+        return values
+    at = np.arange(len(values), dtype=np.float64)
+    return np.interp(at - delay_s / BLOCK_S, at, values)
+
+
+def low_pass(values: Floats, lag_s: float) -> Floats:
+    """First-order low-pass, exact for an input that is linear between blocks."""
+    if lag_s < 1e-9:
+        return values
+    r = BLOCK_S / lag_s
+    keep = float(np.exp(-r))
+    late = (1.0 - keep) / r - keep  # weight of the input one block ago
+    now = 1.0 - (1.0 - keep) / r
+    # state: at rest on the first value
+    result, _ = lfilter([now, late], [1.0, -keep], values, zi=np.array([values[0] * (1.0 - now)]))
+    return np.asarray(result)

@@ -1,0 +1,103 @@
+"""Where to look for a wave: the periods that the scatter of the breakaways, the level of sliding and the drive position show.
+
+Only starting points for a refit come from here, never a verdict.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.cycles import turning_points
+from diagnosis.features import Scales
+from diagnosis.problem import Prepared
+from diagnosis.reduced import BLOCK_S
+
+Floats = npt.NDArray[np.float64]
+_GRID = 400
+
+
+class Wave(NamedTuple):
+    """ratio sin(2 pi u / period + phase_rad) over a coordinate u."""
+
+    period: float
+    ratio: float
+    phase_rad: float
+
+
+class _Series(NamedTuple):
+    at: Floats
+    value: Floats  # relative to the mean of its stretch
+
+
+def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
+    """The strongest waves of the friction over `position` [m] or `time` [s], strongest first."""
+    series: list[_Series] = []
+    for run in runs:
+        force = run.signals.get("drive_force_N")
+        if force is None:
+            continue
+        blocks = np.arange(len(force))
+        if over == "position":
+            coordinate = run.signals.get("mass_position_m")
+            if coordinate is None:
+                path_m = np.cumsum(run.commands.drive) * BLOCK_S
+                coordinate = run.start.position_m + path_m - (force - force[0]) / scales.stiffness_N_per_m
+        else:
+            coordinate = run.start.t_s + (blocks + 0.5) * BLOCK_S
+        for segment in run.commands.segments:
+            own = slice(max(segment.first + 100, segment.settled), segment.last)
+            cut = segment.sign * force[own]
+            tops, bottoms = turning_points(cut, scales.drop_N)
+            if len(bottoms) >= 3:
+                at = tops[: len(bottoms)]
+                series.append(_Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0))
+            elif len(bottoms) == 0 and len(cut) > 500 and cut.mean() > 0.3 * scales.force_N:
+                level = cut[: len(cut) // 20 * 20].reshape(-1, 20).mean(axis=1)
+                series.append(_Series(coordinate[own][10::20][: len(level)], level / level.mean() - 1.0))
+    return _strongest(series, most)
+
+
+def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
+    """The strongest waves of the drive's velocity over its `position` [m] or `time` [s], relative to that velocity."""
+    series: list[_Series] = []
+    for run in runs:
+        position = run.signals.get("drive_position_m")
+        if position is None:
+            continue
+        for segment in run.commands.segments:
+            own = position[segment.first : segment.last]
+            whole = len(own) // 20 * 20
+            if whole < 400 or segment.drive_velocity_mps == 0.0:
+                continue
+            mean = own[:whole].reshape(-1, 20).mean(axis=1)
+            t_s = run.start.t_s + (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
+            slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
+            series.append(_Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0))
+    return _strongest(series, most)
+
+
+def _strongest(series: list[_Series], most: int) -> list[Wave]:
+    if not series:
+        return []
+    span = max(float(np.ptp(one.at)) for one in series)
+    spacing = min(float(np.median(np.abs(np.diff(one.at)))) for one in series)
+    if span <= 0.0 or spacing <= 0.0:
+        return []
+    periods = np.geomspace(max(2.0 * spacing, span / 200.0), 2.0 * span, _GRID)
+    found = [_fitted(series, float(period)) for period in periods]
+    power = np.array([gain for gain, _ in found])
+    peaks = [i for i in range(_GRID) if power[i] == power[max(0, i - 12) : i + 13].max()]
+    best = sorted(peaks, key=lambda i: -power[i])[:most]
+    return [found[i][1] for i in best if power[i] > 0.0]
+
+
+def _fitted(series: list[_Series], period: float) -> tuple[float, Wave]:
+    normal, right = np.zeros((2, 2)), np.zeros(2)
+    for one in series:
+        columns = np.stack([np.sin(2 * np.pi * one.at / period), np.cos(2 * np.pi * one.at / period)], axis=1)
+        columns -= columns.mean(axis=0)
+        normal += columns.T @ columns
+        right += columns.T @ one.value
+    a, b = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(2), right)
+    return float(right @ (a, b)), Wave(period, float(np.hypot(a, b)), float(np.arctan2(b, a)))

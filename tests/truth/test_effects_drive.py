@@ -1,0 +1,144 @@
+"""Effects of the drive, on a slide without friction: what is left is a mass, a spring and what the effect makes of it."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from plant.simulate import simulate
+from tests.effects_rig import BLOCK_S, DISTURBED, HEAVY_KG, NO_FRICTION, NOMINAL, TAU, advance_by, rig, run
+
+MASS_KG, STIFFNESS = 1.5, 11700.0
+
+
+def released(effects, extension_m=2e-3, duration_s=0.5, **drive):
+    """The slide let go with the drive held at a distance."""
+    config = rig(effects, contact=NO_FRICTION, drive=drive)
+    return run(config, np.zeros(round(duration_s / BLOCK_S)), {"s_d": extension_m})
+
+
+def reference_m(force_N, extension_m, t_s):
+    """Position of the released slide for a spring and damper of this force over extension and its rate."""
+
+    def slope(_, state):
+        x, v = state
+        return v, force_N(extension_m - x, -v) / MASS_KG
+
+    return solve_ivp(slope, (0, t_s[-1]), (0, 0), t_eval=t_s, rtol=1e-9, atol=1e-13, max_step=1e-3).y[0]
+
+
+def test_damping_makes_the_free_oscillation_decay_as_its_closed_form():
+    damping = 40.0
+    result = released({"drive-damping": {"damping_Ns_per_m": damping - 10.0}}, damping_Ns_per_m=10.0)
+    decay, natural = damping / (2 * MASS_KG), math.sqrt(STIFFNESS / MASS_KG)
+    damped = math.sqrt(natural**2 - decay**2)
+    course = np.exp(-decay * result.t_s) * (np.cos(damped * result.t_s) + decay / damped * np.sin(damped * result.t_s))
+    assert result.true_position_m == pytest.approx(2e-3 * (1 - course), abs=1e-7)
+
+
+def test_stiffness_sets_the_frequency():
+    result = released({"drive-stiffness": {"ratio": 0.21}})
+    course = np.cos(1.1 * math.sqrt(STIFFNESS / MASS_KG) * result.t_s)
+    assert result.true_position_m == pytest.approx(2e-3 * (1 - course), abs=1e-7)
+    assert result.true_drive_force_N == pytest.approx(1.21 * STIFFNESS * 2e-3 * course, abs=1e-3)
+
+
+def cubic_N(ratio):
+    return lambda e: STIFFNESS * e * (1 + ratio * (e / 1e-3) ** 2)
+
+
+def bilinear_N(ratio, knee_m):
+    return lambda e: STIFFNESS * (e + ratio * math.copysign(max(abs(e) - knee_m, 0.0), e))
+
+
+def slack_N(gap_m):
+    return lambda e: STIFFNESS * math.copysign(max(abs(e) - gap_m / 2, 0.0), e)
+
+
+SPRINGS = {
+    "cubic": ({"drive-hardening": {"form": "cubic", "ratio": 0.3}}, cubic_N(0.3)),
+    "softening": ({"drive-hardening": {"form": "cubic", "ratio": -0.05}}, cubic_N(-0.05)),
+    "bilinear": ({"drive-hardening": {"form": "bilinear", "ratio": 0.6, "knee_m": 8e-4}}, bilinear_N(0.6, 8e-4)),
+    "backlash": ({"drive-backlash": {"gap_m": 6e-4}}, slack_N(6e-4)),
+}
+
+
+@pytest.mark.parametrize("name", SPRINGS)
+def test_a_spring_pulls_as_its_formula_and_swings_as_its_equation(name):
+    effects, force_N = SPRINGS[name]
+    result = released(effects)
+    extension_m = result.true_drive_position_m - result.true_position_m
+    assert result.true_drive_force_N == pytest.approx([force_N(e) for e in extension_m], abs=1e-9)
+    expected_m = reference_m(lambda e, _: force_N(e), 2e-3, result.t_s)
+    assert result.true_position_m == pytest.approx(expected_m, abs=2e-6)
+
+
+def test_a_softening_spring_yields_at_its_largest_force_and_never_pushes():
+    config = rig({"drive-hardening": {"form": "cubic", "ratio": -0.2}}, slide={"mass_kg": HEAVY_KG})
+    result = run(config, np.full(1000, 0.01))
+    largest_N = STIFFNESS * 2 / 3 * 1e-3 / math.sqrt(3 * 0.2)
+    assert result.true_drive_force_N.max() == pytest.approx(largest_N, rel=1e-6)
+    assert result.true_drive_force_N[-1] == pytest.approx(largest_N, rel=1e-6)
+
+
+def test_a_drive_that_reverses_crosses_its_gap_before_it_pushes():
+    """Held slide: 0.5 mm forward and back at 5 mm/s, 0.2 mm of it without a force, also for the damper."""
+    gap_m, damping = 2e-4, 10.0
+    config = rig({"drive-backlash": {"gap_m": gap_m}}, slide={"mass_kg": HEAVY_KG}, drive={"damping_Ns_per_m": damping})
+    result = run(config, [0.005] * 100 + [-0.005] * 200)
+    e = result.true_drive_position_m
+    slack = np.abs(e) < gap_m / 2 - 1e-7
+    assert slack.sum() == pytest.approx(3 * gap_m / 2 / 0.005 / 5e-5, abs=3)
+    assert np.all(result.true_drive_force_N[slack] == 0.0)
+    taut = np.abs(e) > gap_m / 2 + 1e-7
+    expected_N = STIFFNESS * (e - np.sign(e) * gap_m / 2) + damping * np.where(result.t_s < 0.10001, 0.005, -0.005)
+    assert result.true_drive_force_N[taut] == pytest.approx(expected_N[taut], abs=2e-3)
+
+
+def test_ripple_in_time_adds_up_to_its_integral():
+    ratio, f_Hz, phase = 0.3, 7.0, 0.5
+    values = {"form": "time", "ratio": ratio, "frequency_Hz": f_Hz, "phase_rad": phase}
+    result = run(rig({"drive-speed-ripple": values}), np.full(1000, 5e-4))
+    w, t_s = TAU * f_Hz, result.t_s
+    expected_m = 5e-4 * (t_s + ratio / w * (math.cos(phase) - np.cos(w * t_s + phase)))
+    assert result.true_drive_position_m == pytest.approx(expected_m, abs=1e-12)
+
+
+def test_ripple_of_a_screw_follows_its_own_angle():
+    ratio, wavelength_m, phase = 0.4, 2e-4, 1.0
+    values = {"form": "screw", "ratio": ratio, "wavelength_m": wavelength_m, "phase_rad": phase}
+    result = run(rig({"drive-speed-ripple": values}), np.full(1000, 5e-4))
+
+    def slope(_, s_d):
+        return 5e-4 * (1 + ratio * np.sin(TAU * s_d / wavelength_m + phase))
+
+    expected_m = solve_ivp(slope, (0, 1), [0.0], t_eval=result.t_s, rtol=1e-10, atol=1e-14).y[0]
+    assert result.true_drive_position_m == pytest.approx(expected_m, abs=3e-9)
+    # one turn takes longer than an even one: the mean of 1 / (1 + r sin) is 1 / sqrt(1 - r^2)
+    turn_s = np.interp(wavelength_m, result.true_drive_position_m, result.t_s)
+    assert turn_s == pytest.approx(wavelength_m / 5e-4 / math.sqrt(1 - ratio**2), rel=1e-3)
+
+
+def test_a_drive_that_only_pushes_with_a_force_has_no_damper():
+    config = rig(contact=NO_FRICTION, drive={"damping_Ns_per_m": 100.0})
+    result = run(config, np.full(200, 3.0), force_driven=True)
+    assert result.true_drive_force_N == pytest.approx(3.0)
+    assert result.true_position_m == pytest.approx(0.5 * 3.0 / MASS_KG * result.t_s**2, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("drive_mps", [5e-4, -5e-4])
+def test_both_kernels_are_the_same_rig_where_nothing_is_on(drive_mps):
+    """Apart from rounding, which a slip cannot amplify within the first second of creep."""
+    config = rig(drive={"damping_Ns_per_m": 20.0})
+    nominal = advance_by(NOMINAL, config, 1000, drive_mps, 2000.0, 2e-8)
+    disturbed = advance_by(DISTURBED, config, 1000, drive_mps, 2000.0, 2e-8)
+    size = np.abs(nominal).max(axis=1, keepdims=True)
+    assert np.abs(disturbed - nominal).max(axis=1) == pytest.approx(np.zeros(len(size)), abs=1e-8 * size.max())
+    assert np.all(np.abs(disturbed - nominal) <= 1e-6 * size)
+
+
+def test_simulate_reports_the_drive_where_it_is():
+    """Not where a linear spring of the force would put it."""
+    result = simulate(rig({"drive-backlash": {"gap_m": 1e-3}}), 0.5)
+    assert result.drive_position_m == pytest.approx(5e-4 * result.t_s, rel=1e-9)

@@ -1,0 +1,183 @@
+"""`stickslip diagnose`: what it prints and writes, for one folder and for many, with a stand-in for the diagnosing."""
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from bridge.faults import FAULTS
+from cockpit.cli import app
+from cockpit.diagnose_output import strict_json
+from diagnosis import many
+from tests import made_up
+
+
+@pytest.fixture(autouse=True)
+def stand_in(monkeypatch):
+    monkeypatch.setattr(many, "real_diagnose", made_up.quick)
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def diagnose(*arguments):
+    return CliRunner().invoke(app, ["diagnose", *map(str, arguments)])
+
+
+def folders(at: Path, *names: str) -> Path:
+    for name in names:
+        made_up.evidence_folder(at / name)
+    return at
+
+
+def files(at: Path) -> set[str]:
+    return {str(path.relative_to(at)) for path in at.rglob("*") if path.is_file()}
+
+
+def test_one_folder_says_the_verdict_first(tmp_path):
+    result = diagnose(folders(tmp_path, "rig") / "rig")
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert lines[0] == "effect: drive-backlash, probability 93 %"
+    assert lines[3].split() == [
+        *["candidates", "drive-backlash", "93", "%", "gap", "81", "µm", "(90", "%:", "76", "to", "86)"]
+    ]
+    assert "drive-hardening" in lines[4]
+    assert "unexplained" in lines[5]
+    assert lines[6].startswith(
+        "gap        6.2 as described, 5.9 retuned, 1.08 with the best explanation; perfect is 1; 98 %"
+    )
+    assert lines[7].startswith("next       Reverse the drive")
+    assert "off by 6 noise floors" in result.stderr
+    assert "off by 6 noise floors" not in result.stdout
+
+
+def test_one_folder_writes_json_report_and_rig(tmp_path, monkeypatch):
+    rigs = []
+
+    class Apply:
+        @staticmethod
+        def write_rig(diagnosis, evidence, path):
+            rigs.append((diagnosis.effects, evidence.folder.name, path.name))
+
+    monkeypatch.setitem(sys.modules, "diagnosis.apply", Apply)
+    folders(tmp_path, "rig")
+    out = tmp_path / "new" / "folder"
+    options = ("--json", out / "a.json", "--report", out / "a.html", "--apply", out / "a.toml", "--jobs", 3)
+    result = diagnose(tmp_path / "rig", *options)
+    assert result.exit_code == 0, result.output
+    assert files(out) == {"a.json", "a.html"}
+    written = json.loads((out / "a.json").read_text())
+    assert written["format"] == "diagnosis/1"
+    assert written["elapsed_s"] == 3.0  # the stand-in says the number of jobs here
+    assert rigs == [(("drive-backlash",), "rig", "a.toml")]
+    assert "Diagnosis of rig" in (out / "a.html").read_text()
+
+
+def test_json_on_stdout_is_nothing_but_json(tmp_path):
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--json", "-")
+    assert json.loads(result.stdout, parse_constant=pytest.fail)["effects"] == ["drive-backlash"]
+    interval = json.loads(result.stdout)["candidates"][3]["parameters"]["damping_Ns_per_m"]["interval_90"]
+    assert interval == [None, None]
+
+
+def test_json_has_no_numbers_that_json_does_not_know():
+    assert strict_json({"a": (float("nan"), 1), "b": [float("-inf"), None, "x", True]}) == {
+        "a": [None, 1],
+        "b": [None, None, "x", True],
+    }
+
+
+@pytest.mark.parametrize("where", ["absent", "refused"])
+def test_bad_evidence_writes_nothing(where, tmp_path):
+    folders(tmp_path, "refused")
+    before = files(tmp_path)
+    options = ("--json", tmp_path / "out" / "a.json", "--report", tmp_path / "out" / "a.html")
+    result = diagnose(tmp_path / where, *options)
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1].startswith("stickslip: BAD_EVIDENCE: ")
+    assert files(tmp_path) == before
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_evidence_as_json_on_stdout(tmp_path):
+    result = diagnose(tmp_path / "absent", "--json", "-")
+    assert result.exit_code == 2
+    assert json.loads(result.stdout)["fault"] == "BAD_EVIDENCE"
+
+
+def test_a_folder_of_folders_gives_every_result_in_order(tmp_path):
+    folders(tmp_path / "all", "c", "a", "refused", "b-broken")
+    (tmp_path / "all" / "no evidence").mkdir()
+    out = tmp_path / "out"
+    result = diagnose(tmp_path / "all", "--json", out / "a.json", "--report", out / "reports", "--jobs", 1)
+    assert result.exit_code == 2
+    assert [line.split(":")[0] for line in result.stdout.splitlines()] == [
+        "a",
+        "b-broken",
+        "c",
+        "refused",
+        f"reports    {out}/reports",
+    ]
+    assert "b-broken: DIAGNOSIS_BROKE: ZeroDivisionError: nothing to divide by (made_up.py, line" in result.stdout
+    assert "4 of 4: refused: BAD_EVIDENCE: run-01.csv: too short" in result.stderr
+    assert files(out) == {"a.json", "reports/a.html", "reports/c.html"}
+    written = json.loads((out / "a.json").read_text())
+    assert written["format"] == "diagnoses/1"
+    results = {one["evidence"]: one for one in written["results"]}
+    assert results["a"]["diagnosis"]["verdict"] == "effect"
+    assert results["refused"]["fault"] == {"fault": "BAD_EVIDENCE", "line": "run-01.csv: too short"}
+
+
+def test_a_broken_program_is_no_bad_evidence(tmp_path):
+    folders(tmp_path, "a", "broken")
+    assert diagnose(tmp_path, "--jobs", 1).exit_code == FAULTS["DIAGNOSIS_BROKE"].exit_status
+
+
+def test_folders_of_the_same_name_keep_apart(tmp_path):
+    folders(tmp_path, "one/rig", "two/rig", "two/other")
+    sources = many.find_sources([tmp_path / "one", tmp_path / "two", tmp_path / "two" / "rig"])
+    assert [source.name for source in sources] == [str(tmp_path / "one/rig"), "other", str(tmp_path / "two/rig")]
+    result = diagnose(tmp_path / "one", tmp_path / "two", "--report", tmp_path / "out", "--jobs", 1)
+    assert result.exit_code == 0
+    assert len(files(tmp_path / "out")) == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["--json", "."], "CONFIG"),
+        (["--report", "rig/run-01.csv/report.html"], "LOG_WRITE"),
+        (["rig2", "--apply", "rig.toml"], "CONFIG"),
+        (["rig2", "--report", "rig/run-01.csv"], "CONFIG"),
+    ],
+)
+def test_what_cannot_be_written_is_said_before_the_work(options, code, tmp_path, monkeypatch):
+    folders(tmp_path, "rig", "rig2")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(many, "real_diagnose", made_up.endless)
+    result = diagnose("rig", *options)
+    assert result.exit_code == FAULTS[code].exit_status
+    assert f"stickslip: {code}: {options[-2]}" in result.stderr
+
+
+def test_a_cluster_without_the_package_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--cluster", "tcp://127.0.0.1:1")
+    assert result.exit_code == 2
+    assert "CONFIG: --cluster: needs the package distributed" in result.stderr
+
+
+def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
+    def interrupted(evidence, progress, jobs):
+        os.kill(os.getpid(), signal.SIGTERM)
+        raise AssertionError("not interrupted")
+
+    monkeypatch.setattr(many, "real_diagnose", interrupted)
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--json", tmp_path / "a.json")
+    assert result.exit_code == 130
+    assert not (tmp_path / "a.json").exists()

@@ -1,0 +1,206 @@
+"""The report of a diagnosis: the answer first, nothing from outside, small, and nothing that a diagnosis holds breaks it."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from diagnosis import wording
+from diagnosis.report import rig_row, where_map, write_report
+from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Parameter, Picture, Shrinkage
+from tests import made_up
+
+NAN = math.nan
+
+
+def page_of(diagnosis: Diagnosis, tmp_path, name: str = "rig-07") -> str:
+    path = tmp_path / "report.html"
+    write_report(diagnosis, name, path)
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+    return path.read_text(encoding="utf-8")
+
+
+def text_of(page: str) -> str:
+    body = re.sub(r"<[^>]*>", " ", page.split("<body>")[1])
+    return re.sub(r"\s+", " ", body)
+
+
+def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
+    text = text_of(page_of(made_up.diagnosis(), tmp_path))
+    assert text.index("drive-backlash, probability 93 %") < 150
+    parts = [
+        "The drive has play",
+        "Which explanation?",
+        "gap 81 µm (90 %: 76 to 86)",
+        "Below 0.5 % each: force-sensor-lag",
+        "Cannot be told apart with these runs: force-sensor-delay, drive-damping",
+        "How far is the model off?",
+        "closes 98 % of the gap that tuning the described numbers leaves open (90 %: 95 % to 100 %)",
+        "flexible residual",
+        "Where does the difference lie?",
+        "drive force stick",
+        "mass acceleration stick",
+        "above 200 Hz",
+        "Pictures",
+        "Third cycle of run-04",
+        "The rig's numbers",
+        "drive stiffness 11.7 kN/m 11.01 kN/m ± 2 % -2.9",
+        "contact stiffness 77.52 MN/m 77.52 MN/m known exactly",
+        "What to measure next",
+        "Reverse the drive",
+        "differ by 4.2 standard deviations",
+        "What is wrong or missing in the data",
+        "12 samples at 20 N were left out",
+        "Words",
+    ]
+    place = 0
+    for part in parts:
+        place = text.index(part, place)
+
+
+def test_twenty_pictures_stay_small_and_nothing_comes_from_outside(tmp_path):
+    pictures = tuple(made_up.picture("residual" if seed % 2 else "cycle", 2000, seed) for seed in range(20))
+    page = page_of(made_up.diagnosis()._replace(pictures=pictures), tmp_path)
+    assert len(page.encode()) < 5e6
+    assert page.count("data:image/png;base64,") == 20
+    assert not re.search(r"https?://|<link|<script|@import|url\(", page)
+    assert all(source.startswith("data:image/png;base64,") for source in re.findall(r'src="([^"]{0,30})', page))
+
+
+def test_too_many_pictures_are_drawn_coarser(tmp_path, monkeypatch):
+    monkeypatch.setattr("diagnosis.report_plots._ALL_BYTES", 60_000)
+    pictures = tuple(made_up.picture("residual", 2000, seed) for seed in range(4))
+    page = page_of(made_up.diagnosis()._replace(pictures=pictures), tmp_path)
+    assert page.count("data:image/png;base64,") == 4
+    assert len(page) < 100_000
+
+
+def test_text_is_text(tmp_path):
+    nasty = "<script>alert('&')</script> $x_1$ {{ 1 }}"
+    made = made_up.diagnosis()
+    curve = Curve(nasty, np.array([0.0, 1.0]), np.array([0.0, 1.0]), "effect")
+    made = made._replace(
+        summary=(nasty,),
+        candidates=(Candidate(nasty, 0.5, nasty, {nasty: Estimate(1.0, (0.0, 2.0))}),),
+        not_distinguishable=((nasty, nasty),),
+        where=(Cell(nasty, nasty, (0.0, 1.0), nasty, 1.0),),
+        gap=made.gap._replace(definition=nasty, runs=(nasty,), compared=(Shrinkage(nasty, 1.0, 0.0, None),)),
+        pictures=(Picture("residual", nasty, nasty, nasty, (curve,)),),
+        findings=(made.findings[0]._replace(kind=nasty, where=nasty, text=nasty),),
+    )
+    page = page_of(made, tmp_path, nasty)
+    assert "<script" not in page
+    assert "{{ 1 }}" in page
+
+
+@pytest.mark.parametrize("verdict", ["no-gap", "unexplained"])
+def test_a_diagnosis_with_nothing_in_it(verdict, tmp_path):
+    made = made_up.diagnosis()
+    empty = made._replace(
+        verdict=verdict,
+        effects=(),
+        summary=(),
+        candidates=(),
+        not_distinguishable=(),
+        where=(),
+        gap=made.gap._replace(runs=(), shrinkage=None, interval_90=None, compared=()),
+        next_experiment=made.next_experiment._replace(gain=None),
+        rig=(),
+        findings=(),
+        pictures=(),
+    )
+    page = page_of(empty, tmp_path)
+    assert f'class="verdict {verdict}"' in page
+    assert "There was no gap to close." in page
+    assert "No place stands out." in page
+    assert "base64" not in page
+
+
+def test_numbers_that_are_none(tmp_path):
+    made = made_up.diagnosis()
+    hole = Curve("hole", np.array([0.0, 1.0, 2.0]), np.array([NAN, math.inf, 1.0]), "measured")
+    nothing = Curve("nothing", np.array([]), np.array([]), "points")
+    broken = made._replace(
+        candidates=(
+            Candidate("drive-backlash", NAN, "", {"gap_m": Estimate(NAN, (NAN, math.inf))}),
+            Candidate("none", 0.0),
+        ),
+        where=(Cell("drive_force_N", "slip", (0.0, math.inf), "run-01", NAN), Cell("x", "new", (0.0, 1.0), "r", 0.4)),
+        gap=made.gap._replace(nominal=NAN, retuned=math.inf, with_effect=-1.0, floor=NAN, interval_90=(NAN, NAN)),
+        next_experiment=made.next_experiment._replace(gain=NAN),
+        rig=(Parameter("mass_kg", NAN, math.inf, 0.1), Parameter("drive_damping_Ns_per_m", 0.0, 1.0, 0.1)),
+        pictures=(Picture("cycle", "", "", "", (hole, nothing)), Picture("residual", "", "", "", ())),
+        elapsed_s=NAN,
+    )
+    page = page_of(broken, tmp_path)
+    assert "unknown" in page
+    assert "width: nan" not in page
+
+
+def test_the_map_keeps_the_order_of_a_cycle_and_counts_what_it_leaves_out():
+    cells = tuple(
+        Cell("drive_force_N", regime, (0.0, 20.0), run, share)
+        for regime, run, share in (
+            ("steady", "b", 0.5),
+            ("stick", "a", 0.3),
+            ("slip", "b", 0.196),
+            ("restick", "a", 0.004),
+        )
+    )
+    runs, rows, left_out = where_map(cells)
+    assert runs == ["a", "b"]
+    assert [(row.regime, row.shares) for row in rows] == [
+        ("stick", [0.3, None]),
+        ("slip", [None, 0.196]),
+        ("steady", [None, 0.5]),
+    ]
+    assert left_out == pytest.approx(0.004)
+
+
+def test_an_effect_that_cannot_be_told_from_another_says_so_at_once():
+    made = made_up.diagnosis()._replace(not_distinguishable=(("drive-damping", "drive-backlash"),))
+    assert "or drive-damping, which would look the same" in wording.headline(made)
+    assert "two and three" in wording.headline(made._replace(effects=("two", "three")))
+
+
+@pytest.mark.parametrize(
+    ("name", "estimate", "words"),
+    [
+        ("gap_m", Estimate(8.1e-5, (7.6e-5, 8.6e-5)), "gap 81 µm (90 %: 76 to 86)"),
+        ("delay_s", Estimate(1.04e-3, (1.01e-3, 1.07e-3)), "delay 1.040 ms (90 %: 1.010 to 1.070)"),
+        ("ratio", Estimate(0.052, (0.048, 0.056)), "relative change 5.20 % (90 %: 4.80 to 5.60)"),
+        ("damping_Ns2_per_m2", Estimate(210.0, (NAN, NAN)), "damping 210 N s²/m²"),
+        ("rate_per_s", Estimate(0.002, (0.001, 0.003)), "rate 0.0020 1/s (90 %: 0.0010 to 0.0030)"),
+        ("compliance_m_per_N", Estimate(1e-6, (NAN, NAN)), "compliance 1 µm/N"),
+        ("exponent", Estimate(0.3, (0.3, 0.3)), "exponent 0.3 (90 %: 0.3 to 0.3)"),
+        ("corner_Hz", Estimate(3000.0, (2900.0, 3100.0)), "corner 3.00 kHz (90 %: 2.90 to 3.10)"),
+    ],
+)
+def test_an_estimate_in_words(name, estimate, words):
+    assert wording.estimate_in_words(name, estimate) == words
+
+
+def test_every_effect_of_the_library_has_words():
+    from plant.effects import EFFECTS
+
+    assert wording.EFFECT_WORDS.keys() >= EFFECTS.keys()
+
+
+def test_what_is_nearly_sure_is_not_certain():
+    assert [wording.percent(share) for share in (0.0, 1e-4, 0.004, 0.93, 0.996, 0.9999, 1.0, NAN, None)] == [
+        "0 %",
+        "< 0.1 %",
+        "0.4 %",
+        "93 %",
+        "99.6 %",
+        "> 99.9 %",
+        "100 %",
+        "unknown",
+        "unknown",
+    ]
+
+
+def test_a_number_known_exactly_has_not_moved():
+    assert rig_row(Parameter("mass_kg", 1.5, 1.5, 0.0)).shift_sd is None
+    assert rig_row(Parameter("mass_kg", 1.5, 1.53, 0.01)).shift_sd == pytest.approx(2.0)
