@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.axis_motion import Motion, motion_of
 from diagnosis.evidence import Run
 from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S
@@ -19,6 +20,7 @@ _WINDOW = 100  # blocks: 0.1 s, over which a velocity is read from a position wi
 # A change of speed is one when it is larger than this share of the faster speed; a ripple of a screw stays below.
 _SMALLEST_CHANGE = 0.35
 _SHORTEST_S = 0.3
+_SETTLING = 100  # blocks after a change of command: 0.1 s, in which a drive or a piezo may still be moving
 
 
 class Segment(NamedTuple):
@@ -50,6 +52,7 @@ class Commands(NamedTuple):
     frequency_Hz: Floats
     amplitude_m: Floats
     segments: tuple[Segment, ...]
+    motion: Motion | None = None  # of the slide, with a force drive
 
 
 def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands:
@@ -64,7 +67,8 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
         amplitude_m = np.where(frequency_Hz > 0.0, amplitude_m, 0.0)
     if rig.drive == "force":
         drive = reduced["drive_force_N"]
-        return Commands(drive, frequency_Hz, amplitude_m, (Segment(0, blocks, 0.0, 0.0, 0.0),))
+        motion = motion_of(reduced, len(run.t_s) / blocks, rig.mass_kg)
+        return Commands(drive, frequency_Hz, amplitude_m, (Segment(0, blocks, 0.0, 0.0, 0.0),), motion)
     if run.drive_velocity_mps is not None:
         drive = np.full(blocks, run.drive_velocity_mps)
     else:
@@ -72,7 +76,13 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
     change = (np.diff(drive) != 0.0) | (np.diff(frequency_Hz) != 0.0) | (np.diff(amplitude_m) != 0.0)
     edges = [0, *(np.flatnonzero(change) + 1).tolist(), blocks]
     segments = tuple(
-        Segment(first, last, float(drive[first]), float(frequency_Hz[first]), float(amplitude_m[first]))
+        Segment(
+            first + (_SETTLING if first else 0),
+            last,
+            float(drive[first]),
+            float(frequency_Hz[first]),
+            float(amplitude_m[first]),
+        )
         for first, last in pairwise(edges)
         if (last - first) * BLOCK_S >= _SHORTEST_S
     )

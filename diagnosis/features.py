@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.fft import dct
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
@@ -24,9 +25,10 @@ Band = tuple[float, float]
 LOW: Band = (0.0, 5.0)
 MIDDLE: Band = (5.0, 50.0)
 HIGH: Band = (50.0, 500.0)
+# features that are powers of what is left: noise and roughness add to them
+POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 # instants of a slip at which its shape is read, in half periods of the mass on its spring after the middle of the fall
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
-_SETTLING_BLOCKS = 100  # after a change of command: 0.1 s, in which a drive or a piezo may still be moving
 _LEVELS = 8  # bins of a segment without slips
 _BREAKAWAY_WAVES = 5
 _DRIVE_WAVES = 24
@@ -76,17 +78,15 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
     """All features of a run with a spring drive; which ones, depends on commands and channels only."""
     found = Features()
     for number, segment in enumerate(commands.segments):
-        first = segment.first + (_SETTLING_BLOCKS if segment.first else 0)
+        own = slice(segment.first, segment.last)
         cut = {
-            name: values[first : segment.last]
-            if name.endswith("shake_mps2")
-            else segment.sign * values[first : segment.last]
+            name: values[own] if name.endswith("shake_mps2") else segment.sign * values[own]
             for name, values in signals.items()
         }
         slips = _find_slips(cut, scales)
         if "drive_force_N" in cut:
             _cycles(found, number, cut["drive_force_N"], slips)
-            settled = max(segment.settled - first, 0)
+            settled = max(segment.settled - segment.first, 0)
             _level(found, number, cut["drive_force_N"][settled:], slips, segment.at_the_edge)
         _period(found, number, slips)
         _shapes(found, number, cut, slips, scales)
@@ -98,11 +98,20 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
     return found
 
 
-def first_restick(signals: Signals, segment: Segment, scales: Scales) -> int:
-    """Block of the first re-stick in a segment, its first block if nothing slips there."""
+def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
+    """A segment without what its start decides: how loaded the spring was then, and how old the contact at the first slip.
+
+    With three slips or more it begins in the second stick; with fewer only its levels begin after the first re-stick.
+    """
     cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
     slips = _find_slips(cut, scales)
-    return segment.first + int(slips.bottoms[0]) if len(slips.bottoms) else segment.first
+    if len(slips.bottoms) == 0:
+        return segment
+    restick = segment.first + int(slips.bottoms[0])
+    if len(slips.bottoms) < 3:
+        return segment._replace(settled=restick)
+    stick = int(slips.tops[1] - slips.bottoms[0])
+    return segment._replace(first=restick + int(0.4 * stick))
 
 
 def _find_slips(cut: Signals, scales: Scales) -> _Slips:
@@ -150,7 +159,7 @@ def _cycles(found: Features, number: int, force_N: Floats, slips: _Slips) -> Non
 
 
 def _moments(values: Floats, at: Floats, waves: int) -> list[float]:
-    """Mean, cosine waves over the segment as far as the cycles carry them, and the log scatter of what is left."""
+    """Mean, cosine waves over the segment as far as the cycles carry them, and the power of what is left."""
     n = len(values)
     result = [math.nan] * (waves + 2)
     if n == 0:
@@ -162,7 +171,7 @@ def _moments(values: Floats, at: Floats, waves: int) -> list[float]:
     result[1 : 1 + carried] = weights[1:].tolist()
     if n >= 6:
         left = values - columns @ weights
-        result[-1] = 0.5 * math.log(float(left @ left) / (n - carried - 1) + 1e-12)
+        result[-1] = float(left @ left) / (n - carried - 1)
     return result
 
 
@@ -188,14 +197,8 @@ def _level(found: Features, number: int, force_N: Floats, slips: _Slips, at_the_
     for bin_ in range(_LEVELS):
         value = float(force_N[edges[bin_] : edges[bin_ + 1]].mean()) if still else math.nan
         found.add(f"level {bin_}", name, "steady", LOW, number, value)
-    if still:
-        short, long = uniform_filter1d(force_N, 5), uniform_filter1d(force_N, 100)
-        middle, high = (
-            0.5 * math.log(float(np.var(short - long)) + 1e-12),
-            0.5 * math.log(float(np.var(force_N - short)) + 1e-12),
-        )
-    else:
-        middle, high = math.nan, math.nan
+    short, long = uniform_filter1d(force_N, 5), uniform_filter1d(force_N, 100)
+    middle, high = (float(np.var(short - long)), float(np.var(force_N - short))) if still else (math.nan, math.nan)
     found.add("ripple", name, "steady", MIDDLE, number, middle)
     found.add("ripple", name, "steady", HIGH, number, high)
 
@@ -221,7 +224,7 @@ def _shapes(found: Features, number: int, cut: Signals, slips: _Slips, scales: S
             shape = np.interp(at.ravel(), np.arange(blocks), signal).reshape(at.shape).mean(axis=0)
             fast = signal - uniform_filter1d(signal, 5)
             near = (slips.middles[inside, None] + np.arange(int(3.0 * width))).astype(np.int64)
-            ring = 0.5 * math.log(float(np.mean(fast[np.minimum(near, blocks - 1)] ** 2)) + 1e-18)
+            ring = float(np.mean(fast[np.minimum(near, blocks - 1)] ** 2))
         if name == "drive_force_N":
             shape = shape - shape.mean()
         if name == "mass_position_m":
@@ -260,23 +263,29 @@ def _parity(found: Features, signals: Signals, scales: Scales) -> None:
     rate_mps = np.gradient(smooth, BLOCK_S)
     reach_m = scales.force_N / scales.stiffness_N_per_m
     both = force_N.min() < -0.3 * scales.force_N and force_N.max() > 0.3 * scales.force_N
-    columns = [
-        np.ones_like(force_N),
-        extension_m / reach_m,
-        rate_mps * 1e3,
-        (extension_m / reach_m) ** 3,
-        np.linspace(-1.0, 1.0, len(force_N)),
-    ]
+    columns = {
+        "stiffness": extension_m / reach_m,
+        "rate": rate_mps * 1e3,
+        "cube": (extension_m / reach_m) ** 3,
+        "time": np.linspace(-1.0, 1.0, len(force_N)),
+    }
     if both:
-        columns.append(np.sign(force_N))
-    matrix = np.stack(columns, axis=1)
-    weights, *_ = np.linalg.lstsq(matrix, force_N, rcond=None)
-    left = force_N - matrix @ weights
-    names = ("stiffness", "rate", "cube", "time", "direction")
-    values = [*weights[1:].tolist(), math.nan][: len(names)]
-    for name, value in zip(names, values, strict=True):
-        found.add(f"spring {name}", "drive_force_N", "stick", LOW, -1, value)
-    found.add("spring rest", "drive_force_N", "stick", MIDDLE, -1, 0.5 * math.log(float(left.var()) + 1e-12))
+        columns["direction"] = np.sign(force_N)
+    # one after the other, each freed of those before it: together they would pass noise on to each other
+    basis = [np.full(len(force_N), len(force_N) ** -0.5)]
+    left = force_N - force_N.mean()
+    for name, column in columns.items():
+        free = column.copy()
+        for before in basis:
+            free -= before * float(before @ free)
+        power = float(free @ free) + 1e-30
+        weight = float(free @ left) / power
+        left = left - weight * free
+        basis.append(free / power**0.5)
+        found.add(f"spring {name}", "drive_force_N", "stick", LOW, -1, weight)
+    if not both:
+        found.add("spring direction", "drive_force_N", "stick", LOW, -1, math.nan)
+    found.add("spring rest", "drive_force_N", "stick", MIDDLE, -1, float(left.var()))
 
 
 def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
@@ -285,12 +294,11 @@ def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
     for segment in commands.segments:
         rows = slice(segment.first, segment.last)
         rest_m[rows] = _without_line(position_m[rows], segment)
-    time = (np.arange(len(rest_m)) + 0.5) / len(rest_m)
-    for wave in range(1, _DRIVE_WAVES + 1):
-        value = 2.0 * float(rest_m @ np.cos(np.pi * wave * time)) / len(rest_m)
+    waves = dct(rest_m)[1 : _DRIVE_WAVES + 1] / len(rest_m)
+    for wave, value in enumerate(waves.tolist(), start=1):
         found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
     fast = rest_m - uniform_filter1d(rest_m, 100)
-    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, 0.5 * math.log(float(fast.var()) + 1e-18))
+    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()))
 
 
 def _without_line(position_m: Floats, segment: Segment) -> Floats:

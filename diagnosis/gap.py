@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.features import Feature
+from diagnosis.features import POWERS, Feature
 from diagnosis.problem import Draw, Point, Problem
 from diagnosis.twin import Roughness
 
@@ -31,7 +31,8 @@ DEFINITION = (
     "features (cycle means and trends, slip shapes, levels, vibration, parity relations), each in units of the scatter of "
     "replicates of the model with measured noise and a rough surface; beyond 6 units logarithmic; 1.0 is a perfect model"
 )
-_KNEE = 6.0
+KNEE = 6.0
+_LEAST_POWER = 1e-30
 _MISSING = 4.0  # floors, where the rig shows something that the model does not
 _FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
 CellKey = tuple[str, str, tuple[float, float], str]
@@ -41,21 +42,26 @@ class Floor(NamedTuple):
     """What a perfect model would still show, feature by feature. [features] each, of the problem it was made for."""
 
     bias: Floats  # mean of the replicates less the noise-free prediction
+    powers: npt.NDArray[np.bool_]  # features that are powers: noise adds to them, and they are compared as logarithms
     scatter: Floats
     compared: npt.NDArray[np.bool_]
     whitening: Floats  # [compared, compared]: makes differences of replicates independent
     cells: tuple[CellKey, ...]  # of every compared feature
     level: float  # gap of the replicates themselves
 
+    def expected(self, predicted: Floats) -> Floats:
+        """A noise-free prediction [features] as a rough and noisy rig would show it on average."""
+        return _logarithms(predicted + self.bias, self.powers)
 
-def compress(z: Floats) -> Floats:
-    """T of the definition."""
-    return _KNEE * np.arcsinh(z / _KNEE)
+
+def compress(z: Floats, knee: float = KNEE) -> Floats:
+    """T of the definition; fits begin with a larger knee."""
+    return knee * np.arcsinh(z / knee)
 
 
-def slope_of_compress(z: Floats) -> Floats:
+def slope_of_compress(z: Floats, knee: float = KNEE) -> Floats:
     """Its derivative."""
-    return 1.0 / np.sqrt(1.0 + (z / _KNEE) ** 2)
+    return 1.0 / np.sqrt(1.0 + (z / knee) ** 2)
 
 
 def replicates(problem: Problem, point: Point, roughness: Roughness, count: int, seed: int) -> Floats:
@@ -71,15 +77,16 @@ def replicates(problem: Problem, point: Point, roughness: Roughness, count: int,
 
 def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
     """The floor from replicates of the model at `point`, [count, features]."""
+    labels = problem.labels
+    powers = np.array([label.name in POWERS for _, label in labels])
     plain = problem.predicted(point)
     finite = np.isfinite(drawn)
     compared = (finite.mean(axis=0) >= _FEWEST_FINITE) & np.isfinite(plain) & np.isfinite(problem.measured)
     count = np.maximum(finite.sum(axis=0), 1)
-    filled = np.where(finite, drawn, 0.0)
-    mean = filled.sum(axis=0) / count
-    about = np.where(finite, drawn - mean, 0.0)
+    mean = np.where(finite, drawn, 0.0).sum(axis=0) / count
+    bias = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
+    about = np.where(finite, _logarithms(drawn, powers) - _logarithms(mean, powers), 0.0)
     spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
-    labels = problem.labels
     least = np.array([_least(label, problem) for _, label in labels])
     scatter = np.hypot(spread, least)
     z = compress(about[:, compared] / scatter[compared])
@@ -88,16 +95,21 @@ def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
         for (file, label), use in zip(labels, compared, strict=True)
         if use
     )
-    mean = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
     # the least scatter is as much a part of the floor as the drawn one: what of it the replicates do not show is added
     promised = (least[compared] / scatter[compared]) ** 2
     level = np.sqrt(np.mean([_gap_squared(row, cells, promised) for row in z]))
-    return Floor(mean, scatter, compared, _whitening(z, promised), cells, float(level))
+    return Floor(bias, powers, scatter, compared, _whitening(z, promised), cells, float(level))
+
+
+def _logarithms(values: Floats, powers: npt.NDArray[np.bool_]) -> Floats:
+    """Powers as half their logarithm, so that a difference is a relative one of amplitudes; the rest as it is."""
+    return np.where(powers, 0.5 * np.log(np.maximum(values, _LEAST_POWER)), values)
 
 
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     """Measured less predicted in floors, [compared], not compressed."""
-    z = (problem.measured - floor.bias - predicted)[floor.compared] / floor.scatter[floor.compared]
+    apart = _logarithms(problem.measured, floor.powers) - floor.expected(predicted)
+    z = apart[floor.compared] / floor.scatter[floor.compared]
     return np.where(np.isfinite(z), z, _MISSING)
 
 
@@ -150,11 +162,11 @@ def _least(label: Feature, problem: Problem) -> float:
     force_N, slip_s, _, stiffness = problem.scales
     drop_m = 0.3 * force_N / stiffness  # of a slip, for friction that falls by a sixth
     if label.name in {"scatter", "ripple", "rest"}:
-        return 0.4  # logarithms of small powers, which hum, slow noise and the roughness of one track reach
+        return 0.4  # small powers, which hum, slow noise and the roughness of one track reach
     if label.name in {"ring", "spring rest"}:
         return 0.15
     if label.name.startswith("spring"):
-        return 1e-3 * force_N
+        return 2e-3 * force_N  # a displacement sensor's bow of 0.2 % changes its slope along the track
     if label.name.startswith("vibration"):
         return 0.003 if label.signal == "base_accel_mps2" else 0.02
     if label.name == "period":

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import savgol_filter
 
 from diagnosis.commands import Commands
 from diagnosis.features import Scales, Signals
@@ -17,6 +18,7 @@ Floats = npt.NDArray[np.float64]
 _WINDOW = 21  # blocks
 _SLOW_SHARE = 3e-4  # of the static friction: 5 mN on the paper's rig, the drift of a strain gauge within 10 s
 _SLOW_WAVES = 6
+_AXIS_WINDOW = 41  # blocks
 
 
 class Noise(NamedTuple):
@@ -41,6 +43,8 @@ class Noise(NamedTuple):
 
 def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
     """The noise of a reduced run."""
+    if commands.motion is not None:
+        return _axis_noise(signals, scales)
     leading = signals.get("drive_force_N", signals.get("mass_accel_mps2"))
     assert leading is not None, "evidence without force and acceleration is refused when it is read"  # noqa: S101
     speed = np.abs(leading - uniform_filter1d(leading, _WINDOW))
@@ -62,4 +66,17 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
         else:
             rest = values - uniform_filter1d(values, _WINDOW)
             pieces[name] = rest[quiet] * (_WINDOW / (_WINDOW - 1.0)) ** 0.5
+    return Noise(pieces, shake, _SLOW_SHARE * scales.force_N)
+
+
+def _axis_noise(signals: Signals, scales: Scales) -> Noise:
+    """With a force drive the slide hardly ever rests: what a cubic over 41 ms leaves, without the ends and the reversals."""
+    pieces: dict[str, Floats] = {}
+    for name, values in signals.items():
+        rest = values - savgol_filter(values, _AXIS_WINDOW, 3)
+        size = uniform_filter1d(np.abs(rest), _AXIS_WINDOW)
+        calm = size <= 2.0 * np.median(size)
+        calm[:_AXIS_WINDOW] = calm[-_AXIS_WINDOW:] = False
+        pieces[name] = rest[calm] if calm.sum() >= 500 else rest
+    shake = {name: float(np.median(values)) for name, values in signals.items() if name.endswith("shake_mps2")}
     return Noise(pieces, shake, _SLOW_SHARE * scales.force_N)

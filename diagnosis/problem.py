@@ -6,10 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
+from diagnosis.axis_drive import relative, true_commands
 from diagnosis.axis_features import axis_features
 from diagnosis.commands import Commands, commands_of
 from diagnosis.evidence import Evidence, Run
-from diagnosis.features import Feature, Features, Scales, Signals, first_restick, spring_features
+from diagnosis.features import Feature, Features, Scales, Signals, settled, spring_features
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.reduced import BLOCK_S, reduce_run
@@ -84,7 +85,9 @@ class Problem:
         if draw is not None:
             start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
             roughness = draw.roughness
-        raw = self._raw(run, point.values, moving, start, roughness)
+        if self.rig.drive == "force":
+            return self._led(run, point, moving, start, draw)
+        raw = self._raw(run, run.commands, point.values, moving, start, roughness, None)
         result = sensed(raw, run.commands.frequency_Hz, point.effects, point.chain, run.start.t_s)
         result = {name: result[name] for name in run.signals}
         for name in result:
@@ -96,14 +99,44 @@ class Problem:
             result[name] = np.clip(result[name], low, high)
         return result
 
+    def _led(self, run: Prepared, point: Point, moving: Effects, start: Start, draw: Draw | None) -> Signals:
+        """As `signals`, for a force drive: the force that leads the model along the measured motion."""
+        chain = relative(point.chain)
+        commands = true_commands(run.commands, point.effects, chain, run.start.t_s)
+        blocks = len(commands.drive)
+        noise: Signals = {}
+        if draw is not None:
+            noise = {name: run.noise.drawn(name, blocks, draw.random) for name in run.signals}
+            motion = commands.motion
+            if motion is not None and "mass_position_m" in noise:
+                motion = motion._replace(position_m=motion.position_m + noise["mass_position_m"])
+            # a disturbed input moves the mass, and what it takes to put that right is what noise costs
+            commands = commands._replace(drive=commands.drive + noise["drive_force_N"], motion=motion)
+        sensors = {name: table for name, table in point.effects.items() if name in SENSOR_EFFECTS}
+        inputs = (chain, tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(sensors.items())))
+        raw = self._raw(run, commands, point.values, moving, start, draw.roughness if draw else None, inputs)
+        result = sensed(raw, commands.frequency_Hz, point.effects, chain, run.start.t_s)
+        result = {name: result[name] for name in run.signals}
+        for name, values in noise.items():
+            result[name] = result[name] - values if name == "drive_force_N" else result[name] + values
+        return result
+
     def _raw(
-        self, run: Prepared, values: dict[str, float], effects: Effects, start: Start, roughness: Roughness | None
+        self,
+        run: Prepared,
+        commands: Commands,
+        values: dict[str, float],
+        effects: Effects,
+        start: Start,
+        roughness: Roughness | None,
+        inputs: object,
     ) -> Signals:
         force_driven = self.rig.drive == "force"
         if roughness is not None:
-            return predict(rig_config(self.rig, values, effects, roughness), force_driven, run.commands, start)
+            return predict(rig_config(self.rig, values, effects, roughness), force_driven, commands, start)
         key = (
             run.file,
+            inputs,
             tuple(sorted(values.items())),
             tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(effects.items())),
         )
@@ -111,7 +144,7 @@ class Problem:
             if len(self._simulated) > 64:  # of 0.6 MB each
                 self._simulated.pop(next(iter(self._simulated)))
             self._simulated[key] = predict(
-                rig_config(self.rig, values, effects, None), force_driven, run.commands, start
+                rig_config(self.rig, values, effects, None), force_driven, commands, start
             )
         return self._simulated[key]
 
@@ -140,25 +173,27 @@ def _prepare(rig: RigTable, run: Run) -> Prepared:
         line = f"{run.file}: t_s: {blocks * BLOCK_S:.3g} s long: must be 1 s at least; give a longer run"
         raise Fault("BAD_EVIDENCE", line)
     commands = commands_of(run, rig, signals)
-    if rig.drive == "spring" and commands.segments:
-        first = commands.segments[0]
-        first = first._replace(settled=first_restick(signals, first, scales_of(rig)))
-        commands = commands._replace(segments=(first, *commands.segments[1:]))
+    if rig.drive == "spring":
+        scales = scales_of(rig)
+        commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
     noise = noise_of(signals, commands, scales_of(rig))
     clipped = {
         name: (float(run.columns[name].min()), float(run.columns[name].max()))
         for name in run.clipped
         if name in signals
     }
-    return Prepared(run.file, run.holdout, signals, commands, _start(rig, signals, start_s), noise, clipped)
+    return Prepared(run.file, run.holdout, signals, commands, _start(rig, signals, commands, start_s), noise, clipped)
 
 
-def _start(rig: RigTable, signals: Signals, start_s: float) -> Start:
+def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) -> Start:
     first = slice(0, 10)
     if rig.drive == "force":
-        position = signals.get("mass_position_m")
-        at_m = 0.0 if position is None else float(position[0])
-        return Start(start_s, 0.0, at_m)
+        assert commands.motion is not None, "a force drive has a motion"  # noqa: S101
+        at_m, velocity_mps = (float(values[0]) for values in commands.motion[:2])
+        # the bristle as it is in steady sliding, or as it holds the force at rest
+        sliding = abs(velocity_mps) > rig.stribeck_velocity_mps
+        force_N = float(signals["drive_force_N"][first].mean())
+        return Start(start_s, np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)
     force_N = float(signals["drive_force_N"][first].mean()) if "drive_force_N" in signals else 0.7 * rig.coulomb_force_N
     if "mass_position_m" in signals:
         at_m = float(signals["mass_position_m"][first].mean())

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.gap import Floor, compress, differences, slope_of_compress
+from diagnosis.gap import KNEE, Floor, compress, differences, slope_of_compress
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
 from diagnosis.twin import Effects
@@ -18,7 +18,8 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.float64]
 _STEP = 0.5  # of a tolerance: large against the grid, small against the curvature
-_MOST_TOLERANCES = 4.0
+_MOST_TOLERANCES = 5.0
+_WORTH_A_STEP = 0.5  # of chi2
 
 
 class Axis(NamedTuple):
@@ -63,6 +64,24 @@ class Form(NamedTuple):
 NOTHING = Form({}, ())
 
 
+class Stage(NamedTuple):
+    """How a fit proceeds."""
+
+    steps: int
+    renew_every: (
+        int  # steps after which the nuisances' derivatives are computed anew; 0: those of the retuned rig serve
+    )
+    knee: float  # of the compression
+
+
+# Far off, compressed differences pull at nothing: there a fit is nearly one of plain squares.
+FAR_KNEE = 60.0
+_FAR = Stage(4, 2, FAR_KNEE)
+_NEAR = Stage(6, 3, KNEE)
+QUICK = Stage(2, 0, FAR_KNEE)
+_FAR_OFF = 3.0 * KNEE
+
+
 class Fit(NamedTuple):
     """A model fitted to the measured features of a problem."""
 
@@ -91,88 +110,108 @@ class Fitter:
         self.problem = problem
         self.floor = floor
         self.nuisances = nuisances
-        self._nuisance_columns: Floats | None = None
+        self._rates = np.zeros((int(floor.compared.sum()), len(nuisances)))
 
     def predicted(self, deviations: Floats, effects: Effects) -> Floats:
-        """Features of the model, [features]."""
+        """Features of the model, free of noise [features]."""
         return self.problem.predicted(self.nuisances.point(deviations, effects))
 
-    def whitened(self, predicted: Floats) -> tuple[Floats, Floats]:
+    def whitened(self, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
         """Whitened compressed differences [compared], and the derivative of the compression there."""
         z = differences(self.floor, self.problem, predicted)
-        return self.floor.whitening @ compress(z), slope_of_compress(z)
+        return self.floor.whitening @ compress(z, knee), slope_of_compress(z, knee)
 
-    def column(self, change: Floats, slope: Floats) -> Floats:
-        """A change of the prediction [features] as a column of derivatives of the whitened prediction."""
-        z = change[self.floor.compared] / self.floor.scatter[self.floor.compared] * slope
+    def column(self, here: Floats, there: Floats, slope: Floats) -> Floats:
+        """The way from one prediction [features] to another as it shows in whitened compressed differences."""
+        z = (self.floor.expected(there) - self.floor.expected(here))[self.floor.compared]
+        z *= slope / self.floor.scatter[self.floor.compared]
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
-    def retuned(self, deviations: Floats, steps: int = 3) -> Fit:
-        """The rig without effects, refitted; derivatives are computed at the end point."""
-        fit = self.fit(NOTHING, deviations, np.zeros(0), steps=1, renew=True)
-        for _ in range(steps - 1):
-            before = fit.chi2
-            fit = self.fit(NOTHING, fit.deviations, np.zeros(0), steps=2, renew=True)
-            if before - fit.chi2 < 1.0:
-                break
+    def retuned(self, deviations: Floats) -> Fit:
+        """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
+        fit = self.fit(NOTHING, deviations, np.zeros(0), _FAR)
+        fit = self.fit(NOTHING, fit.deviations, fit.w, _NEAR)
+        self._rates = self._nuisance_rates(fit.deviations, {}, self.predicted(fit.deviations, {}))
         return fit
 
-    def fit(self, form: Form, deviations: Floats, w: Floats, steps: int = 4, renew: bool = False) -> Fit:
-        """Fit a form from a starting point."""
-        here = self.predicted(deviations, form.tables(w))
-        residual, slope = self.whitened(here)
-        chi2 = self._chi2(form, residual, deviations, w)
+    def described(self, deviations: Floats) -> Fit:
+        """The rig as it stands, with its nuisances' derivatives, under the wide compression of a far start."""
+        return self.fit(NOTHING, deviations, np.zeros(0), Stage(0, 1, FAR_KNEE))
+
+    def judged(self, fit: Fit) -> Fit:
+        """A fit of any stage with the chi2 and the residual of the gap's own compression."""
+        residual, _ = self.whitened(self.predicted(fit.deviations, fit.effects))
+        prior = np.concatenate([np.ones(len(fit.deviations)), [1.0 / axis.prior for axis in fit.form.axes]])
+        chi2 = self._chi2(prior, residual, np.concatenate([fit.deviations, fit.w]))
+        return fit._replace(chi2=chi2, residual=residual)
+
+    def refit(self, form: Form, deviations: Floats, w: Floats) -> Fit:
+        """Fit a form to the end, from a starting point that may be far off."""
+        z = differences(self.floor, self.problem, self.predicted(deviations, form.tables(w)))
+        if np.abs(z).max() > _FAR_OFF:
+            fit = self.fit(form, deviations, w, _FAR)
+            deviations, w = fit.deviations, fit.w
+        return self.fit(form, deviations, w, _NEAR)
+
+    def fit(self, form: Form, deviations: Floats, w: Floats, stage: "Stage") -> Fit:
+        """Fit a form from a starting point, in the way of one stage."""
+        steps, renew_every, knee = stage
         own = len(deviations)
-        raw: Floats | None = None
         prior = np.concatenate([np.ones(own), [1.0 / axis.prior for axis in form.axes]])
-        columns = np.zeros((len(residual), own + len(w)))
+        now = np.concatenate([deviations, w])
+        here = self.predicted(now[:own], form.tables(now[own:]))
+        residual, slope = self.whitened(here, knee)
+        chi2 = self._chi2(prior, residual, now)
+        nuisance_rates = self._rates
         for step in range(steps + 1):
-            if renew or self._nuisance_columns is None:
-                self._nuisance_columns = self._derivatives(deviations, form.tables(w), here)
-                renew = False
-            raw = np.column_stack([self._nuisance_columns, self._axis_derivatives(form, deviations, w, here)])
-            columns = np.column_stack([self.column(raw[:, i], slope) for i in range(raw.shape[1])])
+            if renew_every and step % renew_every == 0 and (step < steps or steps == 0):
+                nuisance_rates = self._nuisance_rates(now[:own], form.tables(now[own:]), here)
+            rates = np.column_stack([nuisance_rates, self._axis_rates(form, now[:own], now[own:], here)])
+            columns = self.floor.whitening @ (rates * slope[:, None])
             if step == steps:
                 break
-            now = np.concatenate([deviations, w])
             normal = columns.T @ columns + np.diag(prior**2)
             change = np.linalg.solve(normal, columns.T @ residual - prior**2 * now)
-            gained = False
+            gain = 0.0
             for share in (1.0, 0.4, 0.1):
                 ahead = now + share * change
                 ahead[:own] = np.clip(ahead[:own], -_MOST_TOLERANCES, _MOST_TOLERANCES)
-                try_residual_at = self.predicted(ahead[:own], form.tables(ahead[own:]))
-                try_residual, try_slope = self.whitened(try_residual_at)
-                try_chi2 = self._chi2(form, try_residual, ahead[:own], ahead[own:])
-                if try_chi2 < chi2 - 1e-9:
-                    gain = chi2 - try_chi2
-                    deviations, w = ahead[:own], ahead[own:]
-                    here, residual, slope, chi2 = try_residual_at, try_residual, try_slope, try_chi2
-                    gained = gain > 0.3
+                there = self.predicted(ahead[:own], form.tables(ahead[own:]))
+                new_residual, new_slope = self.whitened(there, knee)
+                new_chi2 = self._chi2(prior, new_residual, ahead)
+                if new_chi2 < chi2:
+                    gain = chi2 - new_chi2
+                    now, here, residual, slope, chi2 = ahead, there, new_residual, new_slope, new_chi2
                     break
-            if not gained:
+            fresh = renew_every == 0 or step % renew_every == 0
+            if gain < _WORTH_A_STEP and fresh:
                 break
-        return Fit(form, deviations, w, chi2, residual, columns)
+        return Fit(form, now[:own], now[own:], chi2, residual, columns)
 
     @staticmethod
-    def _chi2(form: Form, residual: Floats, deviations: Floats, w: Floats) -> float:
-        held = sum((x / axis.prior) ** 2 for x, axis in zip(w.tolist(), form.axes, strict=True))
-        return float(residual @ residual + deviations @ deviations) + held
+    def _chi2(prior: Floats, residual: Floats, at: Floats) -> float:
+        held = prior * at
+        return float(residual @ residual + held @ held)
 
-    def _derivatives(self, deviations: Floats, effects: Effects, here: Floats) -> Floats:
+    def _nuisance_rates(self, deviations: Floats, effects: Effects, here: Floats) -> Floats:
         columns: list[Floats] = []
         for i in range(len(deviations)):
             ahead = deviations.copy()
             step = -_STEP if ahead[i] > 0.0 else _STEP
             ahead[i] += step
-            columns.append((self.predicted(ahead, effects) - here) / step)
+            columns.append(self._rate(here, self.predicted(ahead, effects), step))
         return np.column_stack(columns)
 
-    def _axis_derivatives(self, form: Form, deviations: Floats, w: Floats, here: Floats) -> Floats:
-        columns = np.zeros((len(here), len(w)))
+    def _axis_rates(self, form: Form, deviations: Floats, w: Floats, here: Floats) -> Floats:
+        columns = np.zeros((int(self.floor.compared.sum()), len(w)))
         for i, axis in enumerate(form.axes):
             step = 0.15 if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
             ahead = w.copy()
             ahead[i] += step
-            columns[:, i] = (self.predicted(deviations, form.tables(ahead)) - here) / step
+            columns[:, i] = self._rate(here, self.predicted(deviations, form.tables(ahead)), step)
         return columns
+
+    def _rate(self, here: Floats, there: Floats, step: float) -> Floats:
+        change = (self.floor.expected(there) - self.floor.expected(here))[self.floor.compared]
+        z = change / (self.floor.scatter[self.floor.compared] * step)
+        return np.where(np.isfinite(z), z, 0.0)

@@ -1,47 +1,57 @@
 """From every effect of the library to the few that are refitted in full.
 
 Screening only shortlists: one simulation a trial says how much of the remaining difference its direction could take, nuisances
-moving along. What survives is refitted, and only the refit counts.
+moving along. It is done twice, where the rig was retuned and where it was described: a large effect pulls the retuned rig far
+away, into a valley of its own. What survives is refitted, and only the refit counts.
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from diagnosis.library import Trial
-from diagnosis.refit import Fit, Fitter, Form
+from diagnosis.refit import QUICK, Fit, Fitter, Form
 
 Floats = npt.NDArray[np.float64]
-Map = Callable[[Callable[[Trial], "Screened"], list[Trial]], list["Screened"]]
-_QUICK = 16  # trials that get one step of a refit
-_FULL = 7  # effects that are refitted to the end
+_QUICK = 10  # trials of either screening that get two steps of a refit
+_FULL = 4  # effects that are refitted to the end,
+_WORTH_FULL = 0.2  # of the best one's gain, or they are too far behind to matter
 _FURTHEST = 8.0  # times the starting size that a screening may go
+_FURTHEST_TOLERANCES = 3.0
 
 
 class Screened(NamedTuple):
-    """A trial with a better start, and how far chi2 would fall if its direction were all there is."""
+    """A trial with a better start, and the chi2 that its direction would leave if everything were linear."""
 
-    trial: Trial
-    gain: float
+    form: Form  # with the effects of the base
+    deviations: Floats
+    w: Floats
+    chi2: float
 
 
 class Directions:
-    """The nuisances' columns at a fit, to take out of any other direction what they could do as well."""
+    """The nuisances' columns at a fit, to let them move along with any other direction."""
 
     def __init__(self, fit: Fit) -> None:
         held = [1.0] * len(fit.deviations) + [1.0 / axis.prior for axis in fit.form.axes]
-        at = np.concatenate([fit.deviations, fit.w])
+        self._at = np.concatenate([fit.deviations, fit.w])
         self._columns = np.vstack([fit.columns, np.diag(held)])
-        self.residual = np.concatenate([fit.residual, -np.array(held) * at])
+        self.residual = np.concatenate([fit.residual, -np.array(held) * self._at])
         self._inverse = np.linalg.inv(self._columns.T @ self._columns)
+        self.left = self.freed(self.residual)
 
     def freed(self, column: Floats) -> Floats:
         """What is left of a whitened direction [compared] when the nuisances move along, [compared + nuisances]."""
         full = np.concatenate([column, np.zeros(len(self.residual) - len(column))])
         return full - self._columns @ (self._inverse @ (self._columns.T @ full))
+
+    def moved(self, column: Floats, size: float) -> Floats:
+        """Where nuisances and axes go when `size` of a direction [compared] is taken out of the differences."""
+        rest = self.residual.copy()
+        rest[: len(column)] -= size * column
+        return self._at + self._inverse @ (self._columns.T @ rest)
 
 
 def added(base: Form, more: Form) -> Form:
@@ -49,59 +59,70 @@ def added(base: Form, more: Form) -> Form:
     return Form(base.forms | more.forms, (*base.axes, *more.axes))
 
 
-def screen(fitter: Fitter, base: Fit, directions: Directions, trial: Trial) -> Screened:
-    """Scale a trial's start so that it explains most, and say how much that is."""
+def _screen(fitter: Fitter, base: Fit, knee: float, directions: Directions, trial: Trial) -> Screened | None:
+    """Scale a trial's start so that it explains most; nothing where it changes nothing."""
     here = fitter.predicted(base.deviations, base.effects)
-    _, slope = fitter.whitened(here)
+    _, slope = fitter.whitened(here, knee)
     there = fitter.predicted(base.deviations, base.effects | trial.form.tables(trial.w))
-    direction = directions.freed(fitter.column(there - here, slope))
+    column = fitter.column(here, there, slope)
+    direction = directions.freed(column)
     power = float(direction @ direction)
     if power < 1e-6:
-        return Screened(trial, 0.0)
-    size = float(direction @ directions.residual) / power
+        return None
+    along = float(direction @ directions.left)
+    size = along / power
     w = trial.w.copy()
     if trial.form.axes[0].logarithmic:
         size = min(max(size, 1.0 / _FURTHEST), _FURTHEST)
         rolls_off = trial.form.axes[0].name in {"corner_Hz", "resonance_Hz"}  # larger is less
         w[0] += (-0.5 if rolls_off else 1.0) * math.log(size)
     else:
-        w[0] *= min(max(size, -_FURTHEST), _FURTHEST)
-    gain = 2.0 * size * float(direction @ directions.residual) - size * size * power
-    return Screened(Trial(trial.form, w), gain)
+        size = min(max(size, -_FURTHEST), _FURTHEST)
+        w[0] *= size
+    moved = directions.moved(column, size)
+    own = len(base.deviations)
+    deviations = np.clip(moved[:own], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
+    chi2 = float(directions.left @ directions.left) - 2.0 * size * along + size * size * power
+    return Screened(added(base.form, trial.form), deviations, np.concatenate([moved[own:], w]), chi2)
 
 
-def refitted(fitter: Fitter, base: Fit, trials: list[Trial], run: "Runner") -> list[Fit]:
-    """The best fit of every effect that was worth one, best first. Each effect with its best form."""
-    directions = Directions(base)
-    screened = run(lambda trial: screen(fitter, base, directions, trial), trials)
-    screened.sort(key=lambda one: -one.gain)
+def refitted(fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Trial]) -> list[Fit]:
+    """The best fit of every effect that was worth one, each in its best form, best first.
 
-    def quick(trial: Trial) -> Fit:
-        return fitter.fit(added(base.form, trial.form), base.deviations, np.concatenate([base.w, trial.w]), steps=1)
+    Args:
+        origins: fits to start from, each with the knee it was fitted under; the first is the one to improve on.
+        trials: what to add.
 
-    quickly = run(quick, [one.trial for one in screened[:_QUICK]])
+    """
+    quickly: list[Fit] = []
+    for base, knee in origins:
+        directions = Directions(base)
+        screened = [one for trial in trials if (one := _screen(fitter, base, knee, directions, trial)) is not None]
+        screened.sort(key=lambda one: one.chi2)
+        for one in screened[:_QUICK]:
+            fit = fitter.fit(one.form, one.deviations, one.w, QUICK)
+            quickly.append(fitter.judged(fit))
     quickly.sort(key=lambda fit: fit.chi2)
-    best: list[Fit] = []
-    full: set[tuple[str, ...]] = set()
-    for fit in quickly:
-        names = fit.form.effects
-        if len(full) < _FULL or names in full:
-            full.add(names)
-            best.append(fit)
-    finished = run(lambda fit: fitter.fit(fit.form, fit.deviations, fit.w), best)
-    finished += [fit for fit in quickly if fit.form.effects not in full]
+    best = _best_of_each(quickly)
+    gain = origins[0][0].chi2 - best[0].chi2 if best else 0.0
+    worth = [fit for fit in best[:_FULL] if origins[0][0].chi2 - fit.chi2 > _WORTH_FULL * gain]
+    names = {fit.form.effects for fit in worth}
+    finished: list[Fit] = []
+    for effects in names:
+        forms = _best_of_each([fit for fit in quickly if fit.form.effects == effects], by_form=True)
+        finished += [fitter.refit(fit.form, fit.deviations, fit.w) for fit in forms[:2]]
+    finished += [fit for fit in best if fit.form.effects not in names]
     finished.sort(key=lambda fit: fit.chi2)
-    seen: set[tuple[str, ...]] = set()
+    return _best_of_each(finished)
+
+
+def _best_of_each(fits: list[Fit], by_form: bool = False) -> list[Fit]:
+    """The first fit of every effect, or of every form of it, in their order."""
+    seen: set[tuple[tuple[str, str], ...]] = set()
     result: list[Fit] = []
-    for fit in finished:
-        if fit.form.effects not in seen:
-            seen.add(fit.form.effects)
+    for fit in fits:
+        key = tuple((name, form if by_form else "") for name, form in fit.form.forms.items())
+        if key not in seen:
+            seen.add(key)
             result.append(fit)
     return result
-
-
-class Runner:
-    """Runs a function over a list, in this process."""
-
-    def __call__(self, function, items):
-        return [function(item) for item in items]

@@ -46,7 +46,7 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -
         else:
             coordinate = run.start.t_s + (blocks + 0.5) * BLOCK_S
         for segment in run.commands.segments:
-            own = slice(max(segment.first + 100, segment.settled), segment.last)
+            own = slice(max(segment.first, segment.settled), segment.last)
             cut = segment.sign * force[own]
             tops, bottoms = turning_points(cut, scales.drop_N)
             if len(bottoms) >= 3:

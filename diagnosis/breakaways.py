@@ -1,0 +1,68 @@
+"""Where a force breaks away and sticks again within a segment, and what each breakaway could depend on."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.commands import Segment
+from diagnosis.cycles import turning_points
+from diagnosis.features import Scales, Signals
+from diagnosis.kinematics import motion
+from diagnosis.manifest import RigTable
+from diagnosis.problem import Prepared
+from diagnosis.reduced import BLOCK_S
+
+Floats = npt.NDArray[np.float64]
+_SETTLING_BLOCKS = 100
+_LONGEST = 10.0  # half periods of the mass on its spring: what falls longer is a change of level
+
+
+class Slips(NamedTuple):
+    """Slips of a segment. [slips] each, in blocks of the run."""
+
+    tops: npt.NDArray[np.int64]
+    bottoms: npt.NDArray[np.int64]
+    middles: Floats  # where half of the fall is done
+
+
+def slips_of(signals: Signals, segment: Segment, scales: Scales) -> Slips:
+    """The slips that the drive force shows."""
+    first = max(segment.first + (_SETTLING_BLOCKS if segment.first else 0), segment.settled)
+    force_N = segment.sign * signals["drive_force_N"][first : segment.last]
+    tops, bottoms = turning_points(force_N, scales.drop_N)
+    tops = tops[: len(bottoms)]
+    quick = (bottoms - tops) * BLOCK_S < _LONGEST * scales.slip_s
+    tops, bottoms = tops[quick], bottoms[quick]
+    middles = np.empty(len(tops))
+    for i, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
+        half_N = 0.5 * (force_N[top] + force_N[bottom])
+        under = top + int(np.argmax(force_N[top : bottom + 1] <= half_N))
+        step_N = force_N[under - 1] - force_N[under]
+        middles[i] = under - (half_N - force_N[under]) / step_N if step_N > 0.0 else under
+    return Slips(tops + first, bottoms + first, middles + first)
+
+
+def breakaways(rig: RigTable, run: Prepared, scales: Scales) -> tuple[Floats, dict[str, Floats]]:
+    """Breakaway forces above the rig's static friction [N], and what they could depend on, by name; [breakaways] each.
+
+    Only without vibration, which lowers the breakaway by itself.
+    """
+    above: list[float] = []
+    at: list[int] = []
+    dwell_s: list[float] = []
+    direction: list[float] = []
+    if "drive_force_N" in run.signals:
+        for segment in run.commands.segments:
+            if segment.frequency_Hz > 0.0 or segment.drive_velocity_mps == 0.0:
+                continue
+            slips = slips_of(run.signals, segment, scales)
+            # the dwell before the first breakaway of a segment is not the segment's
+            for before, top in zip(slips.bottoms[:-1].tolist(), slips.tops[1:].tolist(), strict=True):
+                above.append(segment.sign * float(run.signals["drive_force_N"][top]) - rig.static_force_N)
+                at.append(top)
+                dwell_s.append((top - before) * BLOCK_S)
+                direction.append(segment.sign)
+    columns = motion(rig, run)
+    over = {name: columns[name][at] for name in ("time_s", "position_m", "drive_position_m") if name in columns}
+    return np.array(above), over | {"dwell_s": np.array(dwell_s), "direction": np.array(direction)}
