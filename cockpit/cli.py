@@ -56,6 +56,10 @@ def _settings(settings: list[str], seed: int | None, endpoint: str | None, prefi
 @app.command()
 def run(
     scenario: ScenarioName = DEFAULT_SCENARIO,
+    rig: Annotated[
+        str | None,
+        typer.Option("--rig", help="In place of the scenario's rig: a name in deploy/rigs, or a .toml file."),
+    ] = None,
     settings: Settings = [],  # noqa: B006 (typer reads the default and never changes it)
     seed: Seed = None,
     endpoint: Endpoint = None,
@@ -71,8 +75,10 @@ def run(
 
     def work() -> int:
         from cockpit.running import run_scenario
+        from cockpit.scenario import rig_setting
 
-        changed = _settings(settings, seed, endpoint, prefix)
+        other = [rig_setting(rig)] if rig is not None else []
+        changed = [*other, *_settings(settings, seed, endpoint, prefix)]
         return run_scenario(scenario, changed, lockstep, in_process, log, as_json)
 
     sys.exit(guarded(work, as_json))

@@ -19,6 +19,7 @@ def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
     return {
         "scenario": scenario.name,
         "description": scenario.description,
+        "rig": scenario.rig.name,
         "seed": scenario.seed,
         "clock": "lockstep" if lockstep else "realtime",
     }
@@ -51,15 +52,22 @@ def run_scenario(
             run_processes(arguments, path, lockstep, follower(scenario.bus, scenario.duration_s))
     except KeyboardInterrupt:
         interrupted = True
-    from cockpit.verdict import headline, in_words, judge
+    from bridge.logfile import read_run
+    from cockpit.verdict import headline, in_words, judge, judge_run
 
     if interrupted:
         if path.is_file():
             print("\n".join(in_words(judge(path))), file=sys.stderr)
         return report(Fault("INTERRUPTED", "stopped by Ctrl-C; the log is closed"), as_json)
-    verdict = judge(path)
-    if as_json:
-        print(json.dumps(verdict.as_dict()))
-    else:
-        print("\n".join([headline(verdict), *in_words(verdict)]))
+    run = read_run(path)
+    verdict = judge_run(run)
+    table, lines = verdict.as_dict() | {"rig": scenario.rig.name}, [f"rig      {scenario.rig.name}"]
+    if scenario.rig.effects:
+        # another rig than the one the loop was designed for
+        from cockpit.margins import loop_margins, margins_in_words
+
+        margins = loop_margins(run)
+        table |= {"effects": list(scenario.rig.effects), "loop": margins.as_dict()}
+        lines = [f"{lines[0]}, with {', '.join(scenario.rig.effects)}", *margins_in_words(margins)]
+    print(json.dumps(table) if as_json else "\n".join([headline(verdict), *lines, *in_words(verdict)]))
     return 0 if verdict.good else 1

@@ -83,6 +83,11 @@ def load_rig(name: str, settings: list[str]) -> RigConfig:
     return validate(RigConfig, with_overrides(read_toml(path), settings), path.name)
 
 
+def rig_setting(name: str) -> str:
+    """The setting that puts another rig in the place of a scenario's. Raises Fault CONFIG when there is none of that name."""
+    return f"rig={{file={json.dumps(str(_find(name, 'rigs').resolve()), ensure_ascii=False)}}}"
+
+
 def load_scenario(name: str, settings: list[str]) -> Scenario:
     """A scenario by name or path, with `key=value` settings applied. Raises Fault CONFIG.
 

@@ -30,6 +30,7 @@ _FRICTION_WAVES_TIME = 72  # half waves: 3 Hz in 12 s
 _FRICTION_WAVES_POSITION = 80  # half waves: 5 mm on a stroke of 0.2 m
 _FORCE_WAVES = 8
 _BINS_PER_WAVE = 4  # of a half wave
+_RATE_WINDOW = 61  # blocks
 _BANDS_HZ = ((3.0, 8.0), (8.0, 24.0))
 _SHORTEST_REST_S = 0.2
 
@@ -44,7 +45,8 @@ def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Featur
     inner = slice(_first(motion, rig), len(rest_N) - _EDGE)
     cut = Motion(*(values[inner] for values in motion))
     rest_N = _without_curve(found, rest_N[inner], cut, rig.stribeck_velocity_mps)
-    sliding = np.abs(cut.velocity_mps) > _SLOW[0] * rig.stribeck_velocity_mps
+    # near a turn of the motion every error of the bristle would pass for a wave
+    sliding = np.abs(cut.velocity_mps) > _SLOW[-2] * rig.stribeck_velocity_mps
     rest_N = _without_inertia(found, np.where(sliding, rest_N, 0.0), cut, sliding)
     _waves(found, rest_N, cut, sliding)
     friction_N = rest_N * np.sign(cut.velocity_mps)
@@ -60,17 +62,17 @@ def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Featur
     return found
 
 
-def friction_share(signals: Signals, motion: Motion) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Friction over its mean at that direction and speed, less 1, [blocks]; and where it slides fast enough to say so."""
-    rest_N = signals["drive_force_N"] - motion.inertia_N
+    rest_N = force_N - motion.inertia_N
     speed = np.abs(motion.velocity_mps)
     edges = np.quantile(speed, np.linspace(0.15, 1.0, 9))
     bins = np.searchsorted(edges, speed, side="right") * 2 + (motion.velocity_mps > 0.0)
     mean = _means(rest_N, bins, int(bins.max()) + 1)[bins]
-    valid = speed > edges[0]
+    valid = (speed > edges[0]) & np.isfinite(mean)
     valid[:_EDGE] = valid[-_EDGE:] = False
     size_N = float(np.abs(mean[valid]).mean())
-    return np.sign(motion.velocity_mps) * (rest_N - mean) / size_N, valid
+    return np.where(valid, np.sign(motion.velocity_mps) * (rest_N - mean) / size_N, 0.0), valid
 
 
 def _first(motion: Motion, rig: RigTable) -> int:
@@ -85,6 +87,13 @@ def _means(values: Floats, bins: Indices, count: int) -> Floats:
     held = np.bincount(bins, minlength=count)
     sums = np.bincount(bins, values, count)
     return np.where(held >= _FEWEST, sums / np.maximum(held, 1), np.nan)
+
+
+def _profile(values: Floats, bins: Indices, count: int) -> Floats:
+    """Mean of every bin, the less the fewer blocks are in it, since what the motion passes but once is rough."""
+    held = np.bincount(bins, minlength=count)
+    sums = np.bincount(bins, values, count)
+    return sums / np.maximum(held, max(float(np.median(held)), 1.0))
 
 
 def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float) -> Floats:
@@ -112,8 +121,9 @@ def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps
 
 
 def _without_inertia(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray[np.bool_]) -> Floats:
-    rate = np.gradient(motion.accel_mps2, BLOCK_S)
-    for name, column in (("inertia", motion.accel_mps2), ("lag", uniform_filter1d(rate, 15))):
+    # smoothed well below what leads the model, or the encoder's noise in both would pass for a lag
+    smooth = uniform_filter1d(uniform_filter1d(motion.accel_mps2, _RATE_WINDOW), _RATE_WINDOW)
+    for name, column in (("inertia", motion.accel_mps2), ("lag", np.gradient(smooth, BLOCK_S))):
         about = np.where(sliding, column - column.mean(), 0.0)
         size = math.sqrt(float(about @ about) / max(int(sliding.sum()), 1)) + 1e-12
         about = about / size
@@ -136,7 +146,7 @@ def _waves(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray
     ):
         bins = waves * _BINS_PER_WAVE
         at = np.minimum((over * bins).astype(np.int64), bins - 1)
-        profile = np.nan_to_num(_means(values[sliding], at[sliding], bins))
+        profile = _profile(values[sliding], at[sliding], bins)
         for wave, value in enumerate((dct(profile)[1 : waves + 1] / bins).tolist(), start=1):
             found.add(f"{name} {wave}", "drive_force_N", "steady", LOW, -1, value)
 

@@ -41,9 +41,17 @@ def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -
     best = Told(run, run.commands.segments[0], versions, -1.0)
     for segment in run.commands.segments:
         apart = _apart(versions[0].signals, against.signals, segment, scales)
+        # where details decide whether anything slips, or when, a difference says little
+        if segment.at_the_edge or not _cycles_there(versions[0].signals, segment, scales):
+            apart *= 0.3
         if apart > best.apart:
             best = Told(run, segment, versions, apart)
     return best
+
+
+def _cycles_there(signals: Signals, segment: Segment, scales: Scales) -> bool:
+    """Whether nothing slips, or something twice."""
+    return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
 
 
 def _apart(measured: Signals, predicted: Signals, segment: Segment, scales: Scales) -> float:
@@ -69,20 +77,29 @@ def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
 def force_picture(told: Told, scales: Scales) -> Picture:
     """The whole cycle, slip to slip, where every version has one; else the signal over time."""
     name = "drive_force_N" if "drive_force_N" in told.run.signals else "mass_accel_mps2"
-    if name == "drive_force_N":
+    # with a force drive the force is no saw tooth and its phase is not free
+    if name == "drive_force_N" and told.segment.drive_velocity_mps != 0.0:
         slips = [slips_of(version.signals, told.segment, scales) for version in told.versions]
         if all(len(one.middles) >= 2 for one in slips):
             curves = [_whole_cycle(version, found) for version, found in zip(told.versions, slips, strict=True)]
             title = f"{_place(told)}: mean of {len(slips[0].middles) - 1} cycles from slip to slip"
             return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
-    curves = [_over_time(version, name, told) for version in told.versions]
+        if all(len(one.middles) == 1 for one in slips) or (
+            told.segment.first and all(len(one.middles) for one in slips)
+        ):
+            # the phase of stick-slip is free
+            zeros = [float(one.middles[0]) for one in slips]
+            title = f"{_place(told)}: first slips laid on each other"
+            curves = [_over_time(version, name, told, zero) for version, zero in zip(told.versions, zeros, strict=True)]
+            return Picture("cycle", title, "time after the middle of the first slip [ms]", _AXES[name], tuple(curves))
+    curves = [_over_time(version, name, told, None) for version in told.versions]
     return Picture("cycle", f"{_place(told)}: over time", "time in the run [s]", _AXES[name], tuple(curves))
 
 
 def slip_picture(told: Told, name: str, scales: Scales) -> Picture | None:
     """The mean slip close up; None where a version does not slip."""
     curves: list[Curve] = []
-    reach = np.arange(-1.5, 2.5, 0.02) * scales.slip_s / BLOCK_S
+    reach = np.arange(-1.5, 2.5, 0.02, dtype=np.float64) * scales.slip_s / BLOCK_S
     count = 0
     for version in told.versions:
         middles = slips_of(version.signals, told.segment, scales).middles
@@ -121,14 +138,16 @@ def _whole_cycle(version: Version, slips: Slips) -> Curve:
     return Curve(version.label, share * float(periods.mean()) * BLOCK_S * 1e3, np.mean(cycles, axis=0), version.style)
 
 
-def _over_time(version: Version, name: str, told: Told) -> Curve:
+def _over_time(version: Version, name: str, told: Told, zero: float | None) -> Curve:
+    """A whole segment, over time in the run [s] or after block `zero` [ms]."""
     segment = told.segment
     values = version.signals[name][segment.first : segment.last]
     block = max(len(values) // _POINTS, 1)
     whole = len(values) // block * block
     mean = values[:whole].reshape(-1, block).mean(axis=1)
-    t_s = told.run.start.t_s + (segment.first + (np.arange(len(mean)) + 0.5) * block) * BLOCK_S
-    return Curve(version.label, t_s, mean, version.style)
+    at = segment.first + (np.arange(len(mean), dtype=np.float64) + 0.5) * block
+    x = told.run.start.t_s + at * BLOCK_S if zero is None else (at - zero) * BLOCK_S * 1e3
+    return Curve(version.label, x, mean, version.style)
 
 
 def _place(told: Told) -> str:

@@ -89,7 +89,7 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
             settled = max(segment.settled - segment.first, 0)
             _level(found, number, cut["drive_force_N"][settled:], slips, segment.at_the_edge)
         _period(found, number, slips)
-        _shapes(found, number, cut, slips, scales)
+        _shapes(found, number, cut, slips, scales, segment.frequency_Hz)
         if segment.frequency_Hz > 0.0:
             _vibration(found, number, cut)
     _parity(found, signals, scales)
@@ -187,11 +187,10 @@ def _period(found: Features, number: int, slips: _Slips) -> None:
 
 def _level(found: Features, number: int, force_N: Floats, slips: _Slips, at_the_edge: bool) -> None:
     name = "drive_force_N"
-    found.add("mean level", name, "steady", LOW, number, float(force_N.mean()))
-    found.add("deviation", name, "steady", LOW, number, float(force_N.std()))
     low, high = np.quantile(force_N, (0.05, 0.95))
-    found.add("low level", name, "steady", LOW, number, float(low))
-    found.add("high level", name, "steady", LOW, number, float(high))
+    levels = {"mean level": force_N.mean(), "deviation": force_N.std(), "low level": low, "high level": high}
+    for level, value in levels.items():
+        found.add(level, name, "steady", LOW, number, math.nan if at_the_edge else float(value))
     still = len(slips.tops) == 0 and not at_the_edge
     edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64)
     for bin_ in range(_LEVELS):
@@ -207,8 +206,9 @@ def _regime(at: float) -> str:
     return "breakaway" if at < -0.4 else "slip" if at < 0.6 else "restick"
 
 
-def _shapes(found: Features, number: int, cut: Signals, slips: _Slips, scales: Scales) -> None:
+def _shapes(found: Features, number: int, cut: Signals, slips: _Slips, scales: Scales, frequency_Hz: float) -> None:
     width = scales.slip_s / BLOCK_S
+    shaken = frequency_Hz > 0.0  # a vibration that the sampling folds down would pass for a ring
     names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]
     if not names:
         return
@@ -224,7 +224,8 @@ def _shapes(found: Features, number: int, cut: Signals, slips: _Slips, scales: S
             shape = np.interp(at.ravel(), np.arange(blocks), signal).reshape(at.shape).mean(axis=0)
             fast = signal - uniform_filter1d(signal, 5)
             near = (slips.middles[inside, None] + np.arange(int(3.0 * width))).astype(np.int64)
-            ring = float(np.mean(fast[np.minimum(near, blocks - 1)] ** 2))
+            power = float(np.mean(fast[np.minimum(near, blocks - 1)] ** 2))
+            ring = math.nan if shaken and name.endswith("accel_mps2") else power
         if name == "drive_force_N":
             shape = shape - shape.mean()
         if name == "mass_position_m":

@@ -97,7 +97,7 @@ def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
     )
     # the least scatter is as much a part of the floor as the drawn one: what of it the replicates do not show is added
     promised = (least[compared] / scatter[compared]) ** 2
-    level = np.sqrt(np.mean([_gap_squared(row, cells, promised) for row in z]))
+    level = np.sqrt(np.mean([_cell_means(row * row + promised, cells).mean() for row in z]))
     return Floor(bias, powers, scatter, compared, _whitening(z, promised), cells, float(level))
 
 
@@ -115,29 +115,23 @@ def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
 
 def gap(floor: Floor, z: Floats) -> float:
     """The gap of differences `z` [compared], 1.0 for a perfect model."""
-    return float(np.sqrt(_gap_squared(compress(z), floor.cells, np.zeros(len(z))))) / floor.level
+    return float(np.sqrt(cell_squares(floor, z).mean())) / floor.level
 
 
-def cell_shares(floor: Floor, z: Floats) -> dict[CellKey, float]:
-    """Share of every cell in what the gap is above the floor; they add up to 1. Empty without a gap."""
-    above: dict[CellKey, float] = {}
-    for key, mean in _cell_means(compress(z), floor.cells).items():
-        if mean > floor.level**2:
-            above[key] = mean - floor.level**2
-    total = sum(above.values())
-    return {key: value / total for key, value in sorted(above.items(), key=lambda item: -item[1])} if total else {}
+def cell_squares(floor: Floor, z: Floats) -> Floats:
+    """Mean square of the compressed differences `z` [compared] in every cell, in the order of `cell_names`, [cells]."""
+    return _cell_means(compress(z) ** 2, floor.cells)
 
 
-def _cell_means(z: Floats, cells: tuple[CellKey, ...]) -> dict[CellKey, float]:
-    sums: dict[CellKey, list[float]] = {}
-    for key, value in zip(cells, z.tolist(), strict=True):
-        sums.setdefault(key, []).append(value * value)
-    return {key: sum(values) / len(values) for key, values in sums.items()}
+def cell_names(floor: Floor) -> tuple[CellKey, ...]:
+    """Signal, regime, band and run of every cell."""
+    return tuple(dict.fromkeys(floor.cells))
 
 
-def _gap_squared(z: Floats, cells: tuple[CellKey, ...], added: Floats) -> float:
-    means = _cell_means(np.sqrt(z * z + added), cells)
-    return sum(means.values()) / len(means) if means else 1.0
+def _cell_means(squares: Floats, cells: tuple[CellKey, ...]) -> Floats:
+    number = {key: i for i, key in enumerate(dict.fromkeys(cells))}
+    index = np.array([number[key] for key in cells], np.int64)
+    return np.bincount(index, squares, len(number)) / np.bincount(index, minlength=len(number))
 
 
 def _whitening(z: Floats, promised: Floats) -> Floats:
@@ -160,15 +154,17 @@ def _whitening(z: Floats, promised: Floats) -> Floats:
 def _least(label: Feature, problem: Problem) -> float:
     """The scatter that a feature has at least, in its own unit: the grid's resolution and what ordinary sensors promise."""
     force_N, slip_s, _, stiffness = problem.scales
+    if problem.rig.drive == "force":
+        return _least_of_axis(label, force_N)
     drop_m = 0.3 * force_N / stiffness  # of a slip, for friction that falls by a sixth
     if label.name in {"scatter", "ripple", "rest"}:
-        return 0.4  # small powers, which hum, slow noise and the roughness of one track reach
+        return 0.6  # small powers, which hum, slow noise and the roughness of one track reach
     if label.name in {"ring", "spring rest"}:
-        return 0.15
+        return 0.25
     if label.name.startswith("spring"):
         return 2e-3 * force_N  # a displacement sensor's bow of 0.2 % changes its slope along the track
     if label.name.startswith("vibration"):
-        return 0.003 if label.signal == "base_accel_mps2" else 0.02
+        return 0.006 if label.signal == "base_accel_mps2" else 0.04
     if label.name == "period":
         return 0.003
     if label.name == "duration":
@@ -182,3 +178,13 @@ def _least(label: Feature, problem: Problem) -> float:
     if label.signal == "drive_position_m":
         return 2e-3 * drop_m
     return 1e-3 * drop_m
+
+
+def _least_of_axis(label: Feature, force_N: float) -> float:
+    if label.name == "ripple":
+        return 0.2
+    if label.signal != "drive_force_N":
+        return 0.002
+    if label.regime == "breakaway" and label.name in {"mean", "over rest"}:
+        return 0.02 * force_N  # how far the contact was loaded before the run is not known
+    return 2e-4 * force_N

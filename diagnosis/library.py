@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.axis_waves import axis_waves
 from diagnosis.manifest import RigTable
 from diagnosis.problem import Prepared, Problem
 from diagnosis.refit import Axis, Form
@@ -16,7 +17,8 @@ from diagnosis.waves import Wave, drive_waves, friction_waves
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.float64]
-_WAVES = 3  # periods that are tried
+_WAVES = 4  # ranges of periods that are searched
+_AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 
 
 class Trial(NamedTuple):
@@ -53,7 +55,9 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
     rig, runs = problem.rig, problem.runs
     scale = scales(name, form, rig, runs, highest_Hz)
     waves: list[Wave] = []
-    if name == "position-dependent-friction":
+    if rig.drive == "force" and "phase_rad" in scale:
+        waves = axis_waves(runs, "position" if "wavelength_m" in scale else "time", _AXIS_WAVES)
+    elif name == "position-dependent-friction":
         waves = friction_waves(runs, problem.scales, "position", _WAVES)
     elif name == "normal-load-fluctuation":
         waves = friction_waves(runs, problem.scales, "time", _WAVES)
@@ -93,7 +97,7 @@ def _wave_trial(name: str, form: str, scale: dict[str, _Scale], wave: Wave) -> T
             axes.append(Axis(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
         else:
             size = wave.period if row.name == "wavelength_m" else 1.0 / wave.period
-            axes.append(Axis(name, row.name, size, True, scale[row.name].prior, row.low, row.high))
+            axes.append(Axis(name, row.name, size, True, wave.spread, row.low, row.high))
     w = np.array([wave.phase_rad if axis.name == "phase_rad" else 0.0 for axis in axes])
     return Trial(Form({name: form}, tuple(axes)), w)
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ValidationError
 
 from bridge.faults import Fault
 from diagnosis.axis_drive import relative, true_commands
@@ -61,6 +62,10 @@ class Problem:
         self._measured = [self._features(run, run.signals) for run in runs]
         self.measured = np.concatenate([np.array(found.values) for found in self._measured])
 
+    def __getstate__(self) -> dict[str, object]:
+        """For another process: without what was simulated here."""
+        return self.__dict__ | {"_simulated": {}}
+
     @property
     def labels(self) -> list[tuple[str, Feature]]:
         """File and feature of every entry."""
@@ -69,10 +74,13 @@ class Problem:
         ]
 
     def predicted(self, point: Point, draw: Draw | None = None) -> Floats:
-        """Features of the model, [features]; with a draw those of one rough and noisy run."""
+        """Features of the model, [features]; with a draw those of one rough and noisy run; NaN where no rig is like that."""
         parts: list[float] = []
-        for run in self.runs:
-            parts += self._features(run, self.signals(run, point, draw)).values
+        try:
+            for run in self.runs:
+                parts += self._features(run, self.signals(run, point, draw)).values
+        except ValidationError:
+            return np.full(len(self.measured), np.nan)
         return np.array(parts)
 
     def signals(self, run: Prepared, point: Point, draw: Draw | None = None) -> Signals:
@@ -113,7 +121,10 @@ class Problem:
             # a disturbed input moves the mass, and what it takes to put that right is what noise costs
             commands = commands._replace(drive=commands.drive + noise["drive_force_N"], motion=motion)
         sensors = {name: table for name, table in point.effects.items() if name in SENSOR_EFFECTS}
-        inputs = (chain, tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(sensors.items())))
+        inputs = (
+            chain,
+            tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(sensors.items())),
+        )
         raw = self._raw(run, commands, point.values, moving, start, draw.roughness if draw else None, inputs)
         result = sensed(raw, commands.frequency_Hz, point.effects, chain, run.start.t_s)
         result = {name: result[name] for name in run.signals}
@@ -143,9 +154,7 @@ class Problem:
         if key not in self._simulated:
             if len(self._simulated) > 64:  # of 0.6 MB each
                 self._simulated.pop(next(iter(self._simulated)))
-            self._simulated[key] = predict(
-                rig_config(self.rig, values, effects, None), force_driven, commands, start
-            )
+            self._simulated[key] = predict(rig_config(self.rig, values, effects, None), force_driven, commands, start)
         return self._simulated[key]
 
     def _features(self, run: Prepared, signals: Signals) -> Features:

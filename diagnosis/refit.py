@@ -17,6 +17,7 @@ from diagnosis.twin import Effects
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.float64]
+_NARROW = 0.1  # prior of a coordinate that is known so well that a common step would leave its line
 _STEP = 0.5  # of a tolerance: large against the grid, small against the curvature
 _MOST_TOLERANCES = 5.0
 _WORTH_A_STEP = 0.5  # of chi2
@@ -36,6 +37,8 @@ class Axis(NamedTuple):
     def value(self, w: float) -> float:
         """The parameter's value, within its bounds."""
         raw = self.scale * math.exp(min(max(w, -30.0), 30.0)) if self.logarithmic else self.scale * w
+        if self.name == "phase_rad":
+            return math.remainder(raw, 2.0 * math.pi)
         return min(max(raw, self.low), self.high)
 
 
@@ -77,7 +80,9 @@ class Stage(NamedTuple):
 # Far off, compressed differences pull at nothing: there a fit is nearly one of plain squares.
 FAR_KNEE = 60.0
 _FAR = Stage(4, 2, FAR_KNEE)
-_NEAR = Stage(6, 3, KNEE)
+_NEAR = Stage(6, 6, KNEE)
+_RETUNE = Stage(6, 3, KNEE)
+_CLOSE = Stage(6, 0, KNEE)
 QUICK = Stage(2, 0, FAR_KNEE)
 _FAR_OFF = 3.0 * KNEE
 
@@ -100,7 +105,8 @@ class Fit(NamedTuple):
     def covariance(self) -> Floats:
         """Of nuisances and axes together, from the columns and the priors."""
         prior = np.concatenate([np.ones(len(self.deviations)), [axis.prior**-2 for axis in self.form.axes]])
-        return np.linalg.inv(self.columns.T @ self.columns + np.diag(prior))
+        result: Floats = np.linalg.inv(self.columns.T @ self.columns + np.diag(prior))
+        return result
 
 
 class Fitter:
@@ -127,10 +133,11 @@ class Fitter:
         z *= slope / self.floor.scatter[self.floor.compared]
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
-    def retuned(self, deviations: Floats) -> Fit:
-        """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
-        fit = self.fit(NOTHING, deviations, np.zeros(0), _FAR)
-        fit = self.fit(NOTHING, fit.deviations, fit.w, _NEAR)
+    def retuned(self, deviations: Floats, again: bool = False) -> Fit:
+        """The rig without effects, refitted, `again` from close by; other fits start from its nuisances' derivatives."""
+        if not again:
+            deviations = self.fit(NOTHING, deviations, np.zeros(0), _FAR).deviations
+        fit = self.fit(NOTHING, deviations, np.zeros(0), _NEAR if again else _RETUNE)
         self._rates = self._nuisance_rates(fit.deviations, {}, self.predicted(fit.deviations, {}))
         return fit
 
@@ -148,10 +155,10 @@ class Fitter:
     def refit(self, form: Form, deviations: Floats, w: Floats) -> Fit:
         """Fit a form to the end, from a starting point that may be far off."""
         z = differences(self.floor, self.problem, self.predicted(deviations, form.tables(w)))
-        if np.abs(z).max() > _FAR_OFF:
-            fit = self.fit(form, deviations, w, _FAR)
-            deviations, w = fit.deviations, fit.w
-        return self.fit(form, deviations, w, _NEAR)
+        if np.abs(z).max() < _FAR_OFF:
+            return self.fit(form, deviations, w, _CLOSE)
+        fit = self.fit(form, deviations, w, _FAR)
+        return self.fit(form, fit.deviations, fit.w, _NEAR)
 
     def fit(self, form: Form, deviations: Floats, w: Floats, stage: "Stage") -> Fit:
         """Fit a form from a starting point, in the way of one stage."""
@@ -163,6 +170,7 @@ class Fitter:
         residual, slope = self.whitened(here, knee)
         chi2 = self._chi2(prior, residual, now)
         nuisance_rates = self._rates
+        columns = np.zeros((len(residual), len(now)))
         for step in range(steps + 1):
             if renew_every and step % renew_every == 0 and (step < steps or steps == 0):
                 nuisance_rates = self._nuisance_rates(now[:own], form.tables(now[own:]), here)
@@ -173,7 +181,7 @@ class Fitter:
             normal = columns.T @ columns + np.diag(prior**2)
             change = np.linalg.solve(normal, columns.T @ residual - prior**2 * now)
             gain = 0.0
-            for share in (1.0, 0.4, 0.1):
+            for share in (1.0, 0.3):
                 ahead = now + share * change
                 ahead[:own] = np.clip(ahead[:own], -_MOST_TOLERANCES, _MOST_TOLERANCES)
                 there = self.predicted(ahead[:own], form.tables(ahead[own:]))
@@ -206,6 +214,8 @@ class Fitter:
         columns = np.zeros((int(self.floor.compared.sum()), len(w)))
         for i, axis in enumerate(form.axes):
             step = 0.15 if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
+            if axis.prior < _NARROW:  # the period of a wave that passes many times
+                step = 0.02 * axis.prior
             ahead = w.copy()
             ahead[i] += step
             columns[:, i] = self._rate(here, self.predicted(deviations, form.tables(ahead)), step)

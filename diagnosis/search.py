@@ -6,17 +6,22 @@ away, into a valley of its own. What survives is refitted, and only the refit co
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from itertools import chain
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
 
 from diagnosis.library import Trial
 from diagnosis.refit import QUICK, Fit, Fitter, Form
 
 Floats = npt.NDArray[np.float64]
-_QUICK = 10  # trials of either screening that get two steps of a refit
-_FULL = 4  # effects that are refitted to the end,
+T = TypeVar("T")
+R = TypeVar("R")
+_QUICK = 6  # trials of either screening that get two steps of a refit
+_FULL = 3  # effects that are refitted to the end,
 _WORTH_FULL = 0.2  # of the best one's gain, or they are too far behind to matter
 _FURTHEST = 8.0  # times the starting size that a screening may go
 _FURTHEST_TOLERANCES = 3.0
@@ -86,34 +91,55 @@ def _screen(fitter: Fitter, base: Fit, knee: float, directions: Directions, tria
     return Screened(added(base.form, trial.form), deviations, np.concatenate([moved[own:], w]), chi2)
 
 
-def refitted(fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Trial]) -> list[Fit]:
+def refitted(
+    fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Trial], jobs: int = 1, most: int = _FULL
+) -> list[Fit]:
     """The best fit of every effect that was worth one, each in its best form, best first.
 
     Args:
+        fitter: of the fitted runs.
         origins: fits to start from, each with the knee it was fitted under; the first is the one to improve on.
         trials: what to add.
+        jobs: processes.
+        most: effects that are refitted to the end.
 
     """
-    quickly: list[Fit] = []
+    starts: list[Screened] = []
     for base, knee in origins:
-        directions = Directions(base)
-        screened = [one for trial in trials if (one := _screen(fitter, base, knee, directions, trial)) is not None]
-        screened.sort(key=lambda one: one.chi2)
-        for one in screened[:_QUICK]:
-            fit = fitter.fit(one.form, one.deviations, one.w, QUICK)
-            quickly.append(fitter.judged(fit))
-    quickly.sort(key=lambda fit: fit.chi2)
+        shares = _each(jobs, _screened, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
+        starts += sorted(chain.from_iterable(shares), key=lambda one: one.chi2)[:_QUICK]
+    quickly = sorted(_each(jobs, _quick, fitter, starts), key=lambda fit: fit.chi2)
     best = _best_of_each(quickly)
     gain = origins[0][0].chi2 - best[0].chi2 if best else 0.0
-    worth = [fit for fit in best[:_FULL] if origins[0][0].chi2 - fit.chi2 > _WORTH_FULL * gain]
+    worth = [fit for fit in best[:most] if origins[0][0].chi2 - fit.chi2 > _WORTH_FULL * gain]
     names = {fit.form.effects for fit in worth}
-    finished: list[Fit] = []
-    for effects in names:
-        forms = _best_of_each([fit for fit in quickly if fit.form.effects == effects], by_form=True)
-        finished += [fitter.refit(fit.form, fit.deviations, fit.w) for fit in forms[:2]]
+    forms: list[Fit] = []
+    for effects in sorted(names):
+        forms += _best_of_each([fit for fit in quickly if fit.form.effects == effects], by_form=True)[:2]
+    finished = _each(jobs, _full, fitter, forms)
     finished += [fit for fit in best if fit.form.effects not in names]
-    finished.sort(key=lambda fit: fit.chi2)
-    return _best_of_each(finished)
+    return _best_of_each(sorted(finished, key=lambda fit: fit.chi2))
+
+
+def _each(jobs: int, function: Callable[[Fitter, T], R], fitter: Fitter, items: list[T]) -> list[R]:
+    if jobs == 1:
+        return [function(fitter, item) for item in items]
+    results: list[R] = Parallel(n_jobs=jobs)(delayed(function)(fitter, item) for item in items)  # pyright: ignore[reportAssignmentType]
+    return results
+
+
+def _screened(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened]:
+    base, knee, trials = work
+    directions = Directions(base)
+    return [one for trial in trials if (one := _screen(fitter, base, knee, directions, trial)) is not None]
+
+
+def _quick(fitter: Fitter, one: Screened) -> Fit:
+    return fitter.judged(fitter.fit(one.form, one.deviations, one.w, QUICK))
+
+
+def _full(fitter: Fitter, fit: Fit) -> Fit:
+    return fitter.refit(fit.form, fit.deviations, fit.w)
 
 
 def _best_of_each(fits: list[Fit], by_form: bool = False) -> list[Fit]:

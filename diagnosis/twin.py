@@ -1,7 +1,7 @@
 """The model beside the rig: one run predicted under the run's own commands, reduced to the 1 ms grid.
 
 The kernel is the plant's own. Its sensors' bandwidths are opened wide, since a manifest states none; the coarsest step that
-keeps the features (50 us without vibration: forces equal to 1e-4 N those at 10 us; 20 steps a period with) makes a 10 s run
+keeps the features (70 us without vibration, 20 steps a period with) makes a 10 s run
 cost 11 ms.
 """
 
@@ -21,13 +21,14 @@ from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.float64]
 Effects = dict[str, dict[str, float | str]]
-_COARSEST_STEP_S = 5e-5
+_COARSEST_STEP_S = 7e-5
 _STEPS_PER_PERIOD = 20
 _CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiffness
 # A force-driven model is held to the measured motion by a spring and a damper: this natural frequency, damped critically. Faster
-# follows the noise of the encoder, slower smears a reversal: friction errors pass up to 15 Hz, the paper axis' own control has 3.
-_HOLDING_RAD_PER_S = 2.0 * math.pi * 15.0
-_RATE_FILTER_S = 3e-3  # of the damper: keeps 0.2 um of encoder noise to 0.4 N, and turns the phase at 15 Hz by 16 degrees
+# follows the noise of the encoder, slower smears a reversal: errors of the friction show up to 10 Hz.
+_HOLDING_RAD_PER_S = 2.0 * math.pi * 10.0
+_RATE_FILTER_S = 3e-3  # of the damper: keeps 0.1 um of encoder noise to 0.2 N, turns the phase at 10 Hz by 11 degrees
+_LED_STEP_S = 1e-4  # its features are equal to 1e-3 N to those at 10 us
 
 
 class Start(NamedTuple):
@@ -87,7 +88,10 @@ def predict(config: RigConfig, force_driven: bool, commands: Commands, start: St
     p.disturbed = p.disturbed or force_driven
     _set_start(p, state[0], start, force_driven)
     contact_rad_per_s = math.sqrt(p.k_t / p.m)
-    coarsest_s = min(_COARSEST_STEP_S, _CONTACT_STEP / contact_rad_per_s)
+    coarsest_s = min(_LED_STEP_S if force_driven else _COARSEST_STEP_S, _CONTACT_STEP / contact_rad_per_s)
+    if p.base_m_per_N > 0.0:  # the bristle between slide and base: stable up to twice this
+        base_kg = 1.0 / (p.base_m_per_N * (2.0 * math.pi * p.base_Hz) ** 2)
+        coarsest_s = min(coarsest_s, math.sqrt(base_kg / p.k_t))
     steps = np.maximum(
         math.ceil(BLOCK_S / coarsest_s - 1e-9),
         np.ceil(_STEPS_PER_PERIOD * commands.frequency_Hz * BLOCK_S - 1e-9),

@@ -3,6 +3,7 @@
 Only starting points for a refit come from here, never a verdict.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,8 @@ from diagnosis.reduced import BLOCK_S
 
 Floats = npt.NDArray[np.float64]
 _GRID = 400
+_LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
+_LOBE = 3  # grid points within which peaks are one
 
 
 class Wave(NamedTuple):
@@ -23,6 +26,7 @@ class Wave(NamedTuple):
     period: float
     ratio: float
     phase_rad: float
+    spread: float = 0.2  # of the period, relative: one standard deviation
 
 
 class _Series(NamedTuple):
@@ -31,7 +35,7 @@ class _Series(NamedTuple):
 
 
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
-    """The strongest waves of the friction over `position` [m] or `time` [s], strongest first."""
+    """The strongest waves of the friction over `position` [m] or `time` [s], two in each of `most` ranges of periods."""
     series: list[_Series] = []
     for run in runs:
         force = run.signals.get("drive_force_N")
@@ -49,17 +53,21 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -
             own = slice(max(segment.first, segment.settled), segment.last)
             cut = segment.sign * force[own]
             tops, bottoms = turning_points(cut, scales.drop_N)
-            if len(bottoms) >= 3:
+            if len(bottoms) >= 2:
                 at = tops[: len(bottoms)]
                 series.append(_Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0))
-            elif len(bottoms) == 0 and len(cut) > 500 and cut.mean() > 0.3 * scales.force_N:
-                level = cut[: len(cut) // 20 * 20].reshape(-1, 20).mean(axis=1)
-                series.append(_Series(coordinate[own][10::20][: len(level)], level / level.mean() - 1.0))
+            elif len(tops) == 0 and len(cut) > 500:
+                # where nothing slips the slide moves evenly, once the climb to that level is over
+                even = cut[len(cut) // 3 :]
+                level = even[: len(even) // 20 * 20].reshape(-1, 20).mean(axis=1)
+                if np.ptp(level) < 0.2 * scales.force_N and level.mean() > 0.5 * scales.force_N:
+                    there = coordinate[own][len(cut) // 3 + 10 :: 20][: len(level)]
+                    series.append(_Series(there, level / level.mean() - 1.0))
     return _strongest(series, most)
 
 
 def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
-    """The strongest waves of the drive's velocity over its `position` [m] or `time` [s], relative to that velocity."""
+    """The strongest waves of the drive's velocity over its `position` [m] or `time` [s], relative to it, likewise."""
     series: list[_Series] = []
     for run in runs:
         position = run.signals.get("drive_position_m")
@@ -84,11 +92,15 @@ def _strongest(series: list[_Series], most: int) -> list[Wave]:
     spacing = min(float(np.median(np.abs(np.diff(one.at)))) for one in series)
     if span <= 0.0 or spacing <= 0.0:
         return []
-    periods = np.geomspace(max(2.0 * spacing, span / 200.0), 2.0 * span, _GRID)
+    periods = np.geomspace(max(2.0 * spacing, span / 100.0), 2.0 * span, _GRID)
     found = [_fitted(series, float(period)) for period in periods]
     power = np.array([gain for gain, _ in found])
-    peaks = [i for i in range(_GRID) if power[i] == power[max(0, i - 12) : i + 13].max()]
-    best = sorted(peaks, key=lambda i: -power[i])[:most]
+    # the best of every range of periods: short ones fit the few breakaways best whatever is there
+    edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
+    best: list[int] = []
+    for first, last in pairwise(edges.tolist()):
+        peaks = [i for i in range(first, last) if power[i] == power[max(0, i - _LOBE) : i + _LOBE + 1].max()]
+        best += sorted(peaks, key=lambda i: -power[i])[:_LOBES]
     return [found[i][1] for i in best if power[i] > 0.0]
 
 

@@ -1,0 +1,218 @@
+"""The whole way from an evidence to a diagnosis: retune, alarm, name, group, judge on held-out runs, say what to do next."""
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.evidence import Evidence
+from diagnosis.flexible import flexible_differences
+from diagnosis.gap import (
+    DEFINITION,
+    KNEE,
+    Floor,
+    cell_names,
+    cell_squares,
+    differences,
+    floor_of,
+    gap,
+    replicates,
+)
+from diagnosis.heldout import Closed, HeldOut
+from diagnosis.library import Trial, trials
+from diagnosis.next_experiment import next_experiment
+from diagnosis.nuisance import Nuisances
+from diagnosis.pictures import pictures
+from diagnosis.problem import Prepared, Problem, prepare
+from diagnosis.refit import FAR_KNEE, Axis, Fit, Fitter
+from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Parameter, Shrinkage
+from diagnosis.search import refitted
+from diagnosis.summary import summary
+from diagnosis.twin import Roughness
+from diagnosis.verdict import Verdict, judge, second_pays
+
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[str, float], None]
+_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
+_MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
+_FIRST_REPLICATES, _REPLICATES = 12, 32
+_PAIRS = 2  # second effects that are refitted to the end
+_NEARLY_AS_GOOD = 1.3  # chi2 up to which the second best single effect gets a second one, too
+
+
+def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
+    """Diagnose one evidence. `progress` is told, in words, what is known and the share of the work that is done.
+
+    Raises Fault BAD_EVIDENCE when nothing can be compared.
+    """
+    began = time.monotonic()
+    runs = prepare(evidence)
+    fitted = [run for run in runs if not run.holdout]
+    problem = Problem(evidence.rig, fitted)
+    nuisances = Nuisances(evidence.rig)
+    described = np.zeros(len(nuisances))
+    point = nuisances.point(described, {})
+    first = replicates(problem, point, _ROUGHNESS, _FIRST_REPLICATES, 1)
+    roughness = _roughness(problem, first)
+    floor = floor_of(problem, point, first)
+    fitter = Fitter(problem, floor, nuisances)
+    apart = gap(floor, differences(floor, problem, problem.predicted(point)))
+    progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
+    retuned = fitter.retuned(described)
+    point = nuisances.point(retuned.deviations, {})
+    floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2))
+    fitter = Fitter(problem, floor, nuisances)
+    retuned = fitter.retuned(retuned.deviations, again=True)
+    left = differences(floor, problem, fitter.predicted(retuned.deviations, {}))
+    progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
+
+    tried = trials(problem)
+    singles = refitted(fitter, [(retuned, KNEE), (fitter.described(described), FAR_KNEE)], tried, jobs)
+    pairs: list[Fit] = []
+    if singles and second_pays(retuned, singles[0]):
+        progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
+        for one in singles[: 1 + (len(singles) > 1 and singles[1].chi2 < _NEARLY_AS_GOOD * singles[0].chi2)]:
+            pairs += refitted(fitter, [(one, KNEE)], _others(tried, one), jobs, _PAIRS)
+    verdict = judge(retuned, singles, pairs)
+    best = verdict.named or retuned
+    progress(f"verdict: {verdict.kind}", 0.8)
+    return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began)
+
+
+def _others(tried: list[Trial], one: Fit) -> list[Trial]:
+    return [trial for trial in tried if not set(trial.form.effects) & set(one.form.effects)]
+
+
+def _roughness(problem: Problem, drawn: Floats) -> Roughness:
+    """Roughness of the surface from the scatter of the breakaways, drawn towards what bench surfaces have."""
+    logs: list[float] = []
+    for i, (_, label) in enumerate(problem.labels):
+        if label.name == "scatter" and label.regime == "breakaway" and np.isfinite(problem.measured[i]):
+            known = drawn[np.isfinite(drawn[:, i]), i]
+            if len(known) and problem.measured[i] > 0.0:
+                logs.append(0.5 * math.log(problem.measured[i] / float(known.mean())))
+    if not logs:
+        return _ROUGHNESS
+    # one segment's scatter is known to a factor of 1.4 or so; surfaces lie within a factor of 1.8 of 0.3 %
+    weight = len(logs) / (len(logs) + 0.5)
+    ratio = _MARGIN * _ROUGHNESS.ratio * math.exp(weight * float(np.median(logs)))
+    return _ROUGHNESS._replace(ratio=min(max(ratio, 0.002), 0.008))
+
+
+def _assembled(
+    evidence: Evidence,
+    runs: list[Prepared],
+    fitter: Fitter,
+    retuned: Fit,
+    best: Fit,
+    singles: list[Fit],
+    verdict: Verdict,
+    tried: list[Trial],
+    roughness: Roughness,
+    began: float,
+) -> Diagnosis:
+    nuisances = fitter.nuisances
+    unseen = [run for run in runs if run.holdout]
+    cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(retuned.deviations, {})))
+    judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
+    if unseen:
+        held_out = HeldOut(Problem(evidence.rig, unseen), nuisances, best, retuned, roughness)
+        cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
+        judged = _judged(fitter, held_out, retuned, best, verdict, tried)
+    total = sum(cell.share for cell in cells)
+    where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
+    by_effect = {fit.form.effects[0]: fit for fit in reversed(singles)}
+    if verdict.named is not None:
+        by_effect |= dict.fromkeys(verdict.named.form.effects, verdict.named)
+    candidates = tuple(
+        _candidate(name, probability, by_effect.get(name)) for name, probability in verdict.probabilities.items()
+    )
+    named = nuisances.point(best.deviations, best.effects) if verdict.named else None
+    effects = best.form.effects if verdict.named else ()
+    leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
+    done = Diagnosis(
+        verdict=verdict.kind,
+        effects=effects,
+        summary=(),
+        candidates=candidates,
+        not_distinguishable=verdict.groups,
+        where=tuple(where),
+        gap=judged,
+        next_experiment=next_experiment(fitter.problem, nuisances, leaders),
+        rig=tuple(
+            Parameter(
+                name, nuisances.value(name, 0.0), nuisances.value(name, float(deviation)), evidence.rig.tolerance[name]
+            )
+            for name, deviation in zip(nuisances.rig_names, best.deviations, strict=False)
+        ),
+        findings=evidence.findings,
+        pictures=pictures(
+            Problem(evidence.rig, runs),
+            nuisances.point(np.zeros(len(nuisances)), {}),
+            nuisances.point(retuned.deviations, {}),
+            named,
+            effects,
+        ),
+        elapsed_s=time.monotonic() - began,
+    )
+    return done._replace(summary=summary(done))
+
+
+def _judged(fitter: Fitter, held_out: HeldOut, retuned: Fit, best: Fit, verdict: Verdict, tried: list[Trial]) -> Gap:
+    closed = held_out.closed_by(best)
+    compared: list[Shrinkage] = []
+    if verdict.named is not None:
+        compared.append(_shrinkage(" and ".join(best.form.effects), closed))
+    if verdict.runner_up is not None:
+        compared.append(_shrinkage(verdict.runner_up.form.effects[0], held_out.closed_by(verdict.runner_up)))
+    compared.append(_shrinkage("parameters alone", held_out.closed_by(retuned)))
+    blend = flexible_differences(fitter, retuned, tried, held_out)
+    compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))
+    named = verdict.named is not None
+    return Gap(
+        definition=DEFINITION,
+        runs=tuple(run.file for run in held_out.problem.runs),
+        nominal=held_out.nominal,
+        retuned=held_out.retuned,
+        with_effect=closed.gap,
+        floor=1.0,
+        shrinkage=closed.shrinkage if named else None,
+        interval_90=closed.interval_90 if named else None,
+        compared=tuple(compared),
+    )
+
+
+def _shrinkage(who: str, closed: Closed) -> Shrinkage:
+    return Shrinkage(who, closed.gap, closed.shrinkage, closed.interval_90)
+
+
+def _cells(floor: Floor, z: Floats) -> list[Cell]:
+    """Cells with what they hold above the floor; all that they hold where nothing is above it."""
+    squares = cell_squares(floor, z)
+    above = np.maximum(squares - floor.level**2, 0.0)
+    shares = above if above.sum() > 0.0 else squares
+    return [
+        Cell(signal, regime, band_Hz, run, float(share))
+        for (signal, regime, band_Hz, run), share in zip(cell_names(floor), shares, strict=True)
+        if share > 0.0
+    ]
+
+
+def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
+    if fit is None:
+        return Candidate(name, probability)
+    own = len(fit.deviations)
+    deviation = np.sqrt(np.diag(fit.covariance()))[own:]
+    parameters = {
+        axis.name: _estimate(axis, float(w), float(spread))
+        for axis, w, spread in zip(fit.form.axes, fit.w, deviation, strict=True)
+        if axis.effect == name
+    }
+    return Candidate(name, probability, fit.form.forms[name], parameters)
+
+
+def _estimate(axis: Axis, w: float, deviation: float) -> Estimate:
+    low, high = sorted((axis.value(w - 1.645 * deviation), axis.value(w + 1.645 * deviation)))
+    return Estimate(axis.value(w), (low, high))

@@ -1,0 +1,92 @@
+"""How far an explanation closes the gap, on runs that no fit has seen.
+
+The held-out runs are a problem of their own: the fitter that knows the fitted runs never holds them, so nothing can leak.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.gap import Floor, cell_squares, differences, floor_of, replicates
+from diagnosis.nuisance import Nuisances
+from diagnosis.problem import Problem
+from diagnosis.refit import NOTHING, Fit, Form
+from diagnosis.twin import Roughness
+
+Floats = npt.NDArray[np.float64]
+_REPLICATES = 24
+_DRAWS = 8  # of a fit's parameters
+_RESAMPLES = 400  # of the cells
+_SEED = 3
+_SMALLEST_GAP = 0.05  # above the floor: less leaves nothing to divide by
+
+
+class Closed(NamedTuple):
+    """What an explanation leaves of the gap."""
+
+    gap: float
+    shrinkage: float | None  # (retuned - gap) / (retuned - floor); None: no gap to close
+    interval_90: tuple[float, float] | None
+
+
+class HeldOut:
+    """The held-out runs and their floor."""
+
+    def __init__(self, problem: Problem, nuisances: Nuisances, best: Fit, retuned: Fit, roughness: Roughness) -> None:
+        self.problem = problem
+        self._nuisances = nuisances
+        point = nuisances.point(best.deviations, best.effects)
+        self.floor: Floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, _SEED))
+        described = np.zeros(len(nuisances))
+        self.nominal = self._gap(cell_squares(self.floor, self.differences(described, NOTHING, np.zeros(0))))
+        self._retuned = cell_squares(self.floor, self.differences(retuned.deviations, retuned.form, retuned.w))
+        self.retuned = self._gap(self._retuned)
+
+    def closed_by(self, fit: Fit) -> Closed:
+        """The gap under a fit, with an interval from the spread over cells and the fit's own uncertainty."""
+        here = cell_squares(self.floor, self.differences(fit.deviations, fit.form, fit.w))
+        random = np.random.default_rng(_SEED)
+        drawn = [here]
+        spread = np.linalg.cholesky(fit.covariance() + 1e-12 * np.eye(len(fit.deviations) + len(fit.w)))
+        at = np.concatenate([fit.deviations, fit.w])
+        for _ in range(_DRAWS):
+            moved = at + spread @ random.normal(size=len(at))
+            own = len(fit.deviations)
+            drawn.append(cell_squares(self.floor, self.differences(moved[:own], fit.form, moved[own:])))
+        return self._closed(here, drawn)
+
+    def closed_by_differences(self, z: Floats) -> Closed:
+        """The same for differences from elsewhere [compared]."""
+        here = cell_squares(self.floor, z)
+        return self._closed(here, [here])
+
+    def _closed(self, here: Floats, drawn: list[Floats]) -> Closed:
+        gap = self._gap(here)
+        if self.retuned - 1.0 < _SMALLEST_GAP:
+            return Closed(gap, None, None)
+        random = np.random.default_rng(_SEED)
+        cells = len(here)
+        shares: list[float] = []
+        for number in range(_RESAMPLES):
+            pick = random.integers(cells, size=cells)
+            before = self._gap(self._retuned[pick])
+            after = self._gap(drawn[number % len(drawn)][pick])
+            if before - 1.0 > _SMALLEST_GAP:
+                shares.append((before - after) / (before - 1.0))
+        shrinkage = (self.retuned - gap) / (self.retuned - 1.0)
+        if len(shares) < _RESAMPLES // 2:
+            return Closed(gap, shrinkage, None)
+        low, high = np.quantile(shares, (0.05, 0.95))
+        return Closed(gap, shrinkage, (float(min(low, shrinkage)), float(max(high, shrinkage))))
+
+    def differences(self, deviations: Floats, form: Form, w: Floats) -> Floats:
+        """Measured less predicted in floors [compared]."""
+        return self.differences_of(self.problem.predicted(self._nuisances.point(deviations, form.tables(w))))
+
+    def differences_of(self, predicted: Floats) -> Floats:
+        """The same for a prediction [features] from elsewhere."""
+        return differences(self.floor, self.problem, predicted)
+
+    def _gap(self, squares: Floats) -> float:
+        return float(np.sqrt(squares.mean())) / self.floor.level

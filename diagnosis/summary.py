@@ -1,0 +1,62 @@
+"""The answer in plain words, the first sentence first."""
+
+import math
+
+from diagnosis.result import Diagnosis
+from diagnosis.wording import EFFECT_WORDS, estimate_in_words, percent, signal_name, times
+
+_SMALL_SHARE = 0.05
+
+
+def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Sentences for a person at the machine."""
+    gap = diagnosis.gap
+    sentences: list[str] = []
+    if diagnosis.verdict == "no-gap":
+        sentences.append("No gap beyond the stated tolerances: the rig as described explains these runs.")
+    elif diagnosis.verdict == "unexplained":
+        sentences.append("There is a gap, and nothing in the library explains it.")
+    if diagnosis.where and diagnosis.verdict != "no-gap":
+        sentences.append(_where(diagnosis))
+    for name in diagnosis.effects:
+        candidate = next(one for one in diagnosis.candidates if one.effect == name)
+        numbers = ", ".join(estimate_in_words(*item) for item in candidate.parameters.items())
+        sentences.append(
+            f"{name} explains it (probability {percent(candidate.probability)}): {EFFECT_WORDS[name]}"
+            + (f"; {numbers}." if numbers else ".")
+        )
+    for group in diagnosis.not_distinguishable:
+        sentences.append(f"These runs cannot tell apart: {', '.join(group)}.")
+    if gap.runs and math.isfinite(gap.retuned):
+        kept = ", ".join(gap.runs)
+        if gap.shrinkage is not None:
+            low, high = gap.interval_90 or (math.nan, math.nan)
+            between = f" (90 %: {percent(low)} to {percent(high)})" if math.isfinite(low) else ""
+            sentences.append(
+                f"On {kept}, kept aside, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
+                f"{percent(gap.shrinkage)} of what could be closed{between}."
+            )
+        else:
+            sentences.append(
+                f"On {kept}, kept aside, {times(gap.retuned)} noise floors are left after refitting the rig's numbers; 1 is perfect."
+            )
+    else:
+        sentences.append("No run was kept aside: how far the gap closes on new data is not known.")
+    if diagnosis.verdict != "no-gap" or diagnosis.next_experiment.gain is not None:
+        sentences.append(f"Next: {diagnosis.next_experiment.what}")
+    return tuple(sentences)
+
+
+def _where(diagnosis: Diagnosis) -> str:
+    by_signal: dict[str, float] = {}
+    by_regime: dict[tuple[str, str], float] = {}
+    for cell in diagnosis.where:
+        by_signal[cell.signal] = by_signal.get(cell.signal, 0.0) + cell.share
+        key = (cell.signal, cell.regime)
+        by_regime[key] = by_regime.get(key, 0.0) + cell.share
+    signal, share = max(by_signal.items(), key=lambda item: item[1])
+    regimes = sorted(((value, regime) for (own, regime), value in by_regime.items() if own == signal), reverse=True)
+    shown = ", ".join(f"{percent(value)} at {regime}" for value, regime in regimes[:2] if value > _SMALL_SHARE)
+    return f"The gap is mostly in the {signal_name(signal)}, {percent(share)} of it" + (
+        f" ({shown})." if shown else "."
+    )

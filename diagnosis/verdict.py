@@ -1,0 +1,125 @@
+"""From fits to a verdict: is there a gap, which effects close it, and which could not be told apart.
+
+Fits compete by the logarithm of their evidence, Laplace's approximation: half of how far chi2 falls, less what the freedom of
+their parameters costs. All of it is divided by the misfit that even the best model leaves, so that a model that is wrong
+everywhere cannot be sure of anything (a quasi-likelihood), and by a temperature that was calibrated on evidence made from the
+plant. `none` is the rig refitted inside its tolerances. `unexplained` stands for a model that nobody wrote down and that would
+close a fair share of the gap: it wins where the library closes less.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.refit import Fit
+from plant.effects import EFFECTS
+
+Floats = npt.NDArray[np.float64]
+# chi2 of a perfect model per compared feature: the replicates' correlation and the least floors keep it below 1. No-gap
+# evidence of the plant had 0.45 to 0.75.
+_PERFECT = 0.6
+_CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
+_COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
+# log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise
+_COST_OF_EFFECT = 14.0
+_COST_OF_SECOND = 16.0  # on top, for a second effect,
+_SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves
+_TEMPERATURE = 3.0
+_SAME = 6.0  # log evidence within which two effects cannot be told apart
+
+
+class Model(NamedTuple):
+    """A fit in the competition."""
+
+    fit: Fit
+    evidence: float  # log, against the refitted rig without effects
+
+
+class Verdict(NamedTuple):
+    """What came of the competition."""
+
+    kind: Literal["effect", "no-gap", "unexplained"]
+    named: Fit | None
+    probabilities: dict[str, float]  # of every effect, none and unexplained; they add up to 1
+    groups: tuple[tuple[str, ...], ...]
+    runner_up: Fit | None
+
+
+def misfit(base: Fit, fits: list[Fit]) -> float:
+    """How many times chi2 of a perfect model the best fit leaves; 1 at least."""
+    best = min([base.chi2, *(fit.chi2 for fit in fits)])
+    return max(best / perfect_chi2(base), 1.0)
+
+
+def perfect_chi2(base: Fit) -> float:
+    """chi2 that a perfect model would leave."""
+    return _PERFECT * len(base.residual)
+
+
+def occam(fit: Fit) -> float:
+    """Log evidence that the freedom of the effects' parameters costs."""
+    if not fit.form.axes:
+        return 0.0
+    own = len(fit.deviations)
+    _, volume = np.linalg.slogdet(fit.covariance()[own:, own:])
+    return sum(math.log(axis.prior) for axis in fit.form.axes) - 0.5 * float(volume)
+
+
+def second_pays(base: Fit, first: Fit) -> bool:
+    """Whether enough is left by the best single effect to look for a second."""
+    left = first.chi2 - perfect_chi2(base)
+    return left > 2.0 * (_COST_OF_EFFECT + _COST_OF_SECOND) and left > 0.1 * (base.chi2 - perfect_chi2(base))
+
+
+def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
+    """The verdict over single effects and pairs of them, each list best first."""
+    scale = misfit(base, [*singles, *pairs])
+
+    def model(fit: Fit) -> Model:
+        return Model(fit, 0.5 * (base.chi2 - fit.chi2) / scale - occam(fit))
+
+    ranked = sorted((model(fit) for fit in singles), key=lambda one: -one.evidence)
+    double = max((model(fit) for fit in pairs), key=lambda one: one.evidence, default=None)
+    if double is not None and ranked:
+        gained = double.evidence - ranked[0].evidence
+        left = max(ranked[0].fit.chi2 - perfect_chi2(base), 1.0)
+        closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
+        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES:
+            double = None
+    best = double or (ranked[0] if ranked else None)
+    reducible = max(base.chi2 - perfect_chi2(base), 0.0)
+    scores: dict[str, float] = {"none": _COST_OF_EFFECT}
+    scores["unexplained"] = 0.5 * _CLOSED_BY_UNKNOWN * reducible / scale - _COST_OF_UNKNOWN
+    for one in ranked:
+        scores[one.fit.form.effects[0]] = one.evidence
+    if double is not None:
+        for name in double.fit.form.effects:
+            scores[name] = double.evidence - math.log(2.0)
+    for name in EFFECTS:
+        scores.setdefault(name, -30.0)
+    probabilities = _softmax(scores)
+    top = max(scores, key=lambda name: scores[name])
+    if best is None or top == "none":
+        return Verdict("no-gap", None, probabilities, (), ranked[0].fit if ranked else None)
+    others = [
+        one.fit for one in ranked if one.fit is not best.fit and one.fit.form.effects[0] not in best.fit.form.effects
+    ]
+    runner_up = others[0] if others else None
+    if top == "unexplained":
+        return Verdict("unexplained", None, probabilities, (), best.fit)
+    groups = () if double is not None else _groups(ranked)
+    return Verdict("effect", best.fit, probabilities, groups, runner_up)
+
+
+def _groups(ranked: list[Model]) -> tuple[tuple[str, ...], ...]:
+    close = [one.fit.form.effects[0] for one in ranked if ranked[0].evidence - one.evidence < _SAME]
+    return (tuple(close),) if len(close) > 1 else ()
+
+
+def _softmax(scores: dict[str, float]) -> dict[str, float]:
+    highest = max(scores.values())
+    weights = {name: math.exp((score - highest) / _TEMPERATURE) for name, score in scores.items()}
+    total = sum(weights.values())
+    return {name: weight / total for name, weight in sorted(weights.items(), key=lambda item: -item[1])}

@@ -1,0 +1,87 @@
+"""A force-driven axis: the model led along the measured motion, and what is compared."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis.axis_drive import relative, true_commands
+from diagnosis.axis_waves import axis_waves
+from diagnosis.evidence import load_evidence
+from diagnosis.gap import differences, floor_of, gap, replicates
+from diagnosis.making import Case, make_evidence
+from diagnosis.nuisance import Nuisances
+from diagnosis.problem import Point, Prepared, Problem, prepare
+from diagnosis.sensing import Chain, sensed
+from diagnosis.twin import Effects, Roughness
+
+ROUGH = Roughness(0.003, 2e-4, 0)
+WAVE: Effects = {"position-dependent-friction": {"form": "", "ratio": 0.05, "wavelength_m": 0.02, "phase_rad": 1.0}}
+GAIN: Effects = {"force-sensor-gain": {"form": "", "ratio": 0.05}}
+
+
+def made(folder: Path, effects: Effects) -> tuple[Problem, list[Prepared], Point]:
+    """The fitted runs of an axis whose true parameters are the described ones, but for the effects."""
+    make_evidence(folder, Case("force", effects=effects, drawn=False), seed=5)
+    evidence = load_evidence(folder)
+    runs = [run for run in prepare(evidence) if not run.holdout]
+    nuisances = Nuisances(evidence.rig)
+    return Problem(evidence.rig, runs), runs, nuisances.point(np.zeros(len(nuisances)), {})
+
+
+def gap_of(problem: Problem, point: Point, effects: Effects) -> float:
+    floor = floor_of(problem, point, replicates(problem, point, ROUGH, 12, 1))
+    return gap(floor, differences(floor, problem, problem.predicted(point._replace(effects=effects))))
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, list[Prepared], Point]:
+    return made(tmp_path_factory.mktemp("plain") / "axis", {})
+
+
+def test_a_described_axis_has_no_gap_and_is_followed(plain: tuple[Problem, list[Prepared], Point]) -> None:
+    problem, runs, point = plain
+    assert 0.4 < gap_of(problem, point, {}) < 1.6
+    assert np.isfinite(problem.measured).mean() > 0.9
+    for run in runs:
+        predicted = problem.signals(run, point)
+        assert np.abs(predicted["mass_position_m"] - run.signals["mass_position_m"]).max() < 1e-3
+        assert np.std(predicted["drive_force_N"] - run.signals["drive_force_N"]) < 1.0  # the encoder's noise
+
+
+@pytest.mark.parametrize("effects", [WAVE, GAIN], ids=lambda effects: next(iter(effects)))
+def test_an_effect_opens_a_gap_that_only_it_closes(tmp_path: Path, effects: Effects) -> None:
+    problem, runs, point = made(tmp_path / "off", effects)
+    assert gap_of(problem, point, {}) > 2.0
+    assert 0.4 < gap_of(problem, point, effects) < 1.6
+    if effects is WAVE:
+        wave = axis_waves(runs, "position", 1)[0]
+        assert wave.period == pytest.approx(0.02, rel=0.05)
+        assert wave.ratio == pytest.approx(0.05, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        GAIN,
+        {"force-sensor-bias": {"form": "", "bias_N": 2.0}},
+        {"force-sensor-drift": {"form": "linear", "rate_N_per_s": 0.1}},
+        {"force-sensor-drift": {"form": "settling", "drift_N": 1.0, "settling_s": 2.0}},
+        {"force-sensor-delay": {"form": "", "delay_s": 3e-3}},
+        {"force-sensor-lag": {"form": "first-order", "lag_s": 4e-3}},
+        {"force-sensor-lag": {"form": "second-order", "lag_s": 2e-3}},
+    ],
+    ids=lambda effects: next(iter(effects)),
+)
+def test_the_true_force_is_what_the_sensor_made_the_measured_one_of(
+    plain: tuple[Problem, list[Prepared], Point], effects: Effects
+) -> None:
+    run = plain[1][0]
+    chain = relative(Chain(force_delay_s=5e-4, position_delay_s=2e-4))
+    smooth = 40.0 * np.sin(2.0 * np.pi * 2.0 * np.arange(len(run.commands.drive)) * 1e-3)
+    commands = true_commands(run.commands._replace(drive=smooth), effects, chain, run.start.t_s)
+    signals = dict.fromkeys(run.signals | {"drive_position_m": 0, "mass_accel_mps2": 0, "base_accel_mps2": 0}, smooth)
+    signals |= dict.fromkeys(("mass_shake_mps2", "base_shake_mps2"), smooth) | {"drive_force_N": commands.drive}
+    shown = sensed(signals, run.commands.frequency_Hz, effects, chain, run.start.t_s)["drive_force_N"]
+    inner = slice(100, -100)
+    assert shown[inner] == pytest.approx(smooth[inner], abs=0.05)  # of 40 N; a lag is undone to second order
