@@ -3,6 +3,8 @@
 The measured force is what `sensing.sensed` makes of the true one; here the way back.
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
@@ -12,7 +14,7 @@ from diagnosis.reduced import BLOCK_S
 from diagnosis.sensing import Chain, delayed
 from diagnosis.twin import Effects
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _DERIVATIVE_S = 2e-3  # over which the force is smoothed for what a low-pass has taken
 
 

@@ -7,6 +7,7 @@ sign of the velocity) and of a force that knows no direction.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,7 @@ from diagnosis.features import LOW, Features, Signals
 from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 Indices = npt.NDArray[np.int64]
 _EDGE = 50  # blocks at either end, where the smoothed motion is not to be trusted
 _SLOW = np.array([0.25, 0.5, 1.0, 2.0, 4.0])  # edges in Stribeck velocities: below the first it is about to stick

@@ -5,7 +5,7 @@ axis of 95 kg. Led along the measured motion it needs a force, and that force is
 mass, a friction or a gain that is wrong shows where it acts.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ from scipy.signal import savgol_filter
 
 from diagnosis.reduced import BLOCK_S
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 31  # blocks, of a cubic: 0.2 um of encoder noise are 4e-6 m/s and 1e-3 m/s^2
 
 

@@ -3,7 +3,7 @@
 Only starting points for a refit come from here, never a verdict.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 from diagnosis.waves import Wave
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _EVERY = 8  # blocks that make one sample
 _MOST_TURNS = 200  # of a wave within the longest run
 _STEPS_PER_TURN = 3  # a line is as narrow as the run is long

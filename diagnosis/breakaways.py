@@ -1,6 +1,6 @@
 """Where a force breaks away and sticks again within a segment, and what each breakaway could depend on."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,7 @@ from diagnosis.manifest import RigTable
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 
-Floats = npt.NDArray[np.float64]
-_SETTLING_BLOCKS = 100
+Floats = npt.NDArray[np.floating[Any]]
 _LONGEST = 10.0  # half periods of the mass on its spring: what falls longer is a change of level
 
 
@@ -28,7 +27,7 @@ class Slips(NamedTuple):
 
 def slips_of(signals: Signals, segment: Segment, scales: Scales) -> Slips:
     """The slips that the drive force shows."""
-    first = max(segment.first + (_SETTLING_BLOCKS if segment.first else 0), segment.settled)
+    first = segment.first
     force_N = segment.sign * signals["drive_force_N"][first : segment.last]
     tops, bottoms = turning_points(force_N, scales.drop_N)
     tops = tops[: len(bottoms)]

@@ -5,7 +5,7 @@ velocity, it is read from the drive position as pieces of constant velocity.
 """
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from diagnosis.evidence import Run
 from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 100  # blocks: 0.1 s, over which a velocity is read from a position with noise
 # A change of speed is one when it is larger than this share of the faster speed; a ripple of a screw stays below.
 _SMALLEST_CHANGE = 0.35
@@ -31,7 +31,6 @@ class Segment(NamedTuple):
     drive_velocity_mps: float  # 0 with a force drive
     frequency_Hz: float
     amplitude_m: float
-    settled: int = 0  # block from which levels count: behind the first slip of a run, whose climb is the start's
 
     @property
     def at_the_edge(self) -> bool:

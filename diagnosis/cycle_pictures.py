@@ -1,6 +1,6 @@
 """Measured cycles laid over predicted ones: of each run the segment in which they differ most."""
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 from diagnosis.result import Curve, Picture
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 Style = Literal["measured", "nominal", "retuned", "effect"]
 _POINTS = 700
 _AXES = {"drive_force_N": "drive force [N]", "mass_accel_mps2": "acceleration of the mass [m/s²]"}
@@ -65,7 +65,7 @@ def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
     """Breakaway, re-stick and mean level, in static friction forces, and a tenth of the logarithm of the period."""
     force_N = signals["drive_force_N"]
     slips = slips_of(signals, segment, scales)
-    level_N = segment.sign * float(force_N[max(segment.first, segment.settled) : segment.last].mean())
+    level_N = segment.sign * float(force_N[segment.first : segment.last].mean())
     if len(slips.tops) == 0:
         return np.array([level_N, level_N, level_N, 0.0]) / scales.force_N
     top_N = segment.sign * float(force_N[slips.tops].mean())

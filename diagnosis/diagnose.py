@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,18 +27,19 @@ from diagnosis.next_experiment import next_experiment
 from diagnosis.nuisance import Nuisances
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
-from diagnosis.refit import FAR_KNEE, Axis, Fit, Fitter
+from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Parameter, Shrinkage
 from diagnosis.search import refitted
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
 from diagnosis.verdict import Verdict, judge, second_pays
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
 _ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
 _MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
 _FIRST_REPLICATES, _REPLICATES = 12, 32
+_RETRIED = 2  # best single effects whose nuisances the rig without effects is tried at
 _PAIRS = 2  # second effects that are refitted to the end
 _NEARLY_AS_GOOD = 1.3  # chi2 up to which the second best single effect gets a second one, too
 
@@ -75,10 +77,32 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
         for one in singles[: 1 + (len(singles) > 1 and singles[1].chi2 < _NEARLY_AS_GOOD * singles[0].chi2)]:
             pairs += refitted(fitter, [(one, KNEE)], _others(tried, one), jobs, _PAIRS)
+        singles = _again(fitter, singles, pairs)
+    # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
+    for one in singles[:_RETRIED]:
+        retuned = min(retuned, fitter.refit(NOTHING, one.deviations, np.zeros(0)), key=lambda fit: fit.chi2)
+    for i, one in enumerate(singles[:_RETRIED]):
+        singles[i] = min(one, fitter.refit(one.form, retuned.deviations, one.w), key=lambda fit: fit.chi2)
     verdict = judge(retuned, singles, pairs)
     best = verdict.named or retuned
     progress(f"verdict: {verdict.kind}", 0.8)
     return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began)
+
+
+def _again(fitter: Fitter, singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
+    """Single effects once more, from where the best pair left them."""
+    best = min(pairs, key=lambda fit: fit.chi2, default=None)
+    if best is None:
+        return singles
+    found = {fit.form.effects: fit for fit in singles}
+    for name, form in best.form.forms.items():
+        own = [i for i, axis in enumerate(best.form.axes) if axis.effect == name]
+        alone = Form({name: form}, tuple(best.form.axes[i] for i in own))
+        fit = fitter.refit(alone, best.deviations, best.w[own])
+        before = found.get((name,))
+        if before is None or fit.chi2 < before.chi2:
+            found[name,] = fit
+    return sorted(found.values(), key=lambda fit: fit.chi2)
 
 
 def _others(tried: list[Trial], one: Fit) -> list[Trial]:

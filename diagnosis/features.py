@@ -7,7 +7,7 @@ have is NaN.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from diagnosis.commands import Commands, Segment
 from diagnosis.cycles import turning_points
 from diagnosis.reduced import BLOCK_S
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 Signals = dict[str, Floats]
 Band = tuple[float, float]
 LOW: Band = (0.0, 5.0)
@@ -31,6 +31,7 @@ POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
 _LEVELS = 8  # bins of a segment without slips
 _BREAKAWAY_WAVES = 5
+_TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
 _DRIVE_WAVES = 24
 
 
@@ -51,6 +52,7 @@ class Scales(NamedTuple):
     slip_s: float  # half a period of the mass on its spring
     drop_N: float  # smallest fall of the force that is a slip
     stiffness_N_per_m: float
+    fall_N: float  # of the force in a slip: twice the static less the Coulomb friction
 
 
 class Features:
@@ -67,11 +69,21 @@ class Features:
 
 
 class _Slips(NamedTuple):
-    """The slips of a segment: blocks of breakaway and re-stick, and where half of the fall is done."""
+    """The slips of a segment: blocks of breakaway and re-stick, where half of the fall is done, and how much each counts.
+
+    A slip counts less towards the ends of its segment and nothing at them: one that comes in or goes out as a parameter
+    moves must not make the features jump, or no fit finds its way.
+    """
 
     tops: npt.NDArray[np.int64]
     bottoms: npt.NDArray[np.int64]
     middles: Floats
+    weights: Floats
+
+    @property
+    def some(self) -> bool:
+        """Whether there is enough of a slip to speak of."""
+        return float(self.weights.sum()) > 0.1
 
 
 def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Features:
@@ -85,9 +97,10 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
         }
         slips = _find_slips(cut, scales)
         if "drive_force_N" in cut:
-            _cycles(found, number, cut["drive_force_N"], slips)
-            settled = max(segment.settled - segment.first, 0)
-            _level(found, number, cut["drive_force_N"][settled:], slips, segment.at_the_edge)
+            travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
+            expected = travel_m * scales.stiffness_N_per_m / scales.fall_N
+            _cycles(found, number, cut["drive_force_N"], slips, expected)
+            _level(found, number, cut["drive_force_N"], slips, segment.at_the_edge)
         _period(found, number, slips)
         _shapes(found, number, cut, slips, scales, segment.frequency_Hz)
         if segment.frequency_Hz > 0.0:
@@ -101,17 +114,14 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
 def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
     """A segment without what its start decides: how loaded the spring was then, and how old the contact at the first slip.
 
-    With three slips or more it begins in the second stick; with fewer only its levels begin after the first re-stick.
+    With three slips or more it begins in the second stick; with fewer nothing would be left.
     """
     cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
     slips = _find_slips(cut, scales)
-    if len(slips.bottoms) == 0:
-        return segment
-    restick = segment.first + int(slips.bottoms[0])
     if len(slips.bottoms) < 3:
-        return segment._replace(settled=restick)
+        return segment
     stick = int(slips.tops[1] - slips.bottoms[0])
-    return segment._replace(first=restick + int(0.4 * stick))
+    return segment._replace(first=segment.first + int(slips.bottoms[0]) + int(0.4 * stick))
 
 
 def _find_slips(cut: Signals, scales: Scales) -> _Slips:
@@ -134,72 +144,80 @@ def _find_slips(cut: Signals, scales: Scales) -> _Slips:
         under = top + int(np.argmax(falling[top : bottom + 1] <= half))
         step = falling[under - 1] - falling[under]
         middles[i] = under - (half - falling[under]) / step if step > 0.0 else under
-    return _Slips(tops, bottoms, middles)
+    width = scales.slip_s / BLOCK_S
+    margin = np.minimum(middles + SHAPE_AT[0] * width, len(falling) - 1 - middles - SHAPE_AT[-1] * width)
+    return _Slips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))
 
 
-def _cycles(found: Features, number: int, force_N: Floats, slips: _Slips) -> None:
+def _cycles(found: Features, number: int, force_N: Floats, slips: _Slips, expected: float) -> None:
     name = "drive_force_N"
     for regime, at, waves in (("breakaway", slips.tops, _BREAKAWAY_WAVES), ("restick", slips.bottoms, 3)):
-        values = force_N[at]
-        moments = _moments(values, at / len(force_N), waves)
+        carried = min(waves, max(int(expected / 2.0) - 1, 0)) if expected >= 5.0 else 0
+        moments, scatter = _moments(force_N[at], at / len(force_N), slips.weights, carried)
         found.add("mean", name, regime, LOW, number, moments[0])
-        for wave, value in enumerate(moments[1:-1], start=1):
-            found.add(f"wave {wave}", name, regime, LOW, number, value)
-        found.add("scatter", name, regime, LOW, number, moments[-1])
+        for wave in range(1, waves + 1):
+            found.add(f"wave {wave}", name, regime, LOW, number, moments[wave] if wave <= carried else math.nan)
+        found.add("scatter", name, regime, LOW, number, scatter)
     # the climb between a re-stick and the next breakaway, in three parts
     rates = np.full(3, np.nan)
-    if len(slips.tops) > 1:
+    weights = np.minimum(slips.weights[:-1], slips.weights[1:])
+    if weights.sum() > 0.1:
         start, end = slips.bottoms[:-1], slips.tops[1:]
-        level = [force_N[(start + share * (end - start)).astype(np.int64)] for share in (0.1, 0.4, 0.7, 0.95)]
+        blocks = np.arange(len(force_N))
+        level = [np.interp(start + share * (end - start), blocks, force_N) for share in (0.1, 0.4, 0.7, 0.95)]
         length = (end - start) * BLOCK_S
         parts = zip(level[:-1], level[1:], (0.3, 0.3, 0.25), strict=True)
-        rates = np.array([float(np.median((high - low) / (share * length))) for low, high, share in parts])
+        rates = np.array([float(weights @ ((high - low) / (share * length))) for low, high, share in parts])
+        rates /= weights.sum()
     for part, rate in zip(("early", "middle", "late"), rates, strict=True):
         found.add(f"rate {part}", name, "stick", LOW, number, float(rate))
 
 
-def _moments(values: Floats, at: Floats, waves: int) -> list[float]:
-    """Mean, cosine waves over the segment as far as the cycles carry them, and the power of what is left."""
-    n = len(values)
-    result = [math.nan] * (waves + 2)
-    if n == 0:
-        return result
-    result[0] = float(values.mean())
-    carried = min(waves, max(n // 2 - 1, 0)) if n >= 4 else 0
+def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple[list[float], float]:
+    """Mean and cosine waves over the segment, and the power of what is left; NaN where there are too few slips."""
+    total = float(weights.sum())
+    moments = [math.nan] * (carried + 1)
+    if total <= 0.1:
+        return moments, math.nan
+    mean = float(weights @ values) / total
+    moments[0] = mean
+    if len(values) < carried + 2:
+        return moments, math.nan
+    root = np.sqrt(weights)
     columns = np.cos(np.pi * np.outer(at, np.arange(carried + 1)))
-    weights, *_ = np.linalg.lstsq(columns, values, rcond=None)
-    result[1 : 1 + carried] = weights[1:].tolist()
-    if n >= 6:
-        left = values - columns @ weights
-        result[-1] = float(left @ left) / (n - carried - 1)
-    return result
+    fitted, *_ = np.linalg.lstsq(columns * root[:, None], values * root, rcond=None)
+    moments[1:] = fitted[1:].tolist()
+    left = values - columns @ fitted
+    free = total - carried - 1.0
+    return moments, float(weights @ (left * left)) / free if free > 1.0 else math.nan
 
 
 def _period(found: Features, number: int, slips: _Slips) -> None:
+    weights = np.minimum(slips.weights[:-1], slips.weights[1:])
     periods_s = np.diff(slips.middles) * BLOCK_S
-    found.add(
-        "period", "drive_force_N", "stick", LOW, number, float(np.log(periods_s.mean())) if len(periods_s) else math.nan
-    )
-    some = len(slips.tops) > 0
-    length_s = float((slips.bottoms - slips.tops).mean()) * BLOCK_S if some else math.nan
-    found.add("duration", "drive_force_N", "slip", MIDDLE, number, length_s)
+    known = weights.sum() > 0.1
+    value = math.log(float(weights @ periods_s) / float(weights.sum())) if known else math.nan
+    found.add("period", "drive_force_N", "stick", LOW, number, value)
 
 
 def _level(found: Features, number: int, force_N: Floats, slips: _Slips, at_the_edge: bool) -> None:
+    """Levels over whole cycles; over the segment where nothing slips."""
     name = "drive_force_N"
-    low, high = np.quantile(force_N, (0.05, 0.95))
-    levels = {"mean level": force_N.mean(), "deviation": force_N.std(), "low level": low, "high level": high}
-    for level, value in levels.items():
-        found.add(level, name, "steady", LOW, number, math.nan if at_the_edge else float(value))
     still = len(slips.tops) == 0 and not at_the_edge
+    whole = force_N[slips.tops[0] : slips.tops[-1]] if len(slips.tops) > 2 else force_N
+    counted = still or (len(slips.tops) > 2 and not at_the_edge)
+    low, high = np.quantile(whole, (0.05, 0.95))
+    levels = {"mean level": whole.mean(), "deviation": whole.std(), "low level": low, "high level": high}
+    for level, value in levels.items():
+        found.add(level, name, "steady", LOW, number, float(value) if counted else math.nan)
     edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64)
     for bin_ in range(_LEVELS):
         value = float(force_N[edges[bin_] : edges[bin_ + 1]].mean()) if still else math.nan
         found.add(f"level {bin_}", name, "steady", LOW, number, value)
     short, long = uniform_filter1d(force_N, 5), uniform_filter1d(force_N, 100)
-    middle, high = (float(np.var(short - long)), float(np.var(force_N - short))) if still else (math.nan, math.nan)
+    middle, fast = (float(np.var(short - long)), float(np.var(force_N - short))) if still else (math.nan, math.nan)
     found.add("ripple", name, "steady", MIDDLE, number, middle)
-    found.add("ripple", name, "steady", HIGH, number, high)
+    found.add("ripple", name, "steady", HIGH, number, fast)
 
 
 def _regime(at: float) -> str:
@@ -213,18 +231,18 @@ def _shapes(found: Features, number: int, cut: Signals, slips: _Slips, scales: S
     if not names:
         return
     blocks = len(cut[names[0]])
-    inside = (slips.middles + SHAPE_AT[0] * width >= 0) & (slips.middles + SHAPE_AT[-1] * width <= blocks - 1)
+    inside = slips.weights > 0.0
     at = slips.middles[inside, None] + SHAPE_AT * width
-    some = bool(inside.any())
+    weights = slips.weights[inside] / max(float(slips.weights.sum()), 1e-9)
     for name in names:
         signal = cut[name]
         shape = np.full(len(SHAPE_AT), np.nan)
         ring = math.nan
-        if some:
-            shape = np.interp(at.ravel(), np.arange(blocks), signal).reshape(at.shape).mean(axis=0)
+        if slips.some:
+            shape = weights @ np.interp(at.ravel(), np.arange(blocks), signal).reshape(at.shape)
             fast = signal - uniform_filter1d(signal, 5)
             near = (slips.middles[inside, None] + np.arange(int(3.0 * width))).astype(np.int64)
-            power = float(np.mean(fast[np.minimum(near, blocks - 1)] ** 2))
+            power = float(weights @ np.mean(fast[np.minimum(near, blocks - 1)] ** 2, axis=1))
             ring = math.nan if shaken and name.endswith("accel_mps2") else power
         if name == "drive_force_N":
             shape = shape - shape.mean()
@@ -295,7 +313,7 @@ def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
     for segment in commands.segments:
         rows = slice(segment.first, segment.last)
         rest_m[rows] = _without_line(position_m[rows], segment)
-    waves = dct(rest_m)[1 : _DRIVE_WAVES + 1] / len(rest_m)
+    waves = np.asarray(dct(rest_m))[1 : _DRIVE_WAVES + 1] / len(rest_m)
     for wave, value in enumerate(waves.tolist(), start=1):
         found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
     fast = rest_m - uniform_filter1d(rest_m, 100)

@@ -4,6 +4,8 @@ It names nothing; it says how far the gap could be closed by something as free a
 against it.
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,7 +14,7 @@ from diagnosis.library import Trial
 from diagnosis.refit import Fit, Fitter
 from diagnosis.search import Directions
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _STEP = 0.5  # of a nuisance's tolerance
 
 

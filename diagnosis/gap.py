@@ -16,7 +16,7 @@ a few floors and a logarithm beyond: a drive that ripples by 500 floors of a las
 ripples by 50, and must not hide everything else.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ from diagnosis.features import POWERS, Feature
 from diagnosis.problem import Draw, Point, Problem
 from diagnosis.twin import Roughness
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 DEFINITION = (
     "root mean square, over cells of signal x regime x band x run, of the differences between measured and predicted "
     "features (cycle means and trends, slip shapes, levels, vibration, parity relations), each in units of the scatter of "
@@ -87,6 +87,8 @@ def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
     bias = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
     about = np.where(finite, _logarithms(drawn, powers) - _logarithms(mean, powers), 0.0)
     spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
+    # under vibration the phase at which a slip begins decides how it goes: the prediction is one draw, as the rig is
+    spread *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
     least = np.array([_least(label, problem) for _, label in labels])
     scatter = np.hypot(spread, least)
     z = compress(about[:, compared] / scatter[compared])
@@ -104,6 +106,16 @@ def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
 def _logarithms(values: Floats, powers: npt.NDArray[np.bool_]) -> Floats:
     """Powers as half their logarithm, so that a difference is a relative one of amplitudes; the rest as it is."""
     return np.where(powers, 0.5 * np.log(np.maximum(values, _LEAST_POWER)), values)
+
+
+def _slips_under_vibration(problem: Problem) -> npt.NDArray[np.bool_]:
+    segments = {run.file: run.commands.segments for run in problem.runs}
+    return np.array(
+        [
+            label.segment >= 0 and label.regime != "steady" and segments[file][label.segment].frequency_Hz > 0.0
+            for file, label in problem.labels
+        ]
+    )
 
 
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
@@ -153,9 +165,9 @@ def _whitening(z: Floats, promised: Floats) -> Floats:
 
 def _least(label: Feature, problem: Problem) -> float:
     """The scatter that a feature has at least, in its own unit: the grid's resolution and what ordinary sensors promise."""
-    force_N, slip_s, _, stiffness = problem.scales
+    force_N, slip_s, _, stiffness, _ = problem.scales
     if problem.rig.drive == "force":
-        return _least_of_axis(label, force_N)
+        return _least_of_axis(label, force_N, problem.force_peak_N)
     drop_m = 0.3 * force_N / stiffness  # of a slip, for friction that falls by a sixth
     if label.name in {"scatter", "ripple", "rest"}:
         return 0.6  # small powers, which hum, slow noise and the roughness of one track reach
@@ -167,24 +179,26 @@ def _least(label: Feature, problem: Problem) -> float:
         return 0.006 if label.signal == "base_accel_mps2" else 0.04
     if label.name == "period":
         return 0.003
-    if label.name == "duration":
-        return 0.01 * slip_s
     if label.name.startswith("rate"):
         return 0.003 * force_N
     if label.signal == "drive_force_N":
         return 3e-4 * force_N
     if label.signal.endswith("accel_mps2"):
+        if label.name in {"shape -0.5", "shape 0.5"}:  # where a slip begins and ends the acceleration jumps
+            return 0.1 * drop_m * (np.pi / slip_s) ** 2
         return 4e-3 * drop_m * (np.pi / slip_s) ** 2
     if label.signal == "drive_position_m":
         return 2e-3 * drop_m
     return 1e-3 * drop_m
 
 
-def _least_of_axis(label: Feature, force_N: float) -> float:
+def _least_of_axis(label: Feature, force_N: float, peak_N: float) -> float:
     if label.name == "ripple":
         return 0.2
     if label.signal != "drive_force_N":
         return 0.002
     if label.regime == "breakaway" and label.name in {"mean", "over rest"}:
         return 0.02 * force_N  # how far the contact was loaded before the run is not known
-    return 2e-4 * force_N
+    if " over " in label.name:
+        return 2e-4 * force_N
+    return 5e-4 * peak_N  # the linearity of a good force channel

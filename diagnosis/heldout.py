@@ -3,7 +3,7 @@
 The held-out runs are a problem of their own: the fitter that knows the fitted runs never holds them, so nothing can leak.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from diagnosis.problem import Problem
 from diagnosis.refit import NOTHING, Fit, Form
 from diagnosis.twin import Roughness
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _REPLICATES = 24
 _DRAWS = 8  # of a fit's parameters
 _RESAMPLES = 400  # of the cells

@@ -1,5 +1,7 @@
 """How the mass and the spring of a reduced run move, from whatever channels it has; smooth derivatives on the 1 ms grid."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
@@ -10,7 +12,7 @@ from diagnosis.problem import Prepared, scales_of
 from diagnosis.reduced import BLOCK_S
 from diagnosis.sensing import low_pass
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _SMOOTH_SHARE = 0.14  # sigma, of a slip: 5 ms on the paper's spring, where a slip keeps 90 % of its acceleration
 _SMOOTH_FREE = 5.0  # blocks, where no spring gives a time scale
 _BRISK = 0.4  # of it, for a first derivative

@@ -4,7 +4,7 @@ Scales come from the rig, so that a step of 1 in a coordinate is an effect that 
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from diagnosis.refit import Axis, Form
 from diagnosis.waves import Wave, drive_waves, friction_waves
 from plant.effects import EFFECTS
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
 _AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 
@@ -65,7 +65,7 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         over = "position" if form == "screw" else "time"
         waves = drive_waves(runs, over, _WAVES) or friction_waves(runs, problem.scales, over, _WAVES)
     if "phase_rad" in scale:
-        return [_wave_trial(name, form, scale, wave) for wave in waves]
+        return [_wave_trial(name, form, wave) for wave in waves]
     starts: list[dict[str, float]] = [{}]
     if name == "frame-compliance":
         starts = [{"frequency_Hz": f} for f in (40.0, 90.0, 200.0)]
@@ -88,7 +88,7 @@ def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, floa
     return Trial(Form({name: form}, tuple(axes)), w)
 
 
-def _wave_trial(name: str, form: str, scale: dict[str, _Scale], wave: Wave) -> Trial:
+def _wave_trial(name: str, form: str, wave: Wave) -> Trial:
     axes: list[Axis] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name == "phase_rad":

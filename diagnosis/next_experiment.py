@@ -5,7 +5,7 @@ imitate the other by moving what the present runs leave uncertain: its rig numbe
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ from diagnosis.twin import Roughness
 from diagnosis.wording import signal_name
 from plant.effects import EFFECTS
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _ROUGHNESS = Roughness(0.003, 1.5e-4, 0)
 _FEW, _SOME = 2, 6  # replicates for a first look, and for a judgement
 _DECISIVE = 10.0  # standard deviations: more is not more certain, only longer

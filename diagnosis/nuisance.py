@@ -4,6 +4,8 @@ All of it is refitted before any effect is judged. An incomplete set makes every
 would have taken up, each effect takes up in its own way.
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,7 +14,7 @@ from diagnosis.problem import Point
 from diagnosis.sensing import Chain
 from diagnosis.twin import Effects
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 # Mean and standard deviation of what no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz displacement by 200 us,
 # an open one by nothing; displacement sensors are linear to 0.2 % of their range, up to 0.8 % in slope; accelerometers of the
 # bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.

@@ -5,7 +5,7 @@ Every residual is given in units of its noise: the measured noise of the channel
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ from diagnosis.manifest import RigTable
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 # What an ordinary chain does to a relation, as a share of the signal's rms: displacement sensors are straight to 0.2 to 0.4 %
 # in slope, a force channel lags by 40 us (0.35 % of a slip on the paper's spring), a displacement by up to 200 us (1.8 %), and
 # an accelerometer that begins at 0.5 Hz loses 1 % of a slip.

@@ -1,6 +1,6 @@
 """Runs of one evidence made ready for comparison: measured features, and predicted ones for any parameters and effects."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +19,11 @@ from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed
 from diagnosis.twin import Effects, Roughness, Start, predict, rig_config
 from plant.effects import EFFECTS
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
+_SCALE_SPREAD = (
+    0.002  # of the position channels from one piece of track to another: a linearity of 0.2 % over the range
+)
 _SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
 
 
@@ -58,11 +61,12 @@ class Problem:
         self.rig = rig
         self.runs = runs
         self.scales = scales_of(rig)
+        self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals] = {}
         self._measured = [self._features(run, run.signals) for run in runs]
         self.measured = np.concatenate([np.array(found.values) for found in self._measured])
 
-    def __getstate__(self) -> dict[str, object]:
+    def __getstate__(self) -> dict[str, Any]:
         """For another process: without what was simulated here."""
         return self.__dict__ | {"_simulated": {}}
 
@@ -88,15 +92,16 @@ class Problem:
         moving = {name: table for name, table in point.effects.items() if name not in SENSOR_EFFECTS}
         if not run.commands.frequency_Hz.any():
             moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
-        start = run.start
+        start, chain = run.start, point.chain
         roughness = None
         if draw is not None:
             start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
+            chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
             roughness = draw.roughness
         if self.rig.drive == "force":
             return self._led(run, point, moving, start, draw)
         raw = self._raw(run, run.commands, point.values, moving, start, roughness, None)
-        result = sensed(raw, run.commands.frequency_Hz, point.effects, point.chain, run.start.t_s)
+        result = sensed(raw, run.commands.frequency_Hz, point.effects, chain, run.start.t_s)
         result = {name: result[name] for name in run.signals}
         for name in result:
             if name.endswith("shake_mps2"):
@@ -167,7 +172,8 @@ def scales_of(rig: RigTable) -> Scales:
     """The scales of a rig with a spring drive; with a force drive only the force means something."""
     stiffness = rig.drive_stiffness_N_per_m or 1.0
     slip_s = float(np.pi * np.sqrt(rig.mass_kg / stiffness))
-    return Scales(rig.static_force_N, slip_s, _SMALLEST_DROP * rig.static_force_N, stiffness)
+    fall_N = 2.0 * max(rig.static_force_N - rig.coulomb_force_N, 0.02 * rig.static_force_N)
+    return Scales(rig.static_force_N, slip_s, _SMALLEST_DROP * rig.static_force_N, stiffness, fall_N)
 
 
 def prepare(evidence: Evidence) -> list[Prepared]:
@@ -185,13 +191,18 @@ def _prepare(rig: RigTable, run: Run) -> Prepared:
     if rig.drive == "spring":
         scales = scales_of(rig)
         commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
-    noise = noise_of(signals, commands, scales_of(rig))
+    start = _start(rig, signals, commands, start_s)
+    noisy = signals
+    if commands.motion is not None and "mass_position_m" in signals:
+        led = predict(rig_config(rig, {}, {}, None), True, commands, start)
+        noisy = signals | {"mass_position_m": signals["mass_position_m"] - led["mass_position_m"]}
+    noise = noise_of(noisy, commands, scales_of(rig))
     clipped = {
         name: (float(run.columns[name].min()), float(run.columns[name].max()))
         for name in run.clipped
         if name in signals
     }
-    return Prepared(run.file, run.holdout, signals, commands, _start(rig, signals, commands, start_s), noise, clipped)
+    return Prepared(run.file, run.holdout, signals, commands, start, noise, clipped)
 
 
 def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) -> Start:

@@ -4,12 +4,14 @@ Measured and predicted runs are reduced alike, so what the reduction loses it lo
 on the paper's spring) and averages 20 samples of noise; vibration is too fast for it and is kept as an rms.
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from diagnosis.evidence import Run
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 BLOCK_S = 1e-3
 MEANS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
 SHAKES = ("mass_shake_mps2", "base_shake_mps2")  # rms within a block, about the block's mean

@@ -5,7 +5,7 @@ own columns at every step, since effects are as nonlinear as a gap that opens or
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from diagnosis.problem import Problem
 from diagnosis.twin import Effects
 from plant.effects import EFFECTS
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _NARROW = 0.1  # prior of a coordinate that is known so well that a common step would leave its line
 _STEP = 0.5  # of a tolerance: large against the grid, small against the curvature
 _MOST_TOLERANCES = 5.0

@@ -49,6 +49,8 @@ USUALLY_OVER: Final = {
 
 
 class Axis(NamedTuple):
+    """A label with its unit, and the factor from SI to that unit."""
+
     label: str
     scale: float
 

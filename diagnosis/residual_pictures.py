@@ -1,6 +1,6 @@
 """Residuals drawn over the variable that explains them: which one, follows from the effect that was named."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from diagnosis.problem import Prepared
 from diagnosis.residual_axes import BREAKAWAY, SHOWN_BY, SHOWN_TWICE, TITLES, USUALLY_OVER, Over, X, Y
 from diagnosis.result import Curve, Picture
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _CLOUD = 900
 _BINS = 50
 _BINS_OF_A_TRACK = 160  # of 15 mm, say: a ripple of 1 mm still shows

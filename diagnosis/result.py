@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from diagnosis.findings import Finding
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 FORMAT = "diagnosis/1"
 
 

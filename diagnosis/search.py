@@ -8,7 +8,7 @@ away, into a valley of its own. What survives is refitted, and only the refit co
 import math
 from collections.abc import Callable
 from itertools import chain
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 from diagnosis.library import Trial
 from diagnosis.refit import QUICK, Fit, Fitter, Form
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 R = TypeVar("R")
 _QUICK = 6  # trials of either screening that get two steps of a refit

@@ -4,7 +4,7 @@ The plant's kernel has the same effects, sample by sample; here they act on the 
 sensor costs no simulation. A slip lasts tens of blocks, so the grid resolves a lag far below 1 ms.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from diagnosis.reduced import BLOCK_S
 from diagnosis.twin import Effects
 from plant.effects import EFFECTS
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 Signals = dict[str, Floats]
 SENSOR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "sensor")
 

@@ -25,8 +25,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             f"{name} explains it (probability {percent(candidate.probability)}): {EFFECT_WORDS[name]}"
             + (f"; {numbers}." if numbers else ".")
         )
-    for group in diagnosis.not_distinguishable:
-        sentences.append(f"These runs cannot tell apart: {', '.join(group)}.")
+    sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
     if gap.runs and math.isfinite(gap.retuned):
         kept = ", ".join(gap.runs)
         if gap.shrinkage is not None:
@@ -38,7 +37,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             )
         else:
             sentences.append(
-                f"On {kept}, kept aside, {times(gap.retuned)} noise floors are left after refitting the rig's numbers; 1 is perfect."
+                f"On {kept}, kept aside, {times(gap.retuned)} noise floors are left after refitting the rig's numbers "
+                "(1 is perfect)."
             )
     else:
         sentences.append("No run was kept aside: how far the gap closes on new data is not known.")

@@ -19,7 +19,7 @@ from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
 from plant.records import CHANNELS, TRUTH, build
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 Effects = dict[str, dict[str, float | str]]
 _COARSEST_STEP_S = 7e-5
 _STEPS_PER_PERIOD = 20

@@ -8,7 +8,7 @@ close a fair share of the gap: it wins where the library closes less.
 """
 
 import math
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from diagnosis.refit import Fit
 from plant.effects import EFFECTS
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 # chi2 of a perfect model per compared feature: the replicates' correlation and the least floors keep it below 1. No-gap
 # evidence of the plant had 0.45 to 0.75.
 _PERFECT = 0.6

@@ -4,7 +4,7 @@ Only starting points for a refit come from here, never a verdict.
 """
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from diagnosis.features import Scales
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating[Any]]
 _GRID = 400
 _LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
 _LOBE = 3  # grid points within which peaks are one
@@ -50,7 +50,7 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -
         else:
             coordinate = run.start.t_s + (blocks + 0.5) * BLOCK_S
         for segment in run.commands.segments:
-            own = slice(max(segment.first, segment.settled), segment.last)
+            own = slice(segment.first, segment.last)
             cut = segment.sign * force[own]
             tops, bottoms = turning_points(cut, scales.drop_N)
             if len(bottoms) >= 2:

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from diagnosis.evidence import load_evidence
-from diagnosis.gap import Floor, differences, floor_of, gap, replicates
+from diagnosis.gap import KNEE, Floor, differences, floor_of, gap, replicates
+from diagnosis.library import trials
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
-from diagnosis.refit import Axis, Fitter, Form
+from diagnosis.refit import FAR_KNEE, Fitter
+from diagnosis.search import refitted
 from diagnosis.twin import Roughness
 
 EMPS = Path(__file__).parents[3] / "shared" / "data" / "emps"
@@ -46,10 +48,6 @@ holdout = true
 """
 
 
-def bias_form() -> Form:
-    return Form({"force-sensor-bias": ""}, (Axis("force-sensor-bias", "bias_N", 1.0, False, 10.0, -20.0, 20.0),))
-
-
 @pytest.mark.skipif(not EMPS.is_dir(), reason=f"needs the EMPS data set in {EMPS}")
 def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> None:
     for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"):
@@ -66,13 +64,13 @@ def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> Non
 
     fitter, judge = Fitter(fitted, floor(fitted), nuisances), floor(held_out)
     retuned = fitter.retuned(np.zeros(len(nuisances)))
-    form = bias_form()
-    # from the described rig: a retuned one has bent its friction to hide the offset
-    with_bias = fitter.refit(form, np.zeros(len(nuisances)), np.array([-3.0]))
+    described = fitter.described(np.zeros(len(nuisances)))
+    offsets = [trial for trial in trials(fitted) if "force-sensor-bias" in trial.form.forms]
+    with_bias = refitted(fitter, [(retuned, KNEE), (described, FAR_KNEE)], offsets)[0]
     gaps = [
         gap(judge, differences(judge, held_out, held_out.predicted(nuisances.point(fit.deviations, fit.effects))))
         for fit in (retuned, with_bias)
     ]
     assert with_bias.chi2 < retuned.chi2
     assert gaps[1] < gaps[0]
-    assert -6.0 < form.axes[0].value(float(with_bias.w[0])) < -2.0  # published: -3.16 N
+    assert -6.0 < float(with_bias.effects["force-sensor-bias"]["bias_N"]) < -2.0  # published: -3.16 N
