@@ -21,9 +21,8 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
-_SCALE_SPREAD = (
-    0.002  # of the position channels from one piece of track to another: a linearity of 0.2 % over the range
-)
+# of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
+_SCALE_SPREAD = 0.004
 _SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
 
 

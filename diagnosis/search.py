@@ -20,7 +20,7 @@ from diagnosis.refit import QUICK, Fit, Fitter, Form
 Floats = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 R = TypeVar("R")
-_QUICK = 6  # trials of either screening that get two steps of a refit
+_QUICK = 8  # trials of either screening that get two steps of a refit
 _FULL = 3  # effects that are refitted to the end,
 _WORTH_FULL = 0.2  # of the best one's gain, or they are too far behind to matter
 _FURTHEST = 8.0  # times the starting size that a screening may go

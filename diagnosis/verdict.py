@@ -18,12 +18,14 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 # chi2 of a perfect model per compared feature: the replicates' correlation and the least floors keep it below 1. No-gap
-# evidence of the plant had 0.45 to 0.75.
-_PERFECT = 0.6
+# evidence of the plant had 0.25 to 0.6.
+_PERFECT = 0.4
 _CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise
-_COST_OF_EFFECT = 14.0
+_COST_OF_EFFECT = 12.0
+# Refits end in valleys that differ by this much of chi2: slips come and go as parameters move. Priors do not.
+_JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves
 _TEMPERATURE = 3.0
@@ -78,7 +80,9 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
     scale = misfit(base, [*singles, *pairs])
 
     def model(fit: Fit) -> Model:
-        return Model(fit, 0.5 * (base.chi2 - fit.chi2) / scale - occam(fit))
+        closer = _square(base.residual) - _square(fit.residual)
+        likelier = (base.chi2 - fit.chi2) - closer
+        return Model(fit, 0.5 * closer / (scale * _JITTER) + 0.5 * likelier - occam(fit))
 
     ranked = sorted((model(fit) for fit in singles), key=lambda one: -one.evidence)
     double = max((model(fit) for fit in pairs), key=lambda one: one.evidence, default=None)
@@ -111,6 +115,10 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
         return Verdict("unexplained", None, probabilities, (), best.fit)
     groups = () if double is not None else _groups(ranked)
     return Verdict("effect", best.fit, probabilities, groups, runner_up)
+
+
+def _square(values: Floats) -> float:
+    return float(values @ values)
 
 
 def _groups(ranked: list[Model]) -> tuple[tuple[str, ...], ...]:
