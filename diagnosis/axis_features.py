@@ -148,7 +148,8 @@ def _waves(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray
         bins = waves * _BINS_PER_WAVE
         at = np.minimum((over * bins).astype(np.int64), bins - 1)
         profile = _profile(values[sliding], at[sliding], bins)
-        for wave, value in enumerate((dct(profile)[1 : waves + 1] / bins).tolist(), start=1):
+        weights = np.asarray(dct(profile))[1 : waves + 1] / bins
+        for wave, value in enumerate(weights.tolist(), start=1):
             found.add(f"{name} {wave}", "drive_force_N", "steady", LOW, -1, value)
 
 

@@ -34,8 +34,8 @@ def motion_of(signals: dict[str, Floats], samples_per_block: float, mass_kg: flo
     elif samples_per_block >= 2.0:  # a mean belongs to the middle of its block
         at = np.arange(len(position), dtype=np.float64)
         position = np.interp(at - 0.5, at, position)
-    velocity = savgol_filter(position, _WINDOW, 3, deriv=1, delta=BLOCK_S)
-    accel = savgol_filter(position, _WINDOW, 3, deriv=2, delta=BLOCK_S)
+    velocity = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=1, delta=BLOCK_S), np.float64)
+    accel = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=2, delta=BLOCK_S), np.float64)
     return Motion(position, velocity, accel, mass_kg * accel)
 
 

@@ -99,7 +99,9 @@ def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
     )
     # the least scatter is as much a part of the floor as the drawn one: what of it the replicates do not show is added
     promised = (least[compared] / scatter[compared]) ** 2
-    level = np.sqrt(np.mean([_cell_means(row * row + promised, cells).mean() for row in z]))
+    # a run of its own differs from the mean of so many others by a little more than they do among themselves
+    others = (len(drawn) + 1.0) / (len(drawn) - 1.0)
+    level = np.sqrt(others * np.mean([_cell_means(row * row, cells).mean() for row in z]))
     return Floor(bias, powers, scatter, compared, _whitening(z, promised), cells, float(level))
 
 

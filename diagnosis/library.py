@@ -143,7 +143,7 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
             "damping_ratio": _Scale(0.05, True, 0.7),
         },
         ("base-compliance", ""): {
-            "compliance_m_per_N": _Scale(0.01 / stiffness, True, 1.5),
+            "compliance_m_per_N": _Scale(1e-3 / stiffness, True, 2.0),
             "frequency_Hz": _Scale(150.0, True, 0.5),
             "damping_ratio": _Scale(0.05, True, 0.7),
         },

@@ -1,0 +1,80 @@
+"""The gap: 1 for two runs of one plant on two rough surfaces, and larger for every effect the larger the effect is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis.evidence import load_evidence
+from diagnosis.gap import Floor, differences, floor_of, gap, replicates
+from diagnosis.making import Case, make_evidence
+from diagnosis.nuisance import Nuisances
+from diagnosis.problem import Problem, prepare
+from diagnosis.twin import Effects, Roughness
+from plant.effects import EFFECTS
+from tests.campaign.sizes import EFFECT_SIZES, Sizes
+
+SURFACE = Roughness(0.003, 1.5e-4, 0)
+
+
+class Bench:
+    """The paper's rig in the protocol "ladder", every number as described."""
+
+    def __init__(self, folder: Path) -> None:
+        make_evidence(folder, Case(drawn=False), seed=11)
+        evidence = load_evidence(folder)
+        self.problem = Problem(evidence.rig, prepare(evidence))
+        self.nuisances = Nuisances(evidence.rig)
+        self.described = np.zeros(len(self.nuisances))
+        self.floor: Floor = floor_of(self.problem, self.point({}), self.runs(16, 1))
+
+    def point(self, effects: Effects):
+        return self.nuisances.point(self.described, effects)
+
+    def runs(self, count: int, seed: int):
+        return replicates(self.problem, self.point({}), SURFACE, count, seed)
+
+    def gap_to(self, predicted) -> float:
+        return gap(self.floor, differences(self.floor, self.problem, predicted))
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory) -> Bench:
+    return Bench(tmp_path_factory.mktemp("evidence"))
+
+
+def test_two_rough_surfaces_are_one_floor_apart(bench):
+    """Runs that the floor was not made from, each as the measured one against the noise-free model."""
+    measured = bench.problem.measured
+    gaps = []
+    for run in bench.runs(8, 2):
+        bench.problem.measured = run
+        gaps.append(bench.gap_to(bench.problem.predicted(bench.point({}))))
+    bench.problem.measured = measured
+    assert np.median(gaps) == pytest.approx(1.0, abs=0.15)
+    assert max(gaps) < 1.6
+
+
+def numbers_of(name: str, sizes: Sizes, size: float) -> dict[str, float | str]:
+    table: dict[str, float | str] = {"form": sizes.form, sizes.parameter: sizes.signs[-1] * size}
+    for key, (low, high) in {**sizes.log, **sizes.even}.items():
+        table[key] = (low * high) ** 0.5 if low > 0.0 else 0.5 * (low + high)
+    for parameter in EFFECTS[name].forms[sizes.form].parameters:
+        table.setdefault(parameter.name, parameter.default)
+    return table
+
+
+@pytest.mark.parametrize("name", list(EFFECTS))
+def test_the_gap_rises_with_the_size_of_every_effect(bench, name):
+    measured = bench.problem.measured
+    sizes = EFFECT_SIZES[name][0]
+    plain = bench.problem.predicted(bench.point({}))
+    gaps = [bench.floor.level * 0.0]
+    for size in np.geomspace(sizes.barely, sizes.large, 4):
+        effects: Effects = {name: numbers_of(name, sizes, float(size))}
+        # the noise and the roughness that the floor expects are added to the rig with the effect as well
+        bench.problem.measured = bench.problem.predicted(bench.point(effects)) + bench.floor.bias
+        gaps.append(bench.gap_to(plain))
+    bench.problem.measured = measured
+    assert all(later > earlier for earlier, later in zip(gaps[:-1], gaps[1:], strict=True)), gaps
+    assert gaps[-1] > 0.5
