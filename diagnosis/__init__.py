@@ -1,7 +1,52 @@
-"""What a record says, whoever made it: the way to where the gap between rig and model lies.
+"""What a record says, whoever made it: from an evidence folder to where the gap between rig and model lies, and why.
 
-cycles                                          slips, breakaways and re-sticks of a force record
-evidence, manifest, evidence_checks             the evidence folder: loaded strictly, its faults reported
-importing, manifest_text, log_evidence          foreign files, and run logs, made into evidence
-logcheck, topic_watch, signal_checks, findings  what is wrong with a log
+Evidence in
+    manifest, manifest_text     what `manifest.toml` may say; the same as text
+    evidence, evidence_checks   a folder read strictly; which samples and columns can be used
+    log_evidence, importing     run logs, and files of other programs, as evidence
+    findings                    one thing that is wrong, and where
+Comparison
+    reduced                     a run on the 1 ms grid
+    commands                    what the rig was told, and the segments in which that does not change
+    axis_motion                 the measured motion along which a force-driven model is led
+    twin                        one run predicted by the plant's kernel under the run's own commands
+    sensing                     what sensors make of a prediction: faults, and ordinary lags
+    axis_drive                  a force-driven axis: the true input, freed of what its sensor did to it
+    noise                       the noise of a run, taken from the run
+    cycles                      slips, breakaways and re-sticks of a force record
+    features, axis_features     a run in numbers that do not depend on when it slips; the same for a force-driven axis
+    problem                     the runs of an evidence, ready: measured features, and predicted ones at any point
+    gap                         the gap, its floor and its definition
+Fit
+    nuisance                    what may differ without being a gap, in units of its tolerance
+    library                     every effect in every formula, with coordinates and starts
+    waves, axis_waves           periods at which a wave may be looked for
+    refit                       Gauss-Newton over nuisances and the parameters of an effect
+    search                      from all trials to the few that are refitted in full
+Verdict
+    diagnose                    the whole way, in order
+    verdict                     is there a gap, which effect closes it, how sure that is
+    imitation                   which effects these runs cannot tell apart
+    heldout                     how far the gap closes on runs that no fit has seen
+    flexible                    what a blend of all effects would close, to compare with
+    experiments, advice         runs that could be measured next; checks by hand
+    next_experiment             which of them separates the leading explanations
+    many                        many folders: on the cores of a machine, or on a Dask cluster
+Output
+    result                      the answer and its JSON
+    wording, summary            numbers and effects in words; the answer in sentences
+    report, report_plots        one HTML file (template: report.html.j2); its pictures as PNG
+    pictures, cycle_pictures    which pictures; cycles laid over their predictions
+    residual_pictures           residuals over what explains them,
+    residual_axes               and which residual over which variable
+    parity, kinematics          relations between channels that need no simulation; the motion and derivatives they need
+    breakaways                  breakaways, and what each could depend on
+    apply                       a rig file with the named effects
+Evidence made from the plant
+    making                      a described rig, and a drawn one that is measured
+    made_runs, made_sensors     one run of it; what its measuring chain adds
+    protocols                   which runs are measured, by name
+Run logs
+    logcheck, topic_watch       what is wrong with a log: all of it; the numbers and times of one topic
+    signal_checks               range, clipping and dead stretches of one signal, for logs and evidence
 """

@@ -45,7 +45,9 @@ def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Featur
     _breakaways(found, rest_N, motion, rig.stribeck_velocity_mps)
     inner = slice(_first(motion, rig), len(rest_N) - _EDGE)
     cut = Motion(*(values[inner] for values in motion))
-    rest_N = _without_curve(found, rest_N[inner], cut, rig.stribeck_velocity_mps)
+    # a velocity out of an acceleration is off by some mm/s: it does not tell when the axis turns
+    slowest = 0 if "mass_position_m" in signals else len(_SLOW)
+    rest_N = _without_curve(found, rest_N[inner], cut, rig.stribeck_velocity_mps, slowest)
     # near a turn of the motion every error of the bristle would pass for a wave
     sliding = np.abs(cut.velocity_mps) > _SLOW[-2] * rig.stribeck_velocity_mps
     rest_N = _without_inertia(found, np.where(sliding, rest_N, 0.0), cut, sliding)
@@ -97,8 +99,8 @@ def _profile(values: Floats, bins: Indices, count: int) -> Floats:
     return sums / np.maximum(held, max(float(np.median(held)), 1.0))
 
 
-def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float) -> Floats:
-    """Features of the force over velocity, and what they leave."""
+def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float, slowest: int) -> Floats:
+    """Features of the force over velocity, from the ring `slowest` on, and what they leave."""
     speed = np.abs(motion.velocity_mps) / stribeck_mps
     fastest = max(float(speed.max()), 1.01 * float(_SLOW[-1]))
     edges = np.concatenate([_SLOW, np.linspace(_SLOW[-1], fastest, _FAST + 1)[1:-1]])
@@ -117,7 +119,8 @@ def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps
             for fork in (0, 1) if 0 < number <= slow else (0,):
                 regime = "stick" if number == 0 else "steady" if number > slow else "breakaway" if fork else "restick"
                 name = f"friction {sign}{number}{'ab'[fork]}"
-                found.add(name, "drive_force_N", regime, LOW, -1, float(means[number * 4 + side + fork]))
+                mean_N = float(means[number * 4 + side + fork]) if number >= slowest else math.nan
+                found.add(name, "drive_force_N", regime, LOW, -1, mean_N)
     return rest_N - np.nan_to_num(means)[bins]
 
 

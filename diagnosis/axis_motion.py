@@ -9,12 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import minimize
 from scipy.signal import savgol_filter
 
+from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S
 
 Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 31  # blocks, of a cubic: 0.2 um of encoder noise are 4e-6 m/s and 1e-3 m/s^2
+_EVERY = 5  # blocks, where a line through the whole run is sought
 
 
 class Motion(NamedTuple):
@@ -26,21 +29,38 @@ class Motion(NamedTuple):
     inertia_N: Floats  # force that accelerates the mass as described
 
 
-def motion_of(signals: dict[str, Floats], samples_per_block: float, mass_kg: float) -> Motion:
+def motion_of(signals: dict[str, Floats], samples_per_block: float, rig: RigTable) -> Motion:
     """The motion of a reduced run, from its position, or from its acceleration where there is none."""
     position = signals.get("mass_position_m")
     if position is None:
-        position = _integrated(_integrated(signals["mass_accel_mps2"]))
+        position = _from_acceleration(signals["mass_accel_mps2"], signals["drive_force_N"], rig)
     elif samples_per_block >= 2.0:  # a mean belongs to the middle of its block
         at = np.arange(len(position), dtype=np.float64)
         position = np.interp(at - 0.5, at, position)
     velocity = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=1, delta=BLOCK_S), np.float64)
     accel = np.asarray(savgol_filter(position, _WINDOW, 3, deriv=2, delta=BLOCK_S), np.float64)
-    return Motion(position, velocity, accel, mass_kg * accel)
+    return Motion(position, velocity, accel, rig.mass_kg * accel)
 
 
-def _integrated(values: Floats) -> Floats:
-    """Integral without its line: an accelerometer knows neither its zero nor where it is."""
-    sums = np.cumsum(values) * BLOCK_S
-    at = np.arange(len(sums), dtype=np.float64)
-    return sums - np.polyval(np.polyfit(at, sums, 1), at)
+def _from_acceleration(accel_mps2: Floats, force_N: Floats, rig: RigTable) -> Floats:
+    """Position from an acceleration with an unknown zero and an unknown speed at the start.
+
+    These two are where the described friction leaves least of the force. A line taken out of the velocity would do for a long
+    record; of three strokes it takes a fifth of the motion along.
+    """
+    gone_mps = np.cumsum(accel_mps2) * BLOCK_S
+    time = np.arange(len(gone_mps)) / len(gone_mps)
+    some = slice(None, None, _EVERY)
+    left_N = (force_N - rig.mass_kg * (accel_mps2 - accel_mps2.mean()))[some]
+
+    def rest(line: Floats) -> float:
+        v = gone_mps[some] - line[0] - line[1] * time[some]
+        friction_N = rig.coulomb_force_N * np.tanh(v / rig.stribeck_velocity_mps) + rig.viscous_damping_Ns_per_m * v
+        return float(np.var(left_N - friction_N))
+
+    slope, start = np.polyfit(time, gone_mps, 1)
+    size = max(float(np.std(gone_mps - start - slope * time)), rig.stribeck_velocity_mps)
+    corners = np.array([[start, slope], [start + size, slope], [start, slope + size]])
+    found = minimize(rest, corners[0], method="Nelder-Mead", options={"initial_simplex": corners})
+    line = np.asarray(found.x)
+    return np.cumsum(gone_mps - line[0] - line[1] * time) * BLOCK_S

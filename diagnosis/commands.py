@@ -66,7 +66,7 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
         amplitude_m = np.where(frequency_Hz > 0.0, amplitude_m, 0.0)
     if rig.drive == "force":
         drive = reduced["drive_force_N"]
-        motion = motion_of(reduced, len(run.t_s) / blocks, rig.mass_kg)
+        motion = motion_of(reduced, len(run.t_s) / blocks, rig)
         return Commands(drive, frequency_Hz, amplitude_m, (Segment(0, blocks, 0.0, 0.0, 0.0),), motion)
     if run.drive_velocity_mps is not None:
         drive = np.full(blocks, run.drive_velocity_mps)

@@ -22,6 +22,7 @@ from diagnosis.gap import (
     replicates,
 )
 from diagnosis.heldout import Closed, HeldOut
+from diagnosis.imitation import imitators
 from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
 from diagnosis.nuisance import Nuisances
@@ -155,13 +156,15 @@ def _assembled(
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
     effects = best.form.effects if verdict.named else ()
+    alone = verdict.named is not None and len(effects) == 1
+    alike = imitators(fitter, list(verdict.ranked), verdict.scale) if alone else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
     done = Diagnosis(
         verdict=verdict.kind,
         effects=effects,
         summary=(),
         candidates=candidates,
-        not_distinguishable=verdict.groups,
+        not_distinguishable=(alike,) if alike else (),
         where=tuple(where),
         gap=judged,
         next_experiment=next_experiment(fitter.problem, nuisances, leaders),

@@ -162,7 +162,7 @@ def _judged(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, seco
     for fit in (first, second):
         covariance = fit.covariance()
         uncertain = np.flatnonzero(np.sqrt(np.diag(covariance)) > _CERTAIN)
-        root = np.linalg.cholesky(covariance[np.ix_(uncertain, uncertain)])
+        root = np.linalg.cholesky(covariance[uncertain[:, None], uncertain])
         free.append(whitening @ (imagined.columns(fit, uncertain) * slope[:, None]) @ root)
     imitated = np.column_stack(free)
     inner = np.eye(imitated.shape[1]) + imitated.T @ imitated

@@ -51,7 +51,7 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
     # a slip stands far above the noise; keep three half periods away from it
     busy = speed > 6.0 * np.median(speed)
     reach = max(int(3.0 * scales.slip_s * 1e3), _WINDOW)
-    quiet = ~maximum_filter1d(busy, 2 * reach + 1)
+    quiet = np.logical_not(np.asarray(maximum_filter1d(busy, 2 * reach + 1)))
     if quiet.sum() < 500:
         quiet = speed <= np.quantile(speed, 0.3)
     pieces: dict[str, Floats] = {}

@@ -106,7 +106,8 @@ class Problem:
             if name.endswith("shake_mps2"):
                 result[name] = np.hypot(result[name], run.noise.shake_mps2[name])
         if draw is not None:
-            result = {name: values + run.noise.drawn(name, len(values), draw.random) for name, values in result.items()}
+            for name, values in result.items():
+                result[name] = values + run.noise.drawn(name, len(values), draw.random)
         for name, (low, high) in run.clipped.items():
             result[name] = np.clip(result[name], low, high)
         return result

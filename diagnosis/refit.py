@@ -123,6 +123,12 @@ class Fitter:
         self._most = np.where(np.arange(len(nuisances)) < own, _MOST_TOLERANCES, _MOST_OF_CHAIN)
         self._rates = np.zeros((int(floor.compared.sum()), len(nuisances)))
 
+    def for_problem(self, problem: Problem) -> "Fitter":
+        """The same floor and derivatives for other measured features of the same runs."""
+        other = Fitter(problem, self.floor, self.nuisances)
+        other._rates = self._rates
+        return other
+
     def predicted(self, deviations: Floats, effects: Effects) -> Floats:
         """Features of the model, free of noise [features]."""
         return self.problem.predicted(self.nuisances.point(deviations, effects))

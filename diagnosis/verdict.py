@@ -1,4 +1,4 @@
-"""From fits to a verdict: is there a gap, which effects close it, and which could not be told apart.
+"""From fits to a verdict: is there a gap, which effects close it, and how sure that is.
 
 Fits compete by the logarithm of their evidence, Laplace's approximation: half of how far chi2 falls, less what the freedom of
 their parameters costs. All of it is divided by the misfit that even the best model leaves, so that a model that is wrong
@@ -20,16 +20,16 @@ Floats = npt.NDArray[np.floating[Any]]
 # chi2 of a perfect model per compared feature: the replicates' correlation and the least floors keep it below 1. No-gap
 # evidence of the plant had 0.25 to 0.6.
 _PERFECT = 0.4
+_WORST_OF_NO_GAP = 0.8  # a gap that nothing explains must leave more than any of them did
 _CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise
-_COST_OF_EFFECT = 12.0
+COST_OF_EFFECT = 12.0
 # Refits end in valleys that differ by this much of chi2: slips come and go as parameters move. Priors do not.
-_JITTER = 1.5
+JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves
 _TEMPERATURE = 3.0
-_SAME = 6.0  # log evidence within which two effects cannot be told apart
 
 
 class Model(NamedTuple):
@@ -45,8 +45,9 @@ class Verdict(NamedTuple):
     kind: Literal["effect", "no-gap", "unexplained"]
     named: Fit | None
     probabilities: dict[str, float]  # of every effect, none and unexplained; they add up to 1
-    groups: tuple[tuple[str, ...], ...]
     runner_up: Fit | None
+    ranked: tuple[Model, ...]  # single effects by evidence, the best first
+    scale: float  # the misfit that all evidence is divided by
 
 
 def misfit(base: Fit, fits: list[Fit]) -> float:
@@ -72,7 +73,7 @@ def occam(fit: Fit) -> float:
 def second_pays(base: Fit, first: Fit) -> bool:
     """Whether enough is left by the best single effect to look for a second."""
     left = first.chi2 - perfect_chi2(base)
-    return left > 2.0 * (_COST_OF_EFFECT + _COST_OF_SECOND) and left > 0.1 * (base.chi2 - perfect_chi2(base))
+    return left > 2.0 * (COST_OF_EFFECT + _COST_OF_SECOND) and left > 0.1 * (base.chi2 - perfect_chi2(base))
 
 
 def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
@@ -82,7 +83,7 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
     def model(fit: Fit) -> Model:
         closer = _square(base.residual) - _square(fit.residual)
         likelier = (base.chi2 - fit.chi2) - closer
-        return Model(fit, 0.5 * closer / (scale * _JITTER) + 0.5 * likelier - occam(fit))
+        return Model(fit, 0.5 * closer / (scale * JITTER) + 0.5 * likelier - occam(fit))
 
     ranked = sorted((model(fit) for fit in singles), key=lambda one: -one.evidence)
     double = max((model(fit) for fit in pairs), key=lambda one: one.evidence, default=None)
@@ -93,9 +94,9 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
         if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES:
             double = None
     best = double or (ranked[0] if ranked else None)
-    reducible = max(base.chi2 - perfect_chi2(base), 0.0)
-    scores: dict[str, float] = {"none": _COST_OF_EFFECT}
-    scores["unexplained"] = 0.5 * _CLOSED_BY_UNKNOWN * reducible / scale - _COST_OF_UNKNOWN
+    beyond = max(base.chi2 - _WORST_OF_NO_GAP * len(base.residual), 0.0)
+    scores: dict[str, float] = {"none": COST_OF_EFFECT}
+    scores["unexplained"] = 0.5 * _CLOSED_BY_UNKNOWN * beyond / scale - _COST_OF_UNKNOWN
     for one in ranked:
         scores[one.fit.form.effects[0]] = one.evidence
     if double is not None:
@@ -106,24 +107,18 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
     probabilities = _softmax(scores)
     top = max(scores, key=lambda name: scores[name])
     if best is None or top == "none":
-        return Verdict("no-gap", None, probabilities, (), ranked[0].fit if ranked else None)
+        return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
     others = [
         one.fit for one in ranked if one.fit is not best.fit and one.fit.form.effects[0] not in best.fit.form.effects
     ]
     runner_up = others[0] if others else None
     if top == "unexplained":
-        return Verdict("unexplained", None, probabilities, (), best.fit)
-    groups = () if double is not None else _groups(ranked)
-    return Verdict("effect", best.fit, probabilities, groups, runner_up)
+        return Verdict("unexplained", None, probabilities, best.fit, tuple(ranked), scale)
+    return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
 
 
 def _square(values: Floats) -> float:
     return float(values @ values)
-
-
-def _groups(ranked: list[Model]) -> tuple[tuple[str, ...], ...]:
-    close = [one.fit.form.effects[0] for one in ranked if ranked[0].evidence - one.evidence < _SAME]
-    return (tuple(close),) if len(close) > 1 else ()
 
 
 def _softmax(scores: dict[str, float]) -> dict[str, float]:

@@ -92,7 +92,7 @@ def _strongest(series: list[_Series], most: int) -> list[Wave]:
     spacing = min(float(np.median(np.abs(np.diff(one.at)))) for one in series)
     if span <= 0.0 or spacing <= 0.0:
         return []
-    periods = np.geomspace(max(2.0 * spacing, span / 100.0), 2.0 * span, _GRID)
+    periods = np.geomspace(max(0.3 * spacing, span / 100.0), 2.0 * span, _GRID)
     found = [_fitted(series, float(period)) for period in periods]
     power = np.array([gain for gain, _ in found])
     # the best of every range of periods: short ones fit the few breakaways best whatever is there

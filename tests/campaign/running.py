@@ -1,7 +1,5 @@
 """A case from nothing to its result: made, diagnosed, its data removed. A case that has a result is not done again."""
 
-import importlib
-import importlib.util
 import json
 import shutil
 import time
@@ -12,10 +10,12 @@ from typing import Any
 
 import joblib
 
+from diagnosis.diagnose import diagnose as product
 from diagnosis.evidence import Evidence, load_evidence
 from diagnosis.making import make_evidence
 from diagnosis.result import Diagnosis, to_json
 from tests.campaign.cases import Planned
+from tests.campaign.detectability import of_evidence
 
 Diagnose = Callable[[Evidence], Diagnosis]
 EVIDENCE, CASE, RESULT, FAILED = "evidence", "case.json", "result.json", "failed.txt"
@@ -23,8 +23,7 @@ EVIDENCE, CASE, RESULT, FAILED = "evidence", "case.json", "result.json", "failed
 
 def diagnose(evidence: Evidence) -> Diagnosis:
     """The product's own, on one core."""
-    module: Any = importlib.import_module("diagnosis.diagnose")
-    return module.diagnose(evidence, progress=lambda *_: None, jobs=1)
+    return product(evidence, progress=lambda *_: None, jobs=1)
 
 
 def run(
@@ -47,9 +46,10 @@ def run_one(folder: Path, case: Planned, diagnose: Diagnose) -> tuple[str, str]:
     try:
         make_evidence(evidence_folder, case.case(), case.seed)
         begin_s = time.perf_counter()
-        found = diagnose(load_evidence(evidence_folder))
+        evidence = load_evidence(evidence_folder)
+        found = diagnose(evidence)
         wall_s = round(time.perf_counter() - begin_s, 2)
-        (folder / CASE).write_text(json.dumps(case.to_json() | _detectability(case), indent=1))
+        (folder / CASE).write_text(json.dumps(case.to_json() | _detectability(case, evidence), indent=1))
     except Exception:  # one case that fails must not stop a night of others
         (folder / FAILED).write_text(traceback.format_exc())
         return case.folder, f"FAILED, see {folder / FAILED}"
@@ -61,12 +61,10 @@ def run_one(folder: Path, case: Planned, diagnose: Diagnose) -> tuple[str, str]:
     return case.folder, f"{found.verdict} {', '.join(found.effects)} in {wall_s:.1f} s"
 
 
-def _detectability(case: Planned) -> dict[str, Any]:
-    """How far above its detection limit the case is, where the product can tell."""
-    if importlib.util.find_spec("diagnosis.detectability") is None:
-        return {}
-    module: Any = importlib.import_module("diagnosis.detectability")
-    return {"detectability": module.of_case(case.case(), case.seed)} if hasattr(module, "of_case") else {}
+def _detectability(case: Planned, evidence: Evidence) -> dict[str, Any]:
+    """How far above its detection limit the case is."""
+    effects = case.case().effects
+    return {"detectability": of_evidence(evidence, effects)} if effects else {}
 
 
 def read(folder: Path) -> list[dict[str, Any]]:

@@ -1,5 +1,6 @@
 """The gap: 1 for two runs of one plant on two rough surfaces, and larger for every effect the larger the effect is."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -69,12 +70,12 @@ def test_the_gap_rises_with_the_size_of_every_effect(bench, name):
     measured = bench.problem.measured
     sizes = EFFECT_SIZES[name][0]
     plain = bench.problem.predicted(bench.point({}))
-    gaps = [bench.floor.level * 0.0]
+    gaps = [0.0]
     for size in np.geomspace(sizes.barely, sizes.large, 4):
         effects: Effects = {name: numbers_of(name, sizes, float(size))}
         # the noise and the roughness that the floor expects are added to the rig with the effect as well
         bench.problem.measured = bench.problem.predicted(bench.point(effects)) + bench.floor.bias
         gaps.append(bench.gap_to(plain))
     bench.problem.measured = measured
-    assert all(later > earlier for earlier, later in zip(gaps[:-1], gaps[1:], strict=True)), gaps
+    assert all(later > earlier for earlier, later in pairwise(gaps)), gaps
     assert gaps[-1] > 0.5
