@@ -67,7 +67,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     point = nuisances.point(retuned.deviations, {})
     floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2))
     fitter = Fitter(problem, floor, nuisances)
-    retuned = fitter.retuned(retuned.deviations, again=True)
+    retuned = fitter.retuned(retuned.deviations)
     left = differences(floor, problem, fitter.predicted(retuned.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
 

@@ -15,7 +15,7 @@ from diagnosis.features import Feature, Features, Scales, Signals, settled, spri
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.reduced import BLOCK_S, reduce_run
-from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed
+from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
 from diagnosis.twin import Effects, Roughness, Start, predict, rig_config
 from plant.effects import EFFECTS
 
@@ -91,7 +91,7 @@ class Problem:
         moving = {name: table for name, table in point.effects.items() if name not in SENSOR_EFFECTS}
         if not run.commands.frequency_Hz.any():
             moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
-        start, chain = run.start, point.chain
+        start, chain = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects)), point.chain
         roughness = None
         if draw is not None:
             start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
@@ -152,6 +152,7 @@ class Problem:
             return predict(rig_config(self.rig, values, effects, roughness), force_driven, commands, start)
         key = (
             run.file,
+            start.force_N,
             inputs,
             tuple(sorted(values.items())),
             tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(effects.items())),

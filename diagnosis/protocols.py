@@ -59,7 +59,8 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
         RunPlan(_constant(0.0005), track=0),
         # 3 mm forward, 5 mm back of which 2.1 mm slide, and 0.9 mm of slow drag with dwells of 3 s
         RunPlan(_steps((0.0, 0.002), (1.5, -0.002), (4.0, -0.00015)), track=1),
-        RunPlan(_constant(0.0005), _vibration((2.0, 1000.0), (4.0, 2000.0), (6.0, 3000.0), (8.0, 4000.0)), track=2),
+        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
+        RunPlan(_constant(0.0005), _vibration((2.0, 3000.0), (4.0, 1000.0), (6.0, 4500.0), (8.0, 2000.0)), track=2),
         RunPlan(
             _steps((0.0, 0.0007), (5.0, -0.002), (7.2, -0.0002)),
             _vibration((2.5, 2500.0), (5.0, 0.0)),
@@ -76,8 +77,11 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
     # on the paper's stand the slide goes back to where it started
     "paper": (
         RunPlan(_constant(0.0005)),
+        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
         RunPlan(_constant(0.0005), _vibration((4.0, 2000.0))),
+        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
         RunPlan(_constant(0.0005), _vibration((4.0, 4000.0))),
+        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
         RunPlan(_constant(0.0005), _vibration((4.0, 3000.0)), holdout=True),
     ),
     "slow": (

@@ -18,7 +18,6 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _NARROW = 0.1  # prior of a coordinate that is known so well that a common step would leave its line
-_STEP = 0.5  # of a tolerance: large against the grid, small against the curvature
 # What goes further is a gap: of eight numbers drawn from their tolerances one is beyond this in 1 of 130 rigs. The sensors'
 # lags and corners have no stated tolerance to hold them to.
 _MOST_TOLERANCES = 3.3
@@ -74,20 +73,20 @@ class Stage(NamedTuple):
     """How a fit proceeds."""
 
     steps: int
-    renew_every: (
-        int  # steps after which the nuisances' derivatives are computed anew; 0: those of the retuned rig serve
-    )
+    renewals: int  # how often the nuisances' derivatives may be computed anew when no step gains any more
     knee: float  # of the compression
 
 
 # Far off, compressed differences pull at nothing: there a fit is nearly one of plain squares.
 FAR_KNEE = 60.0
-_FAR = Stage(4, 2, FAR_KNEE)
-_NEAR = Stage(6, 6, KNEE)
-_RETUNE = Stage(6, 3, KNEE)
-_CLOSE = Stage(6, 0, KNEE)
+_FAR = Stage(4, 1, FAR_KNEE)
+_NEAR = Stage(6, 1, KNEE)
+_RETUNE = Stage(9, 3, KNEE)  # what everything is measured against
 QUICK = Stage(2, 0, FAR_KNEE)
 _FAR_OFF = 3.0 * KNEE
+# of a tolerance, for derivatives: large against the grid, small against the curvature; the second and third time the other
+# way and wider, over the jumps that slips make where they come and go
+_STEPS = (0.5, -1.0, 0.25)
 
 
 class Fit(NamedTuple):
@@ -144,17 +143,21 @@ class Fitter:
         z *= slope / self.floor.scatter[self.floor.compared]
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
-    def retuned(self, deviations: Floats, again: bool = False) -> Fit:
-        """The rig without effects, refitted, `again` from close by; other fits start from its nuisances' derivatives."""
-        if not again:
-            deviations = self.fit(NOTHING, deviations, np.zeros(0), _FAR).deviations
-        fit = self.fit(NOTHING, deviations, np.zeros(0), _NEAR if again else _RETUNE)
-        self._rates = self._nuisance_rates(fit.deviations, {}, self.predicted(fit.deviations, {}))
+    def retuned(self, deviations: Floats) -> Fit:
+        """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
+        fit = self.refit(NOTHING, deviations, np.zeros(0))
+        fit = self.fit(NOTHING, fit.deviations, fit.w, _RETUNE)
+        here = self.predicted(fit.deviations, {})
+        self._rates = self._nuisance_rates(fit.deviations, {}, here, _STEPS[0])
         return fit
 
     def described(self, deviations: Floats) -> Fit:
         """The rig as it stands, with its nuisances' derivatives, under the wide compression of a far start."""
-        return self.fit(NOTHING, deviations, np.zeros(0), Stage(0, 1, FAR_KNEE))
+        here = self.predicted(deviations, {})
+        residual, slope = self.whitened(here, FAR_KNEE)
+        rates = self._nuisance_rates(deviations, {}, here, _STEPS[0])
+        chi2 = self._chi2(np.ones(len(deviations)), residual, deviations)
+        return Fit(NOTHING, deviations, np.zeros(0), chi2, residual, self.floor.whitening @ (rates * slope[:, None]))
 
     def judged(self, fit: Fit) -> Fit:
         """A fit of any stage with the chi2 and the residual of the gap's own compression."""
@@ -166,28 +169,26 @@ class Fitter:
     def refit(self, form: Form, deviations: Floats, w: Floats) -> Fit:
         """Fit a form to the end, from a starting point that may be far off."""
         z = differences(self.floor, self.problem, self.predicted(deviations, form.tables(w)))
-        if np.abs(z).max() < _FAR_OFF:
-            return self.fit(form, deviations, w, _CLOSE)
-        fit = self.fit(form, deviations, w, _FAR)
-        return self.fit(form, fit.deviations, fit.w, _NEAR)
+        if np.abs(z).max() > _FAR_OFF:
+            fit = self.fit(form, deviations, w, _FAR)
+            deviations, w = fit.deviations, fit.w
+        return self.fit(form, deviations, w, _NEAR)
 
-    def fit(self, form: Form, deviations: Floats, w: Floats, stage: "Stage") -> Fit:
+    def fit(self, form: Form, deviations: Floats, w: Floats, stage: Stage) -> Fit:
         """Fit a form from a starting point, in the way of one stage."""
-        steps, renew_every, knee = stage
         own = len(deviations)
         prior = np.concatenate([np.ones(own), [1.0 / axis.prior for axis in form.axes]])
         now = np.concatenate([deviations, w])
         here = self.predicted(now[:own], form.tables(now[own:]))
-        residual, slope = self.whitened(here, knee)
+        residual, slope = self.whitened(here, stage.knee)
         chi2 = self._chi2(prior, residual, now)
         nuisance_rates = self._rates
+        renewed = 0
         columns = np.zeros((len(residual), len(now)))
-        for step in range(steps + 1):
-            if renew_every and step % renew_every == 0 and (step < steps or steps == 0):
-                nuisance_rates = self._nuisance_rates(now[:own], form.tables(now[own:]), here)
+        for step in range(stage.steps + 1):
             rates = np.column_stack([nuisance_rates, self._axis_rates(form, now[:own], now[own:], here)])
             columns = self.floor.whitening @ (rates * slope[:, None])
-            if step == steps:
+            if step == stage.steps:
                 break
             normal = columns.T @ columns + np.diag(prior**2)
             change = np.linalg.solve(normal, columns.T @ residual - prior**2 * now)
@@ -196,15 +197,17 @@ class Fitter:
                 ahead = now + share * change
                 ahead[:own] = np.clip(ahead[:own], -self._most, self._most)
                 there = self.predicted(ahead[:own], form.tables(ahead[own:]))
-                new_residual, new_slope = self.whitened(there, knee)
+                new_residual, new_slope = self.whitened(there, stage.knee)
                 new_chi2 = self._chi2(prior, new_residual, ahead)
                 if new_chi2 < chi2:
                     gain = chi2 - new_chi2
                     now, here, residual, slope, chi2 = ahead, there, new_residual, new_slope, new_chi2
                     break
-            fresh = renew_every == 0 or step % renew_every == 0
-            if gain < _WORTH_A_STEP and fresh:
-                break
+            if gain < _WORTH_A_STEP:
+                if renewed == stage.renewals:
+                    break
+                nuisance_rates = self._nuisance_rates(now[:own], form.tables(now[own:]), here, _STEPS[renewed])
+                renewed += 1
         return Fit(form, now[:own], now[own:], chi2, residual, columns)
 
     @staticmethod
@@ -212,11 +215,11 @@ class Fitter:
         held = prior * at
         return float(residual @ residual + held @ held)
 
-    def _nuisance_rates(self, deviations: Floats, effects: Effects, here: Floats) -> Floats:
+    def _nuisance_rates(self, deviations: Floats, effects: Effects, here: Floats, size: float) -> Floats:
         columns: list[Floats] = []
         for i in range(len(deviations)):
             ahead = deviations.copy()
-            step = -_STEP if ahead[i] > 0.0 else _STEP
+            step = -size if ahead[i] > 0.0 else size
             ahead[i] += step
             columns.append(self._rate(here, self.predicted(ahead, effects), step))
         return np.column_stack(columns)

@@ -73,6 +73,13 @@ def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chai
     return result
 
 
+def true_force_N(reading_N: float, effects: Effects) -> float:
+    """What a constant force was when the sensor read this, before it had time to drift."""
+    bias_N = float(effects.get("force-sensor-bias", {}).get("bias_N", 0.0))
+    gain = 1.0 + float(effects.get("force-sensor-gain", {}).get("ratio", 0.0))
+    return (reading_N - bias_N) / gain
+
+
 def delayed(values: Floats, delay_s: float) -> Floats:
     """Shifted by a time of any sign, linear between blocks."""
     if delay_s == 0.0:

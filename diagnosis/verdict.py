@@ -17,10 +17,10 @@ from diagnosis.refit import Fit
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
-# chi2 of a perfect model per compared feature: the replicates' correlation and the least floors keep it below 1. No-gap
-# evidence of the plant had 0.25 to 0.6.
+# chi2 of a perfect model per compared feature: the replicates' correlation and the least floors keep it below 1.
 _PERFECT = 0.4
-_WORST_OF_NO_GAP = 0.8  # a gap that nothing explains must leave more than any of them did
+# A gap that nothing explains, or that a second effect must explain, leaves more than no-gap evidence does: 0.25 to 0.75.
+_WORST_OF_NO_GAP = 0.8
 _CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise
@@ -72,8 +72,8 @@ def occam(fit: Fit) -> float:
 
 def second_pays(base: Fit, first: Fit) -> bool:
     """Whether enough is left by the best single effect to look for a second."""
-    left = first.chi2 - perfect_chi2(base)
-    return left > 2.0 * (COST_OF_EFFECT + _COST_OF_SECOND) and left > 0.1 * (base.chi2 - perfect_chi2(base))
+    left = first.chi2 - _WORST_OF_NO_GAP * len(base.residual)
+    return left > 0.05 * (base.chi2 - first.chi2)
 
 
 def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
@@ -96,7 +96,7 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
     best = double or (ranked[0] if ranked else None)
     beyond = max(base.chi2 - _WORST_OF_NO_GAP * len(base.residual), 0.0)
     scores: dict[str, float] = {"none": COST_OF_EFFECT}
-    scores["unexplained"] = 0.5 * _CLOSED_BY_UNKNOWN * beyond / scale - _COST_OF_UNKNOWN
+    scores["unexplained"] = 0.5 * _CLOSED_BY_UNKNOWN * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
     for one in ranked:
         scores[one.fit.form.effects[0]] = one.evidence
     if double is not None:
