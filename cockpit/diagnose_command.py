@@ -86,11 +86,14 @@ def _check_destinations(wishes: _Wishes, one: bool) -> None:
 
 def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
     from cockpit.diagnose_output import in_words, watched
+    from diagnosis.apply import refuse_force_drive, write_rig
     from diagnosis.evidence import load_evidence
     from diagnosis.report import write_report
     from diagnosis.result import to_json
 
     evidence = load_evidence(source.folder)
+    if wishes.apply is not None:
+        refuse_force_drive(evidence)
     with watched() as progress:
         diagnosis = _result(source, evidence, wishes, progress)
     written: list[str] = []
@@ -103,12 +106,12 @@ def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
     if wishes.json != _STDOUT:
         print("\n".join(in_words(diagnosis) + written))
     if wishes.apply is not None:
-        from diagnosis.apply import write_rig
-
-        with _writing():
-            write_rig(diagnosis, evidence, wishes.apply)
-        if wishes.json != _STDOUT:
-            print(f"rig file   {wishes.apply}")
+        said = "not written: nothing explains the gap, there is no effect to apply"
+        if diagnosis.verdict != "unexplained":
+            with _writing():
+                write_rig(diagnosis, evidence, wishes.apply)
+            said = str(wishes.apply)
+        print(f"rig file   {said}", file=sys.stderr if wishes.json == _STDOUT else sys.stdout)
     return 0
 
 

@@ -32,13 +32,8 @@ def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
 
     Raises Fault CONFIG where a diagnosis gives no rig that the plant can be, OSError when the file cannot be written.
     """
+    refuse_force_drive(evidence)
     name = evidence.folder.name
-    if evidence.rig.drive == "force":
-        raise Fault(
-            "CONFIG",
-            f'{name}: rig.drive = "force": no rig file can say that, the stand-in rig pulls through a spring; use the '
-            "parameters in the JSON of the diagnosis",
-        )
     if diagnosis.verdict == "unexplained":
         raise Fault(
             "CONFIG",
@@ -48,6 +43,17 @@ def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
     table = rig_table(diagnosis, evidence)
     validate(RigConfig, table, f"the rig diagnosed from {name}")
     write_whole(path, _comment(diagnosis, evidence) + _toml(table))
+
+
+def refuse_force_drive(evidence: Evidence) -> None:
+    """Raise Fault CONFIG for a rig that no rig file can describe."""
+    name = evidence.folder.name
+    if evidence.rig.drive == "force":
+        raise Fault(
+            "CONFIG",
+            f'{name}: rig.drive = "force": no rig file can say that, the stand-in rig pulls through a spring; use the '
+            "parameters in the JSON of the diagnosis",
+        )
 
 
 def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:

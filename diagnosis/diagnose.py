@@ -120,7 +120,7 @@ def _roughness(problem: Problem, drawn: Floats) -> Roughness:
                 logs.append(0.5 * math.log(problem.measured[i] / float(known.mean())))
     if not logs:
         return _ROUGHNESS
-    # one segment's scatter is known to a factor of 1.4 or so; surfaces lie within a factor of 1.8 of 0.3 %
+    # one segment's scatter is known to a factor of 1.4 or so; surfaces lie within a factor of two of 0.3 %
     weight = len(logs) / (len(logs) + 0.5)
     ratio = _MARGIN * _ROUGHNESS.ratio * math.exp(weight * float(np.median(logs)))
     return _ROUGHNESS._replace(ratio=min(max(ratio, 0.002), 0.008))

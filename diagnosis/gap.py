@@ -9,9 +9,9 @@ by sensor noise as measured, by the rough surface, and by the age of the contact
 1 ms grid and ordinary sensors can promise. The gap is the root of the mean square of these over cells of signal x regime x
 band x run, each cell counting alike, so that a shape of 14 points weighs no more than one mean level:
 
-    gap = sqrt(mean over cells of mean over the cell's features of T(difference / floor)^2),  T(z) = 6 asinh(z / 6)
+    gap = sqrt(mean over cells of mean over the cell's features of T(difference / floor)^2) / level,  T(z) = 6 asinh(z / 6)
 
-A perfect model shows 1.0, because replicates differ from each other as the rig differs from the model. T is the identity up to
+The level is what the replicates themselves show, so that a perfect model has 1.0. T is the identity up to
 a few floors and a logarithm beyond: a drive that ripples by 500 floors of a laser-straight position says no more than one that
 ripples by 50, and must not hide everything else.
 """

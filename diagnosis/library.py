@@ -46,7 +46,7 @@ def trials(problem: Problem) -> list[Trial]:
         if rig.drive not in effect.drives or (effect.acts_on == "piezo" and highest_Hz == 0.0):
             continue
         for form in effect.forms:
-            if form != "random":  # a random load shows as scatter only, see `scales`
+            if form != "random":  # no prediction follows a random load; only the sine is tried
                 found += _starts(name, form, problem, highest_Hz)
     return found
 

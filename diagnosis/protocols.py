@@ -77,11 +77,8 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
     # on the paper's stand the slide goes back to where it started
     "paper": (
         RunPlan(_constant(0.0005)),
-        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
         RunPlan(_constant(0.0005), _vibration((4.0, 2000.0))),
-        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
         RunPlan(_constant(0.0005), _vibration((4.0, 4000.0))),
-        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
         RunPlan(_constant(0.0005), _vibration((4.0, 3000.0)), holdout=True),
     ),
     "slow": (

@@ -18,7 +18,7 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _NARROW = 0.1  # prior of a coordinate that is known so well that a common step would leave its line
-# What goes further is a gap: of eight numbers drawn from their tolerances one is beyond this in 1 of 130 rigs. The sensors'
+# What goes further is a gap: of seven numbers drawn from their tolerances one is beyond this in 1 of 150 rigs. The sensors'
 # lags and corners have no stated tolerance to hold them to.
 _MOST_TOLERANCES = 3.3
 _MOST_OF_CHAIN = 5.0

@@ -16,13 +16,24 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         sentences.append("No gap beyond the stated tolerances: the rig as described explains these runs.")
     elif diagnosis.verdict == "unexplained":
         sentences.append("There is a gap, and nothing in the library explains it.")
+    if gap.runs and math.isfinite(gap.nominal):
+        sentences.append(
+            f"Rig and model are {times(gap.nominal)} noise floors apart as described, and {times(gap.retuned)} after "
+            "refitting the rig's numbers inside their tolerances; 1 is a perfect model."
+        )
     if diagnosis.where and diagnosis.verdict != "no-gap":
         sentences.append(_where(diagnosis))
-    for name in diagnosis.effects:
+    sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
+    for i, name in enumerate(diagnosis.effects):
         candidate = next(one for one in diagnosis.candidates if one.effect == name)
         numbers = ", ".join(estimate_in_words(*item) for item in candidate.parameters.items())
+        says = "explains it" if i == 0 else "is needed besides"
+        if len(diagnosis.effects) > 1 and i == 0:
+            says = f"explains it together with {diagnosis.effects[1]}"
         sentences.append(
-            f"{name} explains it (probability {percent(candidate.probability)}): {EFFECT_WORDS[name]}"
+            f"{name} {says}"
+            + (f" (probability {percent(sure)})" if i == 0 else "")
+            + f": {EFFECT_WORDS[name]}"
             + (f"; {numbers}." if numbers else ".")
         )
     sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
@@ -34,11 +45,6 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             sentences.append(
                 f"On {kept}, kept aside, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
                 f"{percent(gap.shrinkage)} of what could be closed{between}."
-            )
-        else:
-            sentences.append(
-                f"On {kept}, kept aside, {times(gap.retuned)} noise floors are left after refitting the rig's numbers "
-                "(1 is perfect)."
             )
     else:
         sentences.append("No run was kept aside: how far the gap closes on new data is not known.")

@@ -1,10 +1,10 @@
 """From fits to a verdict: is there a gap, which effects close it, and how sure that is.
 
 Fits compete by the logarithm of their evidence, Laplace's approximation: half of how far chi2 falls, less what the freedom of
-their parameters costs. All of it is divided by the misfit that even the best model leaves, so that a model that is wrong
-everywhere cannot be sure of anything (a quasi-likelihood), and by a temperature that was calibrated on evidence made from the
-plant. `none` is the rig refitted inside its tolerances. `unexplained` stands for a model that nobody wrote down and that would
-close a fair share of the gap: it wins where the library closes less.
+their parameters costs. What comes from the differences is divided by the misfit that even the best model leaves, so that a
+model that is wrong everywhere cannot be sure of anything (a quasi-likelihood), and by the jitter of the refits. `none` is the
+rig refitted inside its tolerances. `unexplained` stands for a model that nobody wrote down and that would close a fair share of
+the gap: it wins where the library closes less.
 """
 
 import math

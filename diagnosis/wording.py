@@ -54,11 +54,11 @@ def answer(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "unexplained":
         return "these runs differ from the rig as described, and no known effect accounts for it"
     names = " and ".join(diagnosis.effects)
-    best = next((one for one in diagnosis.candidates if one.effect in (names, "+".join(diagnosis.effects))), None)
+    sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
     others = [one for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for one in group]
     others = [one for one in dict.fromkeys(others) if one not in diagnosis.effects]
     alike = f"; or {', '.join(others)}, which would look the same in these runs" if others else ""
-    return names + (f", probability {percent(best.probability)}" if best else "") + alike
+    return f"{names}, probability {percent(sure)}{alike}"
 
 
 def signal_name(column: str) -> str:

@@ -2,9 +2,9 @@
 
 import sys
 
-from tests.bench import effects, kernel, loop, replay
+from tests.bench import diagnosis, effects, kernel, loop, replay
 
-BENCHES = [kernel.bench, effects.bench, loop.bench, replay.bench]
+BENCHES = [kernel.bench, effects.bench, loop.bench, replay.bench, diagnosis.bench]
 
 kept = [bench() for bench in BENCHES]
 sys.exit(0 if all(kept) else 1)

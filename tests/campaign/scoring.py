@@ -54,11 +54,6 @@ def of_singles(cases: list[Case]) -> dict[str, Any]:
     pairs = [(case, next(iter(truth(case)))) for case in cases]
     groups = [named_group(case) for case in cases if case["result"]["effects"]]
     gaps = [case["result"]["gap"]["shrinkage"] for case in cases]
-    ratios = [
-        case["result"]["gap"]["shrinkage"] / case["oracle_shrinkage"]
-        for case in cases
-        if case.get("oracle_shrinkage") and case["result"]["gap"]["shrinkage"] is not None
-    ]
     return {
         "alarm": rate([alarmed(case) for case in cases]),
         "top_1": rate([top(case, 1) == [there] for case, there in pairs]),
@@ -67,7 +62,6 @@ def of_singles(cases: list[Case]) -> dict[str, Any]:
         "group_size": mean(map(len, groups)) if groups else None,
         "wrong": rate([bool(named_group(case)) and there not in named_group(case) for case, there in pairs]),
         "shrinkage": mean([gap for gap in gaps if gap is not None]) if any(gap is not None for gap in gaps) else None,
-        "shrinkage_of_oracle": mean(ratios) if ratios else None,
     }
 
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-HEAD = " " * 30 + "    n  alarm  top-1  top-3  group  size  wrong  shrink  /oracle"
+HEAD = " " * 30 + "    n  alarm  top-1  top-3  group  size  wrong  shrink"
 
 
 def _rate(value: dict[str, float] | None) -> str:
@@ -24,7 +24,7 @@ def _row(name: str, scores: dict[str, Any]) -> str:
     rates = [_rate(scores[key]) for key in ("alarm", "top_1", "top_3", "in_group")]
     return (
         f"{name:30} {n:4} {rates[0]:>6} {rates[1]:>6} {rates[2]:>6} {rates[3]:>6} {_number(scores['group_size']):>5} "
-        f"{_rate(scores['wrong']):>6} {_number(scores['shrinkage']):>7} {_number(scores['shrinkage_of_oracle']):>8}"
+        f"{_rate(scores['wrong']):>6} {_number(scores['shrinkage']):>7}"
     )
 
 

@@ -95,7 +95,7 @@ def case(kind, effects, verdict="effect", named=(), groups=(), **more):
 
 def test_scores_by_hand():
     cases = [
-        case("single", ["drive-damping"], named=["drive-damping"], oracle_shrinkage=1.0, detectability=3.0),
+        case("single", ["drive-damping"], named=["drive-damping"], detectability=3.0),
         case("single", ["drive-damping"], named=["drive-backlash"], groups=[["drive-backlash", "drive-damping"]]),
         case("single", ["drive-damping"], "no-gap"),
         case("single", ["drive-damping"], "unexplained"),
@@ -107,7 +107,6 @@ def test_scores_by_hand():
     rates = {key: all_effects[key]["rate"] for key in ("alarm", "top_1", "top_3", "in_group", "wrong")}
     assert rates == {"alarm": 0.75, "top_1": 0.25, "top_3": 0.25, "in_group": 0.5, "wrong": 0.0}
     assert all_effects["group_size"] == 1.5
-    assert all_effects["shrinkage_of_oracle"] == 0.8
     assert list(scores["by_detectability"]) == ["2 to 4"]
     assert scores["no_gap"]["false_alarms"]["rate"] == 0.0
     assert scores["pairs"]["exact"]["rate"] == scores["pairs"]["set_f1"] == 1.0

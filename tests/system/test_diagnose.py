@@ -1,0 +1,107 @@
+"""The whole diagnosis on evidence made from the plant, through the command and from code."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import diagnosis.diagnose
+from cockpit.cli import app
+from diagnosis.evidence import load_evidence
+from diagnosis.library import trials
+from diagnosis.making import Case, make_evidence
+from diagnosis.problem import Problem
+from plant.config import load_rig
+from plant.effects import EFFECTS
+
+
+def quiet(_text: str, _share: float) -> None:
+    pass
+
+
+@pytest.fixture(scope="module")
+def damped(tmp_path_factory):
+    """A drive that damps by 12 N s/m, everything else within its tolerances."""
+    folder = tmp_path_factory.mktemp("made") / "bench"
+    make_evidence(folder, Case(effects={"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def command(damped):
+    out = damped.parent
+    result = CliRunner().invoke(
+        app,
+        ["diagnose", str(damped), "--json", str(out / "d.json"), "--report", str(out / "d.html"),
+         "--apply", str(out / "rig.toml"), "--jobs", "2"],
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    return result.output, json.loads((out / "d.json").read_text()), out
+
+
+def test_the_command_names_the_effect_in_the_form_of_the_contract(command):
+    said, found, _ = command
+    assert found["format"] == "diagnosis/1"
+    assert found["verdict"] == "effect"
+    assert found["effects"] == ["drive-damping"]
+    names = {one["effect"] for one in found["candidates"]}
+    assert names == {*EFFECTS, "none", "unexplained"}
+    assert sum(one["probability"] for one in found["candidates"]) == pytest.approx(1.0)
+    best = found["candidates"][0]
+    low, high = best["parameters"]["damping_Ns_per_m"]["interval_90"]
+    assert low < best["parameters"]["damping_Ns_per_m"]["value"] < high
+    assert best["parameters"]["damping_Ns_per_m"]["value"] == pytest.approx(12.0, rel=0.25)
+    assert sum(one["share"] for one in found["where"]) == pytest.approx(1.0)
+    assert {one["regime"] for one in found["where"]} <= {"stick", "breakaway", "slip", "restick", "steady"}
+    assert "drive-damping" in said
+
+
+def test_the_gap_is_judged_on_the_held_out_run_only(command):
+    _, found, _ = command
+    gap = found["gap"]
+    assert gap["runs"] == ["run-04.parquet"]
+    assert gap["with_effect"] < gap["retuned"] < gap["nominal"]
+    closed = (gap["retuned"] - gap["with_effect"]) / (gap["retuned"] - gap["floor"])
+    if gap["shrinkage"] is not None:
+        assert gap["shrinkage"] == pytest.approx(closed)
+    assert [one["who"] for one in gap["compared"]][-2:] == ["parameters alone", "flexible residual"]
+
+
+def test_the_report_and_the_rig_file_are_there(command):
+    _, _, out = command
+    page = (out / "d.html").read_text()
+    assert len(page) < 5e6
+    assert "drive-damping" in page
+    assert "drive-damping" in load_rig(out / "rig.toml").effects
+
+
+def test_nothing_leaks_from_the_held_out_run(damped, tmp_path, monkeypatch):
+    """Another held-out run changes what is judged, and not a digit of what was fitted."""
+    wanted = {"drive-damping", "viscous-friction"}
+
+    def few(problem: Problem):
+        return [trial for trial in trials(problem) if set(trial.form.effects) <= wanted]
+
+    monkeypatch.setattr(diagnosis.diagnose, "trials", few)
+    other = tmp_path / "other"
+    shutil.copytree(damped, other)
+    make_evidence(tmp_path / "alien", Case(), seed=99)
+    shutil.copy(tmp_path / "alien" / "run-04.parquet", other / "run-04.parquet")
+    one, two = (diagnosis.diagnose.diagnose(load_evidence(folder), quiet) for folder in (damped, other))
+    assert one.candidates == two.candidates
+    assert one.rig == two.rig
+    assert one.gap.retuned != two.gap.retuned
+
+
+def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(tmp_path):
+    missing = ("mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+    case = Case("constant", {"drive-damping": {"damping_Ns_per_m": 12.0}}, leave_out=missing)
+    make_evidence(tmp_path / "force", case, seed=22)
+    found = diagnosis.diagnose.diagnose(load_evidence(tmp_path / "force"), quiet)
+    best = found.candidates[0]
+    group = {*found.effects, *(name for names in found.not_distinguishable for name in names)}
+    assert "drive-damping" in group or best.effect in {"none", "unexplained"} or best.probability < 0.9
+    assert any("mass_accel_mps2" in finding.where for finding in found.findings)
+    assert np.isfinite(found.gap.retuned)
