@@ -61,6 +61,10 @@ def test_one_folder_writes_json_report_and_rig(tmp_path, monkeypatch):
 
     class Apply:
         @staticmethod
+        def refuse_force_drive(evidence):
+            assert evidence.rig.drive == "spring"
+
+        @staticmethod
         def write_rig(diagnosis, evidence, path):
             rigs.append((diagnosis.effects, evidence.folder.name, path.name))
 
