@@ -22,7 +22,7 @@ from diagnosis.result import Diagnosis
 
 Progress = Callable[[str, float], None]
 Diagnose = Callable[[Evidence, Progress, int], Diagnosis]
-_CLUSTER_WAIT_S = 5.0  # for the scheduler to answer, and again for a first worker
+_CLUSTER_WAIT_S = 5  # for the scheduler to answer, and again for a first worker
 
 
 class Source(NamedTuple):
@@ -135,9 +135,19 @@ def _workers(jobs: int, cluster: str) -> Generator[_Workers]:
             client.wait_for_workers(1, timeout=_CLUSTER_WAIT_S)
         except TimeoutError:
             raise Fault("NO_PEER", f"--cluster {cluster}: the scheduler has no worker; start some") from None
-        config = {"backend": "dask", "client": client, "wait_for_workers_timeout": _CLUSTER_WAIT_S}
+        from joblib._dask import DaskDistributedBackend  # noqa: PLC0415
+
+        class Cluster(DaskDistributedBackend):
+            """Joblib does the work itself where a back-end has one core: the last worker left would stand idle."""
+
+            def effective_n_jobs(self, n_jobs: int) -> int:
+                return max(2, super().effective_n_jobs(n_jobs))
+
+        def pool(dispatched: int) -> Any:
+            return _pool({"backend": Cluster(client=client, wait_for_workers_timeout=_CLUSTER_WAIT_S)}, dispatched)
+
         # TimeoutError: not one worker is left
-        yield _Workers(partial(_pool, config), 2 * sum(client.ncores().values()), (KilledWorker, TimeoutError))
+        yield _Workers(pool, 2 * sum(client.ncores().values()), (KilledWorker, TimeoutError))
 
 
 def _pool(config: dict[str, Any], dispatched: int) -> Any:
