@@ -3,31 +3,22 @@
 Only starting points for a refit come from here, never a verdict.
 """
 
-from typing import Any, NamedTuple
-
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
 from diagnosis.axis_features import friction_share
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
-from diagnosis.waves import Wave
+from diagnosis.waves import Series, Wave, fitted
 
-Floats = npt.NDArray[np.floating[Any]]
 _EVERY = 8  # blocks that make one sample
 _MOST_TURNS = 200  # of a wave within the longest run
 _STEPS_PER_TURN = 3  # a line is as narrow as the run is long
 
 
-class _Series(NamedTuple):
-    at: Floats
-    value: Floats
-
-
 def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
     """The strongest waves of the friction over `position` [m] or `time` [s], strongest first."""
-    series: list[_Series] = []
+    series: list[Series] = []
     for run in runs:
         motion = run.commands.motion
         if motion is None:
@@ -35,27 +26,14 @@ def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
         share, valid = friction_share(run.signals["drive_force_N"], motion)
         time_s = run.start.t_s + np.arange(len(share)) * BLOCK_S
         at = motion.position_m if over == "position" else time_s
-        series.append(_Series(at[valid][::_EVERY], uniform_filter1d(share, _EVERY)[valid][::_EVERY]))
+        series.append(Series(at[valid][::_EVERY], uniform_filter1d(share, _EVERY)[valid][::_EVERY]))
     span = max((float(np.ptp(one.at)) for one in series), default=0.0)
     if span <= 0.0:
         return []
     turns = np.arange(1, _MOST_TURNS * _STEPS_PER_TURN) / _STEPS_PER_TURN
-    found = [_fitted(series, span / number) for number in turns.tolist()]
+    found = [fitted(series, span / number) for number in turns.tolist()]
     power = np.array([gain for gain, _ in found])
     near = 2 * _STEPS_PER_TURN
     peaks = [i for i in range(len(power)) if power[i] == power[max(0, i - near) : i + near + 1].max()]
     best = [found[i][1] for i in sorted(peaks, key=lambda i: -power[i])[:most]]
     return [wave._replace(spread=min(0.5 * wave.period / span, 0.2)) for wave in best]
-
-
-def _fitted(series: list[_Series], period: float) -> tuple[float, Wave]:
-    """What of the squares a wave of this period takes, and the wave."""
-    normal, right = np.zeros((2, 2)), np.zeros(2)
-    for at, value in series:
-        turn = 2.0 * np.pi * at / period
-        columns = np.stack([np.sin(turn), np.cos(turn)], axis=1)
-        columns -= columns.mean(axis=0)
-        normal += columns.T @ columns
-        right += columns.T @ value
-    a, b = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(2), right)
-    return float(right @ (a, b)), Wave(period, float(np.hypot(a, b)), float(np.arctan2(b, a)))

@@ -1,45 +1,25 @@
 """Where a force breaks away and sticks again within a segment, and what each breakaway could depend on."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from diagnosis.commands import Segment
-from diagnosis.cycles import turning_points
-from diagnosis.features import Scales, Signals
+from diagnosis.features import Scales, Signals, Slips, find_slips
 from diagnosis.kinematics import motion
 from diagnosis.manifest import RigTable
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 
 Floats = npt.NDArray[np.floating[Any]]
-_LONGEST = 10.0  # half periods of the mass on its spring: what falls longer is a change of level
-
-
-class Slips(NamedTuple):
-    """Slips of a segment. [slips] each, in blocks of the run."""
-
-    tops: npt.NDArray[np.int64]
-    bottoms: npt.NDArray[np.int64]
-    middles: Floats  # where half of the fall is done
 
 
 def slips_of(signals: Signals, segment: Segment, scales: Scales) -> Slips:
-    """The slips that the drive force shows."""
+    """The slips of a segment that the drive force shows, in blocks of the run."""
     first = segment.first
-    force_N = segment.sign * signals["drive_force_N"][first : segment.last]
-    tops, bottoms = turning_points(force_N, scales.drop_N)
-    tops = tops[: len(bottoms)]
-    quick = (bottoms - tops) * BLOCK_S < _LONGEST * scales.slip_s
-    tops, bottoms = tops[quick], bottoms[quick]
-    middles = np.empty(len(tops))
-    for i, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
-        half_N = 0.5 * (force_N[top] + force_N[bottom])
-        under = top + int(np.argmax(force_N[top : bottom + 1] <= half_N))
-        step_N = force_N[under - 1] - force_N[under]
-        middles[i] = under - (half_N - force_N[under]) / step_N if step_N > 0.0 else under
-    return Slips(tops + first, bottoms + first, middles + first)
+    slips = find_slips({"drive_force_N": segment.sign * signals["drive_force_N"][first : segment.last]}, scales)
+    return Slips(slips.tops + first, slips.bottoms + first, slips.middles + first, slips.weights)
 
 
 def breakaways(rig: RigTable, run: Prepared, scales: Scales) -> tuple[Floats, dict[str, Floats]]:

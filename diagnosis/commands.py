@@ -100,9 +100,7 @@ def _pieces(position_m: Floats) -> Floats:
     lines: list[tuple[float, float]] = []
     for first, last in pairwise(edges):
         # the outer windows of a piece may hold the change itself
-        inner = slice(
-            (first + (first > 0)) * _WINDOW, (last - (last < windows)) * _WINDOW if last < windows else blocks
-        )
+        inner = slice((first + (first > 0)) * _WINDOW, (last - 1) * _WINDOW if last < windows else blocks)
         at = np.arange(blocks)[inner]
         slope, offset = np.polyfit(at, position_m[inner], 1)
         if lines:

@@ -5,9 +5,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.breakaways import Slips, slips_of
+from diagnosis.breakaways import slips_of
 from diagnosis.commands import Segment
-from diagnosis.features import Scales, Signals
+from diagnosis.features import Scales, Signals, Slips
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 from diagnosis.result import Curve, Picture

@@ -68,7 +68,7 @@ class Features:
         self.values.append(value)
 
 
-class _Slips(NamedTuple):
+class Slips(NamedTuple):
     """The slips of a segment: blocks of breakaway and re-stick, where half of the fall is done, and how much each counts.
 
     A slip counts less towards the ends of its segment and nothing at them: one that comes in or goes out as a parameter
@@ -95,7 +95,7 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
             name: values[own] if name.endswith("shake_mps2") else segment.sign * values[own]
             for name, values in signals.items()
         }
-        slips = _find_slips(cut, scales)
+        slips = find_slips(cut, scales)
         if "drive_force_N" in cut:
             travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
             expected = travel_m * scales.stiffness_N_per_m / scales.fall_N
@@ -117,14 +117,15 @@ def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
     With three slips or more it begins in the second stick; with fewer nothing would be left.
     """
     cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
-    slips = _find_slips(cut, scales)
+    slips = find_slips(cut, scales)
     if len(slips.bottoms) < 3:
         return segment
     stick = int(slips.tops[1] - slips.bottoms[0])
     return segment._replace(first=segment.first + int(slips.bottoms[0]) + int(0.4 * stick))
 
 
-def _find_slips(cut: Signals, scales: Scales) -> _Slips:
+def find_slips(cut: Signals, scales: Scales) -> Slips:
+    """The slips of a segment whose signals are cut out and turned into the direction of the drive."""
     if "drive_force_N" in cut:
         falling = cut["drive_force_N"]
         tops, bottoms = turning_points(falling, scales.drop_N)
@@ -146,10 +147,10 @@ def _find_slips(cut: Signals, scales: Scales) -> _Slips:
         middles[i] = under - (half - falling[under]) / step if step > 0.0 else under
     width = scales.slip_s / BLOCK_S
     margin = np.minimum(middles + SHAPE_AT[0] * width, len(falling) - 1 - middles - SHAPE_AT[-1] * width)
-    return _Slips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))
+    return Slips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))
 
 
-def _cycles(found: Features, number: int, force_N: Floats, slips: _Slips, expected: float) -> None:
+def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, expected: float) -> None:
     name = "drive_force_N"
     for regime, at, waves in (("breakaway", slips.tops, _BREAKAWAY_WAVES), ("restick", slips.bottoms, 3)):
         carried = min(waves, max(int(expected / 2.0) - 1, 0)) if expected >= 5.0 else 0
@@ -192,7 +193,7 @@ def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple
     return moments, float(weights @ (left * left)) / free if free > 1.0 else math.nan
 
 
-def _period(found: Features, number: int, slips: _Slips) -> None:
+def _period(found: Features, number: int, slips: Slips) -> None:
     weights = np.minimum(slips.weights[:-1], slips.weights[1:])
     periods_s = np.diff(slips.middles) * BLOCK_S
     known = weights.sum() > 0.1
@@ -200,7 +201,7 @@ def _period(found: Features, number: int, slips: _Slips) -> None:
     found.add("period", "drive_force_N", "stick", LOW, number, value)
 
 
-def _level(found: Features, number: int, force_N: Floats, slips: _Slips, at_the_edge: bool) -> None:
+def _level(found: Features, number: int, force_N: Floats, slips: Slips, at_the_edge: bool) -> None:
     """Levels over whole cycles; over the segment where nothing slips."""
     name = "drive_force_N"
     still = len(slips.tops) == 0 and not at_the_edge
@@ -224,7 +225,7 @@ def _regime(at: float) -> str:
     return "breakaway" if at < -0.4 else "slip" if at < 0.6 else "restick"
 
 
-def _shapes(found: Features, number: int, cut: Signals, slips: _Slips, scales: Scales, frequency_Hz: float) -> None:
+def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Scales, frequency_Hz: float) -> None:
     width = scales.slip_s / BLOCK_S
     shaken = frequency_Hz > 0.0  # a vibration that the sampling folds down would pass for a ring
     names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]

@@ -29,7 +29,7 @@ COST_OF_EFFECT = 12.0
 JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves
-_TEMPERATURE = 3.0
+_TEMPERATURE = 3.0  # of the probabilities: a guess, they are not calibrated yet
 
 
 class Model(NamedTuple):

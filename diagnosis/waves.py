@@ -29,14 +29,16 @@ class Wave(NamedTuple):
     spread: float = 0.2  # of the period, relative: one standard deviation
 
 
-class _Series(NamedTuple):
+class Series(NamedTuple):
+    """A quantity along a coordinate; its mean is free."""
+
     at: Floats
     value: Floats  # relative to the mean of its stretch
 
 
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
     """The strongest waves of the friction over `position` [m] or `time` [s], two in each of `most` ranges of periods."""
-    series: list[_Series] = []
+    series: list[Series] = []
     for run in runs:
         force = run.signals.get("drive_force_N")
         if force is None:
@@ -55,20 +57,20 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -
             tops, bottoms = turning_points(cut, scales.drop_N)
             if len(bottoms) >= 2:
                 at = tops[: len(bottoms)]
-                series.append(_Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0))
+                series.append(Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0))
             elif len(tops) == 0 and len(cut) > 500:
                 # where nothing slips the slide moves evenly, once the climb to that level is over
                 even = cut[len(cut) // 3 :]
                 level = even[: len(even) // 20 * 20].reshape(-1, 20).mean(axis=1)
                 if np.ptp(level) < 0.2 * scales.force_N and level.mean() > 0.5 * scales.force_N:
                     there = coordinate[own][len(cut) // 3 + 10 :: 20][: len(level)]
-                    series.append(_Series(there, level / level.mean() - 1.0))
+                    series.append(Series(there, level / level.mean() - 1.0))
     return _strongest(series, most)
 
 
 def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
     """The strongest waves of the drive's velocity over its `position` [m] or `time` [s], relative to it, likewise."""
-    series: list[_Series] = []
+    series: list[Series] = []
     for run in runs:
         position = run.signals.get("drive_position_m")
         if position is None:
@@ -81,11 +83,11 @@ def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
             mean = own[:whole].reshape(-1, 20).mean(axis=1)
             t_s = run.start.t_s + (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
             slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
-            series.append(_Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0))
+            series.append(Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0))
     return _strongest(series, most)
 
 
-def _strongest(series: list[_Series], most: int) -> list[Wave]:
+def _strongest(series: list[Series], most: int) -> list[Wave]:
     if not series:
         return []
     span = max(float(np.ptp(one.at)) for one in series)
@@ -93,7 +95,7 @@ def _strongest(series: list[_Series], most: int) -> list[Wave]:
     if span <= 0.0 or spacing <= 0.0:
         return []
     periods = np.geomspace(max(0.3 * spacing, span / 100.0), 2.0 * span, _GRID)
-    found = [_fitted(series, float(period)) for period in periods]
+    found = [fitted(series, float(period)) for period in periods]
     power = np.array([gain for gain, _ in found])
     # the best of every range of periods: short ones fit the few breakaways best whatever is there
     edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
@@ -104,7 +106,8 @@ def _strongest(series: list[_Series], most: int) -> list[Wave]:
     return [found[i][1] for i in best if power[i] > 0.0]
 
 
-def _fitted(series: list[_Series], period: float) -> tuple[float, Wave]:
+def fitted(series: list[Series], period: float) -> tuple[float, Wave]:
+    """What a wave of this period takes of the sum of squares, and the wave."""
     normal, right = np.zeros((2, 2)), np.zeros(2)
     for one in series:
         columns = np.stack([np.sin(2 * np.pi * one.at / period), np.cos(2 * np.pi * one.at / period)], axis=1)

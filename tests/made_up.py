@@ -25,7 +25,7 @@ from diagnosis.result import (
 )
 
 Progress = Callable[[str, float], None]
-MANIFEST = """
+RIG = """
 format = "evidence/1"
 [rig]
 drive = "spring"
@@ -38,10 +38,15 @@ viscous_damping_Ns_per_m = 0.0
 coulomb_force_N = 14.49
 static_force_N = 17.38
 stribeck_velocity_mps = 0.0005
+"""
+MANIFEST = (
+    RIG
+    + """
 [[run]]
 file = "run-01.csv"
 drive_velocity_mps = 0.0005
 """
+)
 
 
 def evidence_folder(at: Path) -> Path:

@@ -11,9 +11,17 @@ from bridge import stickslip_pb2 as wire
 from bridge.logfile import read_run
 from bridge.topics import OPERATOR, STATE
 from bridge.zenoh_link import Bus, BusConfig
+from controller.codes import BLOCK
 from tests.system.ports import free_endpoint
 
 COMMAND = [sys.executable, "-m", "cockpit"]
+
+
+def await_size(log: Path, size: int) -> None:
+    """Until a log has grown to so many bytes; a minute at most."""
+    until_s = time.monotonic() + 60
+    while (not log.exists() or log.stat().st_size < size) and time.monotonic() < until_s:
+        time.sleep(0.05)
 
 
 def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
@@ -25,7 +33,7 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     )  # fmt: skip
     data = read_run(log)
     assert len(data.sensors) == 6000, result.stderr
-    assert np.array_equal(data.trace["block"][data.trace["events"] & 1 == 1], data.sensors["sequence"])
+    assert np.array_equal(data.trace["block"][data.trace["events"] & BLOCK != 0], data.sensors["sequence"])
     # how soon the answers come is for the bench to say; that they come at all is for this test
     assert int(data.applied["commands"].sum()) >= 5990
     assert set(data.headers) == {"run", "plant", "controller"}
@@ -39,9 +47,7 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
-        until_s = time.monotonic() + 60
-        while (not log.exists() or log.stat().st_size < 400_000) and time.monotonic() < until_s:
-            time.sleep(0.05)
+        await_size(log, 400_000)
         assert subprocess.run([*COMMAND, "stop", "--endpoint", endpoint], timeout=30, check=False).returncode == 0
         time.sleep(1.0)
         again = [*COMMAND, "stop", "--reset", "--endpoint", endpoint]
@@ -67,9 +73,7 @@ def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
-        until_s = time.monotonic() + 60
-        while (not log.exists() or log.stat().st_size < 300_000) and time.monotonic() < until_s:
-            time.sleep(0.05)
+        await_size(log, 300_000)
         with Bus(BusConfig(endpoint=endpoint), "stranger", lockstep=False) as bus:
             for topic, payload in ((OPERATOR, b"\x08\x07"), (OPERATOR, b"\xff\xff"), (STATE, b"\xff\xff\xff")):
                 bus.publisher(topic)(payload)
@@ -80,7 +84,8 @@ def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
             run.kill()
             run.communicate()
     data = read_run(log)
-    assert len(data.trace) == 5000
+    # on a busy machine a step without a block, for a late one, may stand between
+    assert int((data.trace["events"] & BLOCK).sum()) == 5000
     texts = [f"{event.code} {event.text}" for event in data.events]
     assert sum(text.startswith("OPERATOR ignored") for text in texts) == 2
     assert sum(text.startswith("BAD_MESSAGE") for text in texts) == 1

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import diagnosis.twin
 from diagnosis.evidence import load_evidence
 from diagnosis.gap import Floor, differences, floor_of, gap, replicates
 from diagnosis.making import Case, make_evidence
@@ -54,6 +55,17 @@ def test_two_rough_surfaces_are_one_floor_apart(bench):
     bench.problem.measured = measured
     assert np.median(gaps) == pytest.approx(1.0, abs=0.15)
     assert max(gaps) < 1.6
+
+
+def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
+    """Runs without vibration, whose steps the twin chooses freely, against those of the plant's own 10 us."""
+    quiet = Problem(bench.problem.rig, [run for run in bench.problem.runs if not run.commands.frequency_Hz.any()])
+    files = {run.file for run in quiet.runs}
+    scatter = bench.floor.scatter[[file in files for file, _ in bench.problem.labels]]
+    coarse = quiet.predicted(bench.point({}))
+    monkeypatch.setattr(diagnosis.twin, "_COARSEST_STEP_S", 1e-5)
+    fine = Problem(quiet.rig, quiet.runs).predicted(bench.point({}))
+    assert np.nanmax(np.abs(coarse - fine) / scatter) < 0.33
 
 
 def numbers_of(name: str, sizes: Sizes, size: float) -> dict[str, float | str]:

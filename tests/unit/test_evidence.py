@@ -14,20 +14,11 @@ import scipy.io
 from bridge.faults import Fault
 from diagnosis.evidence import Evidence, load_evidence
 from tests.logs import doctored, short_log
+from tests.made_up import RIG
 
-MANIFEST = """
-format = "evidence/1"
-[rig]
-drive = "spring"
-mass_kg = 1.5
-drive_stiffness_N_per_m = 11700.0
-drive_damping_Ns_per_m = 0.0
-contact_stiffness_N_per_m = 77.52e6
-contact_damping_Ns_per_m = 2.15e4
-viscous_damping_Ns_per_m = 0.0
-coulomb_force_N = 14.49
-static_force_N = 17.38
-stribeck_velocity_mps = 0.0005
+MANIFEST = (
+    RIG
+    + """
 [rig.tolerance]
 mass_kg = 0.005
 coulomb_force_N = 0.03
@@ -35,6 +26,7 @@ coulomb_force_N = 0.03
 file = "run-01.parquet"
 drive_velocity_mps = 0.0005
 """
+)
 Columns = dict[str, Any]
 
 
