@@ -151,13 +151,15 @@ def _assembled(
     by_effect = {fit.form.effects[0]: fit for fit in reversed(singles)}
     if verdict.named is not None:
         by_effect |= dict.fromkeys(verdict.named.form.effects, verdict.named)
+    alone = {"none": retuned.chi2} | {fit.form.effects[0]: fit.chi2 for fit in reversed(singles)}
     candidates = tuple(
-        _candidate(name, probability, by_effect.get(name)) for name, probability in verdict.probabilities.items()
+        _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
+        for name, probability in verdict.probabilities.items()
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
     effects = best.form.effects if verdict.named else ()
-    alone = verdict.named is not None and len(effects) == 1
-    alike = imitators(fitter, list(verdict.ranked), verdict.scale) if alone else ()
+    single = len(effects) == 1
+    alike = imitators(fitter, list(verdict.ranked), verdict.scale) if single else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
     done = Diagnosis(
         verdict=verdict.kind,
@@ -182,6 +184,7 @@ def _assembled(
             named,
             effects,
         ),
+        compared_features=len(retuned.residual),
         elapsed_s=time.monotonic() - began,
     )
     return done._replace(summary=summary(done))

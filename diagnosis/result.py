@@ -25,6 +25,7 @@ class Candidate(NamedTuple):
     probability: float
     form: str = ""  # which formula of the effect fitted best
     parameters: dict[str, Estimate] = {}  # names carry their units
+    chi2: float | None = None  # of its fit alone, the nuisances' priors included; None: not refitted
 
 
 class Cell(NamedTuple):
@@ -110,6 +111,7 @@ class Diagnosis(NamedTuple):
     rig: tuple[Parameter, ...]
     findings: tuple[Finding, ...]
     pictures: tuple[Picture, ...]
+    compared_features: int  # of the fitted runs: what every chi2 is a sum over
     elapsed_s: float
 
 
@@ -132,12 +134,17 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": diagnosis.next_experiment._asdict(),
         "rig": [parameter._asdict() for parameter in diagnosis.rig],
         "findings": [finding._asdict() for finding in diagnosis.findings],
+        "compared_features": diagnosis.compared_features,
         "elapsed_s": round(diagnosis.elapsed_s, 2),
     }
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:
-    result: dict[str, Any] = {"effect": candidate.effect, "probability": candidate.probability}
+    result: dict[str, Any] = {
+        "effect": candidate.effect,
+        "probability": candidate.probability,
+        "chi2": None if candidate.chi2 is None else round(candidate.chi2, 2),
+    }
     if candidate.form:
         result["form"] = candidate.form
     if candidate.parameters:

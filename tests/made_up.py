@@ -139,6 +139,7 @@ def diagnosis() -> Diagnosis:
             Finding("clipped", "run-02.parquet: drive_force_N", "12 samples at 20 N were left out", 12),
         ),
         pictures=(picture(), picture("residual")),
+        compared_features=640,
         elapsed_s=21.0,
     )
 
