@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+BLIND := $(or $(OUT),runs/blind)
 
-.PHONY: demo test check bench campaign bless lock proto clean
+.PHONY: demo test check bench campaign real bless lock proto clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -21,8 +22,14 @@ check: $(READY)
 bench: $(VENV)/.ready-bench
 	@$(BIN)/python -m tests.bench
 
-campaign: $(READY) ## hours; what has a result in OUT is not done again: make campaign OUT=runs/campaign ARGS="--cases 5"
-	@$(BIN)/python -m tests.campaign --out $(or $(OUT),runs/campaign) $(ARGS)
+blind: $(READY) ## hours; what has a result is not done again: make blind CASES=20 SEED=1 OUT=runs/blind GENERATOR=plant
+	@test -e $(BLIND) || $(BIN)/stickslip blind make --cases $(or $(CASES),200) --seed $(or $(SEED),1) --out $(BLIND) \
+		--key $(BLIND).key.json --generator $(or $(GENERATOR),independent)
+	@$(BIN)/stickslip blind run $(BLIND)
+	@$(BIN)/stickslip blind score $(BLIND) --key $(BLIND).key.json --baselines --json $(BLIND).json --report $(BLIND).html
+
+real: $(READY) ## some minutes; needs the public logs in ../shared/data: make real OUT=runs/real ARGS="--known"
+	@$(BIN)/python -m tests.real --out $(or $(OUT),runs/real) $(ARGS)
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v >= (3, 11) else f"$(PYTHON) is {v[0]}.{v[1]}: stickslip needs Python 3.11 or later; try make PYTHON=python3.11")'

@@ -86,6 +86,18 @@ FAULTS = {
             "report it together with the evidence.",
         ),
         FaultKind(
+            "BAD_SET",
+            2,
+            "A set of blind cases, its key or its results cannot be used: a file is missing or is something else, or cases "
+            "have no result yet. The line names the file, what was expected and what to do. The answers stay closed.",
+        ),
+        FaultKind(
+            "SEAL_BROKEN",
+            11,
+            "An answer in the key, or the evidence of a case, is not the one whose hash was written when the set was made. "
+            "A score of it would mean nothing. Find the files as they were made, or make a new set.",
+        ),
+        FaultKind(
             "INTERRUPTED",
             130,
             "Somebody pressed Ctrl-C. The vibration was ramped down, the log was closed and every process has ended.",
@@ -101,3 +113,7 @@ class Fault(Exception):
         self.kind = FAULTS[code]
         self.line = line
         Exception.__init__(self, f"{code}: {line}")
+
+    def __reduce__(self) -> tuple[type["Fault"], tuple[str, str]]:
+        """For another process: an exception is made again from its one message otherwise."""
+        return Fault, (self.kind.code, self.line)

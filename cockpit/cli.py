@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from bridge.faults import FAULTS, Fault
+from cockpit.blind_command import blind_app
 from cockpit.diagnose_command import diagnose
 from cockpit.log_commands import log_app
 from cockpit.processes import guarded, stop_event
@@ -342,6 +343,7 @@ def scenarios(as_json: Json = False) -> None:
 
 app.command()(diagnose)
 app.add_typer(log_app, name="log")
+app.add_typer(blind_app, name="blind")
 
 
 def main() -> None:

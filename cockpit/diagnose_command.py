@@ -170,14 +170,12 @@ def _file_name(name: str) -> str:
 
 
 def _write_json(path: Path, value: dict[str, Any]) -> None:
-    from cockpit.diagnose_output import strict_json
-    from diagnosis.report import write_whole
+    from diagnosis.strict_json import strict_json, write_json
 
-    text = json.dumps(strict_json(value), allow_nan=False, indent=1)
     if path == _STDOUT:
-        print(text)
+        print(json.dumps(strict_json(value), allow_nan=False, indent=1))
     else:
-        write_whole(path, text + "\n")
+        write_json(path, value)
 
 
 @contextmanager

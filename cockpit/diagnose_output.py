@@ -1,6 +1,5 @@
 """What `stickslip diagnose` shows and writes: progress, the answer in words, one line a folder, strict JSON."""
 
-import math
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -50,15 +49,6 @@ def _as_json(outcome: "Outcome") -> dict[str, Any]:
         return {"evidence": outcome.source.name, "diagnosis": to_json(outcome.diagnosis)}
     code, line = outcome.fault or ("", "")
     return {"evidence": outcome.source.name, "fault": {"fault": code, "line": line}}
-
-
-def strict_json(value: Any) -> Any:
-    """`value` with null for NaN and infinity, which JSON does not know."""
-    if isinstance(value, dict):
-        return {key: strict_json(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [strict_json(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @contextmanager

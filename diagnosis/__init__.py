@@ -39,9 +39,12 @@ Output
     pictures, cycle_pictures    which pictures; cycles laid over their predictions
     residual_pictures           residuals over what explains them,
     residual_axes               and which residual over which variable
+    strict_json                 JSON files that any reader takes
     parity, kinematics          relations between channels that need no simulation; the motion and derivatives they need
     breakaways                  breakaways, and what each could depend on
     apply                       a rig file with the named effects
+How good it is
+    blind                       sealed cases, one run, one score: a package of its own
 Evidence made from the plant
     making                      a described rig, and a drawn one that is measured
     made_runs, made_sensors     one run of it; what its measuring chain adds

@@ -30,10 +30,10 @@ from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Parameter, Shrinkage
-from diagnosis.search import refitted
+from diagnosis.search import much_left, pairs_of_effects, refitted
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
-from diagnosis.verdict import Verdict, judge, second_pays
+from diagnosis.verdict import COST_OF_EFFECT, Verdict, judge
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
@@ -41,8 +41,6 @@ _ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidenc
 _MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
 _FIRST_REPLICATES, _REPLICATES = 12, 32
 _RETRIED = 2  # best single effects whose nuisances the rig without effects is tried at
-_PAIRS = 2  # second effects that are refitted to the end
-_NEARLY_AS_GOOD = 1.3  # chi2 up to which the second best single effect gets a second one, too
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
@@ -65,19 +63,21 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
     retuned = fitter.retuned(described)
     point = nuisances.point(retuned.deviations, {})
-    floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2))
+    floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2), floor)
     fitter = Fitter(problem, floor, nuisances)
     retuned = fitter.retuned(retuned.deviations)
     left = differences(floor, problem, fitter.predicted(retuned.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
 
     tried = trials(problem)
-    singles = refitted(fitter, [(retuned, KNEE), (fitter.described(described), FAR_KNEE)], tried, jobs)
+    origins = [(retuned, KNEE)]
+    if much_left(retuned):  # then the effect is large, and may have pulled the refit into a valley of its own
+        origins.append((fitter.described(described), FAR_KNEE))
+    singles = refitted(fitter, origins, tried, jobs)
     pairs: list[Fit] = []
-    if singles and second_pays(retuned, singles[0]):
+    if singles and retuned.chi2 - singles[0].chi2 > COST_OF_EFFECT:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
-        for one in singles[: 1 + (len(singles) > 1 and singles[1].chi2 < _NEARLY_AS_GOOD * singles[0].chi2)]:
-            pairs += refitted(fitter, [(one, KNEE)], _others(tried, one), jobs, _PAIRS)
+        pairs = pairs_of_effects(fitter, retuned, singles, tried, jobs)
         singles = _again(fitter, singles, pairs)
     # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
     for one in singles[:_RETRIED]:
@@ -104,10 +104,6 @@ def _again(fitter: Fitter, singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
         if before is None or fit.chi2 < before.chi2:
             found[name,] = fit
     return sorted(found.values(), key=lambda fit: fit.chi2)
-
-
-def _others(tried: list[Trial], one: Fit) -> list[Trial]:
-    return [trial for trial in tried if not set(trial.form.effects) & set(one.form.effects)]
 
 
 def _roughness(problem: Problem, drawn: Floats) -> Roughness:

@@ -33,6 +33,9 @@ _LEVELS = 8  # bins of a segment without slips
 _BREAKAWAY_WAVES = 5
 _TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
 _DRIVE_WAVES = 24
+_RESOLVED_M2 = (
+    1e-18  # (1 nm)^2: a commanded position that was logged as measured has no noise but the rounding of its sums
+)
 
 
 class Feature(NamedTuple):
@@ -318,7 +321,7 @@ def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
     for wave, value in enumerate(waves.tolist(), start=1):
         found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
     fast = rest_m - uniform_filter1d(rest_m, 100)
-    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()))
+    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + _RESOLVED_M2)
 
 
 def _without_line(position_m: Floats, segment: Segment) -> Floats:

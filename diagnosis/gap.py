@@ -33,7 +33,7 @@ DEFINITION = (
 )
 KNEE = 6.0
 _LEAST_POWER = 1e-30
-_MISSING = 4.0  # floors, where the rig shows something that the model does not
+_MISSING = 8.0  # floors, where the rig shows something that the model does not: lacking a slip must not pay
 _FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
 CellKey = tuple[str, str, tuple[float, float], str]
 
@@ -75,8 +75,11 @@ def replicates(problem: Problem, point: Point, roughness: Roughness, count: int,
     return np.array(drawn)
 
 
-def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
-    """The floor from replicates of the model at `point`, [count, features]."""
+def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None = None) -> Floor:
+    """The floor from replicates of the model at `point`, [count, features].
+
+    What a floor `before` compared stays compared, with its scatter: a refit that loses the slips does not lose their features.
+    """
     labels = problem.labels
     powers = np.array([label.name in POWERS for _, label in labels])
     plain = problem.predicted(point)
@@ -91,6 +94,11 @@ def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
     spread *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
     least = np.array([_least(label, problem) for _, label in labels])
     scatter = np.hypot(spread, least)
+    lost = np.zeros_like(compared)
+    if before is not None:
+        lost = before.compared & ~compared
+        compared = compared | lost
+        bias, scatter = np.where(lost, before.bias, bias), np.where(lost, before.scatter, scatter)
     z = compress(about[:, compared] / scatter[compared])
     cells = tuple(
         (label.signal, label.regime, label.band_Hz, file)
@@ -98,10 +106,11 @@ def floor_of(problem: Problem, point: Point, drawn: Floats) -> Floor:
         if use
     )
     # the least scatter is as much a part of the floor as the drawn one: what of it the replicates do not show is added
-    promised = (least[compared] / scatter[compared]) ** 2
+    promised = np.where(lost, 1.0, least / scatter)[compared] ** 2
     # a run of its own differs from the mean of so many others by a little more than they do among themselves
     others = (len(drawn) + 1.0) / (len(drawn) - 1.0)
-    level = np.sqrt(others * np.mean([_cell_means(row * row, cells).mean() for row in z]))
+    squares = np.where(lost[compared], 1.0, z * z)
+    level = np.sqrt(others * np.mean([_cell_means(row, cells).mean() for row in squares]))
     return Floor(bias, powers, scatter, compared, _whitening(z, promised), cells, float(level))
 
 

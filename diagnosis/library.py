@@ -115,7 +115,8 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
         critical = static_N / slip_mps
         slip_s = 0.05
     length_s = max(len(run.commands.drive) for run in runs) * 1e-3
-    level = {"ratio": _Scale(0.1, False)}
+    # wide, so that the rig's number of the same name, which holds a part of it, goes back to where it was
+    level = {"ratio": _Scale(0.1, False, 3.0)}
     wave = {"ratio": _Scale(0.02, True, 1.5), "phase_rad": _Scale(1.0, False, 3.0)}
     table: dict[tuple[str, str], dict[str, _Scale]] = {
         ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)},

@@ -31,6 +31,7 @@ TOLERANCES: Mapping[str, float] = {  # relative, one standard deviation; a dampi
     "static_force_N": 0.03,
     "stribeck_velocity_mps": 0.10,
 }
+_MOST_DEVIATION = 3.0  # tolerances: what goes further is a gap
 _LEAST_STATIC = 1.02  # times the Coulomb force: below, nothing sticks
 _PAPER_STATIC_N = 17.38
 _FASTEST_BLOCK_HZ = 4000.0  # below, a block of 1 ms holds too few samples: faster ones are averaged
@@ -47,6 +48,8 @@ class Case(NamedTuple):
     leave_out: tuple[str, ...] = ()  # columns
     rate_Hz: float = 20_000.0  # a force-driven axis is sampled with its control, at 1 kHz
     drawn: bool = True  # False: the true parameters are the described ones
+    spread: float = 1.0  # times the tolerances; no parameter is drawn beyond three of them
+    rough: bool = True  # False: the same friction everywhere on the track
 
 
 def paper_rig() -> RigConfig:
@@ -136,7 +139,8 @@ def _draw_rig(random: np.random.Generator, described: RigConfig, table: RigTable
     for name, share in table.tolerance.items():
         value = true[name]
         if case.drawn and value is not None:
-            true[name] = value * max(1.0 + share * drawn.get(name, 0.0), 0.1)
+            deviation = min(max(case.spread * drawn.get(name, 0.0), -_MOST_DEVIATION), _MOST_DEVIATION)
+            true[name] = value * max(1.0 + share * deviation, 0.1)
     static_N, coulomb_N = true["static_force_N"] or 0.0, true["coulomb_force_N"] or 0.0
     contact: dict[str, Any] = described.contact.model_dump() | {
         "pair": "",
@@ -145,7 +149,7 @@ def _draw_rig(random: np.random.Generator, described: RigConfig, table: RigTable
         "coulomb_force_N": coulomb_N,
         "static_force_N": max(static_N, _LEAST_STATIC * coulomb_N) if case.drawn else static_N,
         "stribeck_velocity_mps": true["stribeck_velocity_mps"],
-        "roughness_ratio": random.uniform(0.001, 0.006),
+        "roughness_ratio": random.uniform(0.001, 0.006) * case.rough,
         "roughness_length_m": math.exp(random.uniform(math.log(5e-5), math.log(5e-4))),
         "roughness_seed": int(random.integers(0, 1_000_000)),
     }

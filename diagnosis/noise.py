@@ -56,6 +56,7 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
         quiet = speed <= np.quantile(speed, 0.3)
     pieces: dict[str, Floats] = {}
     shake: dict[str, float] = {}
+    quiet[:_WINDOW] = quiet[-_WINDOW:] = False  # at the ends the mean is one-sided: a ramp would leave spikes
     still = quiet & (commands.frequency_Hz == 0.0)
     for name, values in signals.items():
         if name.endswith("shake_mps2"):

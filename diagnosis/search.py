@@ -14,17 +14,23 @@ import numpy as np
 import numpy.typing as npt
 from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
 
+from diagnosis.gap import KNEE
 from diagnosis.library import Trial
 from diagnosis.refit import QUICK, Fit, Fitter, Form
 
 Floats = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 R = TypeVar("R")
-_QUICK = 8  # trials of either screening that get two steps of a refit
-_FULL = 3  # effects that are refitted to the end,
+_QUICK = 8  # trials of a screening that get two steps of a refit
+_FULL = 3  # single effects that are refitted to the end,
+_FULL_PAIRS = 2  # and pairs of effects,
 _WORTH_FULL = 0.2  # of the best one's gain, or they are too far behind to matter
 _FURTHEST = 8.0  # times the starting size that a screening may go
 _FURTHEST_TOLERANCES = 3.0
+_PAIRED = 3  # single effects that get a second one: the strongest of two need not fit best alone,
+_WORTH_PAIRING = 0.25  # if they close this share of what the best one closes
+_MUCH = 0.6  # of chi2 a compared feature; evidence without a gap leaves 0.15 to 0.5
+_LEAST_OF_SECOND = 15.0  # of chi2 that a second effect would take by its direction; less never pays
 
 
 class Screened(NamedTuple):
@@ -91,33 +97,63 @@ def _screen(fitter: Fitter, base: Fit, knee: float, directions: Directions, tria
     return Screened(added(base.form, trial.form), deviations, np.concatenate([moved[own:], w]), chi2)
 
 
-def refitted(
-    fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Trial], jobs: int = 1, most: int = _FULL
-) -> list[Fit]:
+def refitted(fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Trial], jobs: int = 1) -> list[Fit]:
     """The best fit of every effect that was worth one, each in its best form, best first.
 
     Args:
         fitter: of the fitted runs.
-        origins: fits to start from, each with the knee it was fitted under; the first is the one to improve on.
+        origins: fits of the rig without effects to start from, each with the knee it was fitted under; the first is the one to
+            improve on.
         trials: what to add.
         jobs: processes.
-        most: effects that are refitted to the end.
 
     """
     starts: list[Screened] = []
     for base, knee in origins:
-        shares = _each(jobs, _screened, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
-        starts += sorted(chain.from_iterable(shares), key=lambda one: one.chi2)[:_QUICK]
+        starts += _screened(fitter, base, knee, trials, jobs)[:_QUICK]
+    return _refitted(fitter, origins[0][0].chi2, starts, jobs, _FULL)
+
+
+def much_left(fit: Fit) -> bool:
+    """Whether a fit leaves more than a model that is right would."""
+    return fit.chi2 > _MUCH * len(fit.residual)
+
+
+def pairs_of_effects(fitter: Fitter, base: Fit, singles: list[Fit], trials: list[Trial], jobs: int = 1) -> list[Fit]:
+    """The best fits of two effects at once, best first; none where no second effect would take anything.
+
+    Args:
+        fitter: of the fitted runs.
+        base: the rig without effects.
+        singles: single effects, best first, at least one.
+        trials: what to add to them.
+        jobs: processes.
+
+    """
+    best = singles[0].chi2
+    firsts = singles[:1]
+    if much_left(singles[0]):
+        firsts = [one for one in singles[:_PAIRED] if base.chi2 - one.chi2 > _WORTH_PAIRING * (base.chi2 - best)]
+    starts: list[Screened] = []
+    for first in firsts:
+        others = [trial for trial in trials if not set(trial.form.effects) & set(first.form.effects)]
+        starts += _screened(fitter, first, KNEE, others, jobs)[:_QUICK]
+    worth = sorted((one for one in starts if one.chi2 < best - _LEAST_OF_SECOND), key=lambda one: one.chi2)
+    return _refitted(fitter, best, worth[:_QUICK], jobs, _FULL_PAIRS)
+
+
+def _refitted(fitter: Fitter, chi2: float, starts: list[Screened], jobs: int, most: int) -> list[Fit]:
+    """The starts refitted a little, and the best `most` effects or pairs that are worth it to the end."""
     quickly = sorted(_each(jobs, _quick, fitter, starts), key=lambda fit: fit.chi2)
     best = _best_of_each(quickly)
-    gain = origins[0][0].chi2 - best[0].chi2 if best else 0.0
-    worth = [fit for fit in best[:most] if origins[0][0].chi2 - fit.chi2 > _WORTH_FULL * gain]
-    names = {fit.form.effects for fit in worth}
+    gain = chi2 - best[0].chi2 if best else 0.0
+    worth = [fit for fit in best[:most] if chi2 - fit.chi2 > _WORTH_FULL * gain]
+    names = [set(fit.form.effects) for fit in worth]
     forms: list[Fit] = []
-    for effects in sorted(names):
-        forms += _best_of_each([fit for fit in quickly if fit.form.effects == effects], by_form=True)[:2]
+    for effects in names:
+        forms += _best_of_each([fit for fit in quickly if set(fit.form.effects) == effects], by_form=True)[:2]
     finished = _each(jobs, _full, fitter, forms)
-    finished += [fit for fit in best if fit.form.effects not in names]
+    finished += [fit for fit in best if set(fit.form.effects) not in names]
     return _best_of_each(sorted(finished, key=lambda fit: fit.chi2))
 
 
@@ -128,7 +164,13 @@ def _each(jobs: int, function: Callable[[Fitter, T], R], fitter: Fitter, items: 
     return results
 
 
-def _screened(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened]:
+def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs: int) -> list[Screened]:
+    """All trials that change anything, the most promising first."""
+    shares = _each(jobs, _screened_share, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
+    return sorted(chain.from_iterable(shares), key=lambda one: one.chi2)
+
+
+def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened]:
     base, knee, trials = work
     directions = Directions(base)
     return [one for trial in trials if (one := _screen(fitter, base, knee, directions, trial)) is not None]
@@ -144,10 +186,10 @@ def _full(fitter: Fitter, fit: Fit) -> Fit:
 
 def _best_of_each(fits: list[Fit], by_form: bool = False) -> list[Fit]:
     """The first fit of every effect, or of every form of it, in their order."""
-    seen: set[tuple[tuple[str, str], ...]] = set()
+    seen: set[frozenset[tuple[str, str]]] = set()
     result: list[Fit] = []
     for fit in fits:
-        key = tuple((name, form if by_form else "") for name, form in fit.form.forms.items())
+        key = frozenset((name, form if by_form else "") for name, form in fit.form.forms.items())
         if key not in seen:
             seen.add(key)
             result.append(fit)

@@ -21,10 +21,12 @@ Floats = npt.NDArray[np.floating[Any]]
 _PERFECT = 0.4
 # A gap that nothing explains, or that a second effect must explain, leaves more than no-gap evidence does: 0.25 to 0.75.
 _WORST_OF_NO_GAP = 0.8
+# What is beyond this counts against `none` in full: however wrong every model is, that there is a gap stays certain.
+_NEVER_WITHOUT_GAP = 1.2
 _CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise
-COST_OF_EFFECT = 12.0
+COST_OF_EFFECT = 8.0
 # Refits end in valleys that differ by this much of chi2: slips come and go as parameters move. Priors do not.
 JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
@@ -70,12 +72,6 @@ def occam(fit: Fit) -> float:
     return sum(math.log(axis.prior) for axis in fit.form.axes) - 0.5 * float(volume)
 
 
-def second_pays(base: Fit, first: Fit) -> bool:
-    """Whether enough is left by the best single effect to look for a second."""
-    left = first.chi2 - _WORST_OF_NO_GAP * len(base.residual)
-    return left > 0.05 * (base.chi2 - first.chi2)
-
-
 def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
     """The verdict over single effects and pairs of them, each list best first."""
     scale = misfit(base, [*singles, *pairs])
@@ -95,7 +91,8 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
             double = None
     best = double or (ranked[0] if ranked else None)
     beyond = max(base.chi2 - _WORST_OF_NO_GAP * len(base.residual), 0.0)
-    scores: dict[str, float] = {"none": COST_OF_EFFECT}
+    certain = max(base.chi2 - _NEVER_WITHOUT_GAP * len(base.residual), 0.0)
+    scores: dict[str, float] = {"none": COST_OF_EFFECT - 0.5 * certain / JITTER}
     scores["unexplained"] = 0.5 * _CLOSED_BY_UNKNOWN * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
     for one in ranked:
         scores[one.fit.form.effects[0]] = one.evidence

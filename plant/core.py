@@ -171,7 +171,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     v_lag += lag_share * (v_r - v_lag)
                     v_g = v_lag if p.lag_s > 0.0 else v_r
                     age_s = (age_s + dt) / (1.0 + math.fabs(v_r) / p.age_length_m * dt)
-                    F_c_now = F_c * friction
+                    F_c_now = F_c * friction * (1.0 + (p.kinetic_backward_ratio if v_r < 0.0 else 0.0))
                     F_s_now = F_s * friction
                     if p.age_growth_N != 0.0:
                         F_s_now += ageing_N(p, age_s) * friction

@@ -91,6 +91,7 @@ EFFECTS: Final[dict[str, Effect]] = {
             "both": Form(
                 "friction times 1 + ratio / 2 where v_r > 0, 1 - ratio / 2 where v_r < 0", (_ratio(0.1, -0.9, 0.9),)
             ),
+            "kinetic": Form("F_c alone times 1 + ratio where v_r < 0, F_s kept", (_ratio(0.1, -0.9, 0.9),)),
         },
     ),
     "normal-load-fluctuation": Effect(

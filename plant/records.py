@@ -36,6 +36,7 @@ PARAMS = np.dtype(
             # the effects of `plant.effects`, all 0 in the nominal rig
             *("age_growth_N", "age_scale_s", "age_exponent", "age_length_m", "lag_s", "quadratic_Ns2_per_m2"),
             *("position_ratio", "position_wavelength_m", "position_phase_rad", "forward_ratio", "backward_ratio"),
+            "kinetic_backward_ratio",
             *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_seed"),
             *("drift_per_s", "drift_ratio", "drift_settling_s"),
             *("roughness_ratio", "roughness_length_m", "roughness_seed", "elastic_ratio"),
@@ -60,6 +61,7 @@ PARAMS = np.dtype(
 # an effect that runs in the kernel is off while its switch is 0
 _SWITCHES = (
     *("age_growth_N", "lag_s", "quadratic_Ns2_per_m2", "position_ratio", "forward_ratio", "backward_ratio"),
+    "kinetic_backward_ratio",
     *("load_ratio", "drift_per_s", "drift_ratio", "roughness_ratio", "hardening_per_m2", "knee_ratio", "gap_m"),
     *("ripple_ratio", "frame_m_per_N", "base_m_per_N", "sag_ratio", "force_lag_s", "force_delay_s", "force_ratio"),
     *("force_bias_N", "force_drift_N_per_s", "force_drift_N", "mass_accel_ratio", "base_accel_ratio"),
@@ -171,9 +173,11 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.position_ratio, p.position_wavelength_m = value["ratio"], value["wavelength_m"]
         p.position_phase_rad = value["phase_rad"]
     elif name == "direction-dependent-friction":
-        both = form == "both"
-        p.forward_ratio = 0.5 * value["ratio"] if both else 0.0
-        p.backward_ratio = -0.5 * value["ratio"] if both else value["ratio"]
+        if form == "kinetic":
+            p.kinetic_backward_ratio = value["ratio"]
+        else:
+            p.forward_ratio = 0.5 * value["ratio"] if form == "both" else 0.0
+            p.backward_ratio = -0.5 * value["ratio"] if form == "both" else value["ratio"]
     elif name == "normal-load-fluctuation":
         p.load_ratio, p.load_frequency_Hz = value["ratio"], value["frequency_Hz"]
         p.load_phase_rad, p.load_seed = value.get("phase_rad", 0.0), value.get("seed", -1.0)

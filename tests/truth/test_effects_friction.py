@@ -29,7 +29,9 @@ def test_friction_along_the_track_is_a_sine():
 
 
 @pytest.mark.parametrize(
-    ("form", "forward", "backward"), [("backward", 1.0, 1.2), ("both", 1.1, 0.9)], ids=["backward", "both"]
+    ("form", "forward", "backward"),
+    [("backward", 1.0, 1.2), ("both", 1.1, 0.9), ("kinetic", 1.0, 1.2)],
+    ids=["backward", "both", "kinetic"],
 )
 def test_friction_differs_by_direction_also_after_a_reversal(form, forward, backward):
     """A force decelerates the heavy slide from 5 mm/s to -5 mm/s within 0.1 s."""
@@ -39,6 +41,18 @@ def test_friction_differs_by_direction_also_after_a_reversal(form, forward, back
     assert result.true_velocity_mps[-1] == pytest.approx(-FAST_MPS, rel=1e-3)
     assert result.true_friction_force_N[900] == pytest.approx(forward * CONTACT.coulomb_force_N, rel=1e-4)
     assert result.true_friction_force_N[-1] == pytest.approx(-backward * CONTACT.coulomb_force_N, rel=1e-4)
+
+
+def test_kinetic_friction_that_differs_by_direction_leaves_the_static_one():
+    """A drive of -1 mm/s on the paper's spring: the force breaks away at -F_s, and falls further with a smaller F_c."""
+    forces = {}
+    for ratio in (-0.2, 0.0):
+        effects = {"direction-dependent-friction": {"form": "kinetic", "ratio": ratio}} if ratio else {}
+        result = run(rig(effects), np.full(6000, -1e-3), {})
+        forces[ratio] = result.true_drive_force_N
+    assert forces[-0.2].min() == pytest.approx(forces[0.0].min(), rel=2e-3)
+    fall = {ratio: float(np.ptp(force_N[len(force_N) // 2 :])) for ratio, force_N in forces.items()}
+    assert fall[-0.2] > fall[0.0] + 4.0
 
 
 def test_a_load_that_swings_swings_friction():

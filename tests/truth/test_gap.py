@@ -14,7 +14,7 @@ from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
 from diagnosis.twin import Effects, Roughness
 from plant.effects import EFFECTS
-from tests.campaign.sizes import EFFECT_SIZES, Sizes
+from tests.blind.plant_sizes import EFFECT_SIZES, Sizes
 
 SURFACE = Roughness(0.003, 1.5e-4, 0)
 

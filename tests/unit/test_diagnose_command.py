@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
 from cockpit.cli import app
-from cockpit.diagnose_output import strict_json
 from diagnosis import many
+from diagnosis.strict_json import strict_json
 from tests import made_up
 
 

@@ -39,7 +39,7 @@ def test_every_name_is_there():
     [
         ("static-friction-ageing", ["log", "power"]),
         ("viscous-friction", ["linear", "quadratic"]),
-        ("direction-dependent-friction", ["backward", "both"]),
+        ("direction-dependent-friction", ["backward", "both", "kinetic"]),
         ("normal-load-fluctuation", ["sine", "random"]),
         ("friction-drift", ["linear", "settling"]),
         ("drive-hardening", ["cubic", "bilinear"]),

@@ -1,6 +1,5 @@
 """The public EMPS ball-screw axis: what its published rigid model leaves, found in the measured runs."""
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,45 +13,12 @@ from diagnosis.problem import Problem, prepare
 from diagnosis.refit import FAR_KNEE, Fitter
 from diagnosis.search import refitted
 from diagnosis.twin import Roughness
-
-EMPS = Path(__file__).parents[3] / "shared" / "data" / "emps"
-# friction, mass and viscous damping as published; what the paper does not give, as for a ball screw with seals
-MANIFEST = """
-format = "evidence/1"
-[rig]
-drive = "force"
-mass_kg = 95.1
-contact_stiffness_N_per_m = 2e6
-contact_damping_Ns_per_m = 2.76e4
-viscous_damping_Ns_per_m = 203.5
-coulomb_force_N = 20.4
-static_force_N = 22.4
-stribeck_velocity_mps = 0.003
-[rig.tolerance]
-mass_kg = 0.03
-contact_stiffness_N_per_m = 0.2
-contact_damping_Ns_per_m = 0.2
-viscous_damping_Ns_per_m = 0.1
-coulomb_force_N = 0.1
-static_force_N = 0.1
-stribeck_velocity_mps = 0.2
-[channels]
-t_s = { column = "t" }
-drive_force_N = { column = "vir", scale = 35.15 }
-mass_position_m = { column = "qm" }
-[[run]]
-file = "DATA_EMPS.mat"
-[[run]]
-file = "DATA_EMPS_PULSES.mat"
-holdout = true
-"""
+from tests.real.evidences import AXIS, MISSING, axis
 
 
-@pytest.mark.skipif(not EMPS.is_dir(), reason=f"needs the EMPS data set in {EMPS}")
+@pytest.mark.skipif(not AXIS.is_dir(), reason=MISSING)
 def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> None:
-    for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"):
-        shutil.copyfile(EMPS / name, tmp_path / name)
-    (tmp_path / "manifest.toml").write_text(MANIFEST)
+    axis(tmp_path)
     evidence = load_evidence(tmp_path)
     runs = prepare(evidence)
     nuisances = Nuisances(evidence.rig)

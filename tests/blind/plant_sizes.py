@@ -11,8 +11,6 @@ No resonance inside the band of the piezo is ever drawn.
 import math
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from plant.effects import EFFECTS
 
 TURN: Final = (0.0, 2.0 * math.pi)
@@ -28,15 +26,6 @@ class Sizes(NamedTuple):
     signs: tuple[float, ...] = (1.0,)
     log: dict[str, tuple[float, float]] = {}  # other parameters, log-uniform
     even: dict[str, tuple[float, float]] = {}  # other parameters, uniform
-
-
-class Drawn(NamedTuple):
-    """One effect of a case."""
-
-    name: str
-    numbers: dict[str, float | str]  # as in a rig file
-    size: float
-    size_share: float  # 0 barely visible, 1 large
 
 
 BOTH_SIGNS = (-1.0, 1.0)
@@ -60,6 +49,7 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
     "direction-dependent-friction": (
         Sizes("backward", "ratio", 0.01, 0.2, BOTH_SIGNS),
         Sizes("both", "ratio", 0.01, 0.2, BOTH_SIGNS),
+        Sizes("kinetic", "ratio", 0.01, 0.2, BOTH_SIGNS),
     ),
     "normal-load-fluctuation": (
         Sizes("sine", "ratio", 0.004, 0.08, log={"frequency_Hz": (0.3, 20.0)}, even={"phase_rad": TURN}),
@@ -123,25 +113,3 @@ def possible(drive: str, vibrated: bool) -> list[str]:
         names = [name for name in names if EFFECTS[name].acts_on != "piezo"]
     # an axis has no accelerometer in its files, and nothing that shakes with its base
     return [name for name in names if drive == "spring" or name not in {"accelerometer-gain", "base-compliance"}]
-
-
-def draw(random: np.random.Generator, name: str, vibrated: bool, least_share: float = 0.0) -> Drawn:
-    """Draw form, size, sign and everything else of an effect."""
-    # a base that does not move shows no gain of its sensor
-    forms = [sizes for sizes in EFFECT_SIZES[name] if vibrated or sizes.form != "base"]
-    sizes = forms[random.integers(len(forms))]
-    share = random.uniform(least_share, 1.0)
-    size = sizes.barely * (sizes.large / sizes.barely) ** share
-    numbers: dict[str, float | str] = {sizes.parameter: float(random.choice(sizes.signs)) * size}
-    if sizes.form:
-        numbers["form"] = sizes.form
-    for key, (low, high) in sizes.log.items():
-        numbers[key] = low * (high / low) ** random.random()
-    for key, (low, high) in sizes.even.items():
-        numbers[key] = random.uniform(low, high)
-    return Drawn(name, numbers, size, share)
-
-
-def size_of(name: str) -> tuple[str, ...]:
-    """Which parameter is the size, for every form."""
-    return tuple(dict.fromkeys(sizes.parameter for sizes in EFFECT_SIZES[name]))

@@ -1,0 +1,153 @@
+"""`stickslip blind ...`: make a set of rigs with sealed answers, diagnose it without them, open and score it."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Generator
+from contextlib import closing, contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.faults import Fault
+from cockpit.processes import guarded
+
+blind_app = typer.Typer(
+    help="How good is the diagnosis? Sealed cases made, diagnosed without the answers, scored.", no_args_is_help=True
+)
+SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `blind make` made.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")]
+Key = Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")]
+
+
+class Source(StrEnum):
+    """Where the rigs come from."""
+
+    independent = "independent"
+    plant = "plant"
+
+
+@blind_app.command("make")
+def blind_make(
+    cases: Annotated[int, typer.Option(help="How many; 200 or more tell something.")],
+    seed: Annotated[int, typer.Option(min=0, help="The same seed makes the same evidence, under other names.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The set: a new folder.")],
+    key: Key,
+    generator: Annotated[
+        Source, typer.Option(help="Formulas of their own, or those that the diagnosis itself tries.")
+    ] = Source.independent,
+    jobs: Jobs = None,
+) -> None:
+    """Make evidence folders whose names tell nothing, and a key with the answers (10 to 20 s a case and core)."""
+
+    def work() -> None:
+        from joblib import cpu_count
+
+        from cockpit.diagnose_output import watched
+
+        try:
+            from tests.blind.making import make_set
+        except ModuleNotFoundError as error:
+            if not (error.name or "").startswith("tests"):
+                raise
+            line = "blind make: the generators of cases are not installed; run it in a checkout of the source tree"
+            raise Fault("CONFIG", line) from None
+        _end_like_ctrl_c()
+        with _writing(), watched() as progress:
+            make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
+        print(f"{cases} cases    {out}\nkey         {key}\nnext        stickslip blind run {out}")
+
+    sys.exit(guarded(work))
+
+
+@blind_app.command("run")
+def blind_run(folder: SetArgument, jobs: Jobs = None) -> None:
+    """Diagnose every case that has no result yet, without the key. It can be stopped and taken up again."""
+
+    def work() -> None:
+        from joblib import cpu_count
+
+        from cockpit.diagnose_output import in_a_line, watched
+        from diagnosis.blind.running import missing, run
+
+        _end_like_ctrl_c()
+        todo = len(missing(folder))
+        began = time.monotonic()
+        with _writing(), watched() as progress, closing(run(folder, jobs or cpu_count())) as outcomes:
+            for done, outcome in enumerate(outcomes, 1):
+                left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
+                progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
+        print(f"all cases have results    {folder}\nnext    stickslip blind score {folder} --key KEY")
+
+    sys.exit(guarded(work))
+
+
+@blind_app.command("score")
+def blind_score(
+    folder: SetArgument,
+    key: Key,
+    as_json: Annotated[Path | None, typer.Option("--json", help="Write the scores here as JSON.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
+    baselines: Annotated[
+        bool, typer.Option("--baselines", help="Oracle and tree ensemble too: half a minute a case and core.")
+    ] = False,
+    partial: Annotated[bool, typer.Option("--partial", help="Score although results are missing.")] = False,
+    jobs: Jobs = None,
+) -> None:
+    """Check every hash, open the answers, score. A set that was opened once is development data from then on."""
+
+    def work() -> None:
+        from joblib import cpu_count
+
+        from cockpit.diagnose_output import watched
+        from diagnosis.blind.opening import open_set, scored
+        from diagnosis.blind.report import write_report
+        from diagnosis.blind.scoring import as_json as plain
+        from diagnosis.blind.table import table
+        from diagnosis.strict_json import write_json
+
+        _end_like_ctrl_c()
+        _check_writable("--json", as_json)
+        _check_writable("--report", report)
+        with _writing(), watched() as progress:
+            cases, sealed = open_set(folder, key, partial)
+            methods = scored(folder, cases, baselines, jobs or cpu_count(), progress)
+        print(table(methods, sealed))
+        with _writing():
+            if as_json is not None:
+                write_json(as_json, {"format": "blind-scores/1", "sealed": sealed, "methods": plain(methods)})
+            if report is not None:
+                write_report(methods, sealed, folder.name, report)
+                print(f"\nreport     {report}")
+
+    sys.exit(guarded(work))
+
+
+def _end_like_ctrl_c() -> None:
+    """Killed politely is like Ctrl-C: the workers end too."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def _check_writable(option: str, path: Path | None) -> None:
+    """Refuse before the answers are opened what could not be written afterwards. Raises Fault."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")
+    above = next(parent for parent in path.absolute().parents if parent.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {above} does not allow it; choose another")
+
+
+@contextmanager
+def _writing() -> Generator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        line = f"{error.filename}: cannot be written: {error.strerror}; choose another place or free space"
+        raise Fault("LOG_WRITE", line) from None

@@ -1,0 +1,85 @@
+"""Simpler methods, answering from what the diagnosis has computed: each turns a result into what it would have said itself."""
+
+import math
+from typing import Any
+
+from diagnosis.blind.outcomes import Opened
+
+Said = dict[str, Any]
+_NO_GAP = 1.25  # of the gap: rigs without one are left with 0.9 to 1.2 on the held-out run
+PARAMETERS, FLEXIBLE = "parameters alone", "flexible residual"
+
+
+def parameters_only(case: Opened) -> Opened:
+    """Tuning, as most do it: what is left of the gap is there, and nobody says what it is."""
+    retuned = case.said["gap"].get("retuned")
+    gap = retuned is not None and retuned > _NO_GAP
+    return _saying(case, {"unexplained" if gap else "none": 1.0}, _closed(case, PARAMETERS))
+
+
+def flexible_residual(case: Opened) -> Opened:
+    """A blend of everything, which closes what it can and names nothing."""
+    retuned = case.said["gap"].get("retuned")
+    gap = retuned is not None and retuned > _NO_GAP
+    return _saying(case, {"unexplained" if gap else "none": 1.0}, _closed(case, FLEXIBLE))
+
+
+def lowest_bic(case: Opened) -> Opened:
+    """The single effect, or none, with the lowest Bayesian information criterion: chi2 + parameters x ln(features).
+
+    It knows no `unexplained`. A candidate that was not refitted is out.
+    """
+    features = case.said.get("compared_features") or 0
+    values = {
+        one["effect"]: one["chi2"] + len(one.get("parameters", {})) * math.log(features)
+        for one in case.said["candidates"]
+        if one.get("chi2") is not None and features > 0
+    }
+    if not values:
+        return _saying(case, {}, None)
+    least = min(values.values())
+    weights = {name: math.exp(-0.5 * (value - least)) for name, value in values.items()}
+    total = sum(weights.values())
+    probabilities = {name: weight / total for name, weight in weights.items()}
+    return _saying(case, probabilities, _closed(case, max(probabilities, key=lambda name: probabilities[name])))
+
+
+def told(case: Opened, shrinkage: float | None) -> Opened:
+    """Somebody who knows the answer: what names and probabilities are worth at most."""
+    said = {
+        "verdict": case.answer["verdict"],
+        "effects": sorted(case.truth) if case.answer["verdict"] == "effect" else [],
+        "candidates": [{"effect": name, "probability": 1.0} for name in sorted(case.truth) or ["none"]],
+        "not_distinguishable": [case.answer["group"]],
+        "where": [],
+        "gap": {"shrinkage": shrinkage, "interval_90": None},
+        "next_experiment": {},
+    }
+    if case.right_candidate is not None:
+        said["candidates"] = [{"effect": case.right_candidate, "probability": 1.0}]
+    return Opened(case.name, case.answer, said)
+
+
+def from_probabilities(case: Opened, probabilities: dict[str, float]) -> Opened:
+    """Any classifier: the most probable is what it says."""
+    return _saying(case, probabilities, None)
+
+
+def _closed(case: Opened, who: str) -> Said | None:
+    return next((one for one in case.said["gap"].get("compared", []) if one["who"] == who), None)
+
+
+def _saying(case: Opened, probabilities: dict[str, float], closed: Said | None) -> Opened:
+    top = max(probabilities, key=lambda name: probabilities[name], default="fault")
+    verdict = {"none": "no-gap", "unexplained": "unexplained", "fault": "fault"}.get(top, "effect")
+    gap = {key: (closed or {}).get(key) for key in ("shrinkage", "interval_90")}
+    said = {
+        "verdict": verdict,
+        "effects": [top] if verdict == "effect" else [],
+        "candidates": [{"effect": name, "probability": share} for name, share in probabilities.items()],
+        "not_distinguishable": [],
+        "where": [],
+        "gap": gap,
+        "next_experiment": {},
+    }
+    return Opened(case.name, case.answer, said)

@@ -1,0 +1,70 @@
+"""Whether the probabilities mean what they say."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.blind.intervals import Score, bootstrapped, mean, rate
+from diagnosis.blind.outcomes import Opened
+
+_BINS = 10
+_FEWEST_IN_BIN = 10
+_LEAST_PROBABILITY = 1e-6  # a single certain mistake must not be the whole log score
+
+
+class Bin(NamedTuple):
+    """Cases whose leading candidate was about as probable."""
+
+    probability: float  # mean
+    right: Score
+
+
+def judged(cases: Sequence[Opened]) -> list[tuple[float, bool]]:
+    """Probability of the leading candidate and whether it is the right one, of every case with one right answer."""
+    found: list[tuple[float, bool]] = []
+    for case in cases:
+        if case.right_candidate is not None and case.ranked:
+            name, probability = case.ranked[0]
+            found.append((probability, name == case.right_candidate))
+    return found
+
+
+def reliability(pairs: Sequence[tuple[float, bool]]) -> list[Bin]:
+    """Bins of equally many cases, by probability."""
+    bins: list[Bin] = []
+    for some in _split(pairs):
+        right = rate([hit for _, hit in some])
+        assert right is not None, "no bin is empty"  # noqa: S101
+        bins.append(Bin(sum(probability for probability, _ in some) / len(some), right))
+    return bins
+
+
+def calibration_error(pairs: Sequence[tuple[float, bool]]) -> Score | None:
+    """Mean over the cases of how far the rate of right ones in their bin is from the mean probability in it."""
+    return bootstrapped(pairs, _error)
+
+
+def log_score(cases: Sequence[Opened]) -> Score | None:
+    """Mean logarithm of the probability of the right candidate, over every case with one right answer; 0 is perfect."""
+    return mean(
+        [
+            math.log(max(case.probability(case.right_candidate), _LEAST_PROBABILITY))
+            for case in cases
+            if case.right_candidate is not None
+        ]
+    )
+
+
+def _error(pairs: Sequence[tuple[float, bool]]) -> float:
+    apart = 0.0
+    for some in _split(pairs):
+        apart += abs(sum(probability - hit for probability, hit in some))
+    return apart / len(pairs)
+
+
+def _split(pairs: Sequence[tuple[float, bool]]) -> list[list[tuple[float, bool]]]:
+    ordered = sorted(pairs)
+    count = max(1, min(_BINS, len(ordered) // _FEWEST_IN_BIN))
+    return [[ordered[i] for i in rows] for rows in np.array_split(np.arange(len(ordered)), count) if len(rows)]

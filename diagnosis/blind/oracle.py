@@ -1,0 +1,92 @@
+"""The oracle: told which effects are there, how much of the held-out gap does the library close with them?
+
+Its formulas are the library's, not those of the case, so it closes less than everything. What was computed is kept beside the
+set, since it takes half a minute a case.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
+
+from diagnosis.blind.outcomes import Opened
+from diagnosis.blind.scoring import Oracle
+from diagnosis.evidence import load_evidence
+from diagnosis.gap import KNEE, floor_of, replicates
+from diagnosis.heldout import HeldOut
+from diagnosis.library import trials
+from diagnosis.nuisance import Nuisances
+from diagnosis.problem import Problem, prepare
+from diagnosis.refit import FAR_KNEE, Fit, Fitter
+from diagnosis.search import refitted
+from diagnosis.strict_json import write_json
+from diagnosis.twin import Roughness
+
+Progress = Callable[[str, float], None]
+KEPT = "oracle"
+_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)
+_REPLICATES = 24
+
+
+def oracle(folder: Path, cases: list[Opened], jobs: int, progress: Progress) -> Oracle:
+    """Shrinkage of the true effects of every case with effects of the library, by case. Raises OSError."""
+    found: Oracle = {}
+    todo: list[Opened] = []
+    for case in cases:
+        if case.answer["verdict"] != "effect":
+            continue
+        path = folder / KEPT / f"{case.name}.json"
+        if path.is_file():
+            found[case.name] = json.loads(path.read_text(encoding="utf-8"))["shrinkage"]
+        else:
+            todo.append(case)
+    tasks = (delayed(_one)(folder / case.name, case.name, sorted(case.truth)) for case in todo)
+    done: Any = Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
+    for number, (name, shrinkage) in enumerate(done, 1):
+        found[name] = shrinkage
+        write_json(folder / KEPT / f"{name}.json", {"shrinkage": shrinkage})
+        progress(f"oracle: {number} of {len(todo)}", number / len(todo))
+    return found
+
+
+def _one(folder: Path, name: str, effects: list[str]) -> tuple[str, float | None]:
+    shrinkage = shrinkage_with(folder, effects)
+    return name, shrinkage if shrinkage is not None and math.isfinite(shrinkage) else None
+
+
+def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
+    """How much of the held-out gap an evidence's named effects close; None where there is no gap, or no way to try them."""
+    evidence = load_evidence(folder)
+    runs = prepare(evidence)
+    problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
+    nuisances = Nuisances(evidence.rig)
+    described = np.zeros(len(nuisances))
+    point = nuisances.point(described, {})
+    fitter = Fitter(
+        problem, floor_of(problem, point, replicates(problem, point, _ROUGHNESS, _REPLICATES, 1)), nuisances
+    )
+    retuned = fitter.retuned(described)
+    point = nuisances.point(retuned.deviations, {})
+    fitter = Fitter(
+        problem, floor_of(problem, point, replicates(problem, point, _ROUGHNESS, _REPLICATES, 2)), nuisances
+    )
+    retuned = fitter.retuned(retuned.deviations)
+    tried = trials(problem)
+    best: Fit = retuned
+    for effect in effects:  # one after the other, each on top of those before it
+        own = [trial for trial in tried if trial.form.effects == (effect,)]
+        origins = [(best, KNEE)]
+        if best is retuned:
+            origins.append((fitter.described(described), FAR_KNEE))
+        found = refitted(fitter, origins, own)
+        if not found:
+            return None
+        best = found[0]
+    held_out = HeldOut(
+        Problem(evidence.rig, [run for run in runs if run.holdout]), nuisances, best, retuned, _ROUGHNESS
+    )
+    return held_out.closed_by(best).shrinkage

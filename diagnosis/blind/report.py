@@ -1,0 +1,87 @@
+"""The scores as one HTML file that needs nothing from the network."""
+
+import base64
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from diagnosis.blind.scoring import Scores
+from diagnosis.blind.table import TOOL, headline, rows, table, with_interval
+from diagnosis.report import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DPI = 110.0
+
+
+def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path) -> None:
+    """Write the page. Raises OSError."""
+    from jinja2 import Environment, StrictUndefined  # noqa: PLC0415
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = Path(__file__).with_name("report.html.j2").read_text(encoding="utf-8")
+    tool = methods[TOOL]
+    page = environment.from_string(template).render(
+        name=name,
+        headline=headline(tool, sealed),
+        methods=list(methods),
+        rows=[row for row in rows(methods) if any(one is not None for one in row.scores)],
+        with_interval=with_interval,
+        pictures=[
+            ("Does 80 % mean 80 %?", _png(_reliability(tool))),
+            ("What was said instead", _png(_confusions(tool))),
+        ],
+        text=table(methods, sealed),
+    )
+    write_whole(path, page)
+
+
+def _reliability(scores: Scores) -> "Figure":
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(5.0, 4.2), layout="constrained")
+    axis = figure.subplots()
+    axis.plot([0, 1], [0, 1], color="#808b96", linewidth=1.0, linestyle=":")
+    for one in scores.reliability:
+        low, high = one.right.value - one.right.low, one.right.high - one.right.value
+        axis.errorbar(
+            one.probability,
+            one.right.value,
+            yerr=[[max(low, 0.0)], [max(high, 0.0)]],
+            fmt="o",
+            color="#2471a3",
+            capsize=3,
+        )
+        axis.annotate(f" {one.right.n}", (one.probability, one.right.value), fontsize=8)
+    axis.set(xlabel="probability of the leading candidate", ylabel="how often it is right", xlim=(0, 1), ylim=(0, 1))
+    axis.grid(alpha=0.25)
+    return figure
+
+
+def _confusions(scores: Scores) -> "Figure":
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    there = sorted({one for one, _, _ in scores.confusions})
+    said = sorted({one for _, one, _ in scores.confusions})
+    counts = np.zeros((len(there), len(said)))
+    for one, other, count in scores.confusions:
+        counts[there.index(one), said.index(other)] = count
+    figure = Figure(figsize=(3.5 + 0.3 * len(said), 2.5 + 0.25 * len(there)), layout="constrained")
+    axis = figure.subplots()
+    if there:
+        axis.imshow(counts, cmap="Blues", vmin=0.0, aspect="auto")
+        axis.set_xticks(range(len(said)), said, rotation=90, fontsize=7)
+        axis.set_yticks(range(len(there)), there, fontsize=7)
+        for row, column in np.argwhere(counts > 0):
+            axis.text(column, row, f"{counts[row, column]:.0f}", ha="center", va="center", fontsize=7)
+    axis.set(xlabel="said", ylabel="there")
+    return figure
+
+
+def _png(figure: "Figure") -> str:
+    memory = io.BytesIO()
+    figure.savefig(memory, format="png", dpi=_DPI)
+    return base64.b64encode(memory.getvalue()).decode()

@@ -1,0 +1,51 @@
+"""Every case of a sealed set diagnosed by the product itself, without the key. What has a result is not done again."""
+
+import json
+from collections.abc import Generator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from diagnosis import many
+from diagnosis.blind.sealing import RESULTS, read_set
+from diagnosis.many import Outcome, Source
+from diagnosis.result import to_json
+from diagnosis.strict_json import write_json
+
+FAULT_FORMAT = "fault/1"
+
+
+def missing(folder: Path) -> list[str]:
+    """Cases of a set without a result. Raises Fault BAD_SET."""
+    return [name for name in read_set(folder) if not result_file(folder, name).is_file()]
+
+
+def result_file(folder: Path, case: str) -> Path:
+    """Where the result of a case is."""
+    return folder / RESULTS / f"{case}.json"
+
+
+def run(folder: Path, jobs: int) -> Generator[Outcome]:
+    """Diagnose what has no result yet, one core a case and `jobs` at a time; yield each when its result is written.
+
+    A case that ends in a fault has that as its result. Closing the generator ends the workers; what is written stays.
+    Raises Fault BAD_SET, and OSError where a result cannot be written.
+    """
+    sources = [Source(name, folder / name) for name in missing(folder)]
+    with closing(many.diagnose_many(sources, jobs, "", many.real_diagnose)) as outcomes:
+        for outcome in outcomes:
+            write_json(result_file(folder, outcome.source.name), _as_json(outcome))
+            yield outcome
+
+
+def _as_json(outcome: Outcome) -> dict[str, Any]:
+    if outcome.diagnosis is not None:
+        return to_json(outcome.diagnosis)
+    code, line = outcome.fault or ("", "")
+    return {"format": FAULT_FORMAT, "fault": code, "line": line}
+
+
+def results(folder: Path, cases: list[str]) -> dict[str, dict[str, Any]]:
+    """The results that are there, by case."""
+    found = {name: result_file(folder, name) for name in cases}
+    return {name: json.loads(path.read_text(encoding="utf-8")) for name, path in found.items() if path.is_file()}

@@ -1,0 +1,212 @@
+"""All scores of one method over one opened set. Rates have Wilson's 95 % interval, everything else the bootstrap's."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+from diagnosis.blind.calibration import Bin, calibration_error, judged, log_score, reliability
+from diagnosis.blind.intervals import Score, mean, rate, ratio
+from diagnosis.blind.locating import f1
+from diagnosis.blind.outcomes import OTHER_NAMES, SENSOR_NAMES, Opened
+
+_SURE = 0.8
+_VISIBLE = 2.0  # detection limits
+_DETECTABILITIES = (0.0, 1.0, 2.0, 4.0, math.inf)
+_LEAST_SHRINKAGE = 0.1  # of the oracle: where even the truth closes less there is nothing to compare
+
+Oracle = dict[str, float | None]  # by case: shrinkage with the true effects
+
+
+class Singles(NamedTuple):
+    """Scores of cases with one effect of the library."""
+
+    alarm: Score | None
+    top_1: Score | None
+    top_3: Score | None
+    in_group: Score | None
+    group_size: Score | None
+    wrong: Score | None  # something was named, and the truth is not in its group
+
+
+class Unclear(NamedTuple):
+    """Scores of cases whose channels cannot tell a group of effects apart."""
+
+    in_group: Score | None  # the true one is named, or said to be not told from what is named
+    group_told: Score | None  # two or more of those that cannot be told apart are given together
+    experiment: Score | None  # and an experiment that would separate the leading explanations
+
+
+class Scores(NamedTuple):
+    """What a method amounts to."""
+
+    cases: int
+    faults: int
+    visible: Singles  # of 2 detection limits or more
+    singles: Singles
+    by_detectability: dict[str, Singles]
+    by_effect: dict[str, Singles]
+    by_backbone: dict[str, Singles]
+    false_alarms: Score | None
+    false_alarms_wide: Score | None  # of rigs whose numbers were drawn as far off as they may be
+    outside_caught: Score | None  # unexplained
+    outside_named: Score | None
+    sure_of_wrong_name: Score | None  # an effect that is not there has more than 0.8
+    sure_of_wrong_answer: Score | None  # anything but the right candidate has, none and unexplained included
+    named_wrong: Score | None
+    pair_f1: Score | None
+    pair_exact: Score | None
+    pair_one_right: Score | None
+    unclear: Unclear
+    real_logs: Singles  # sensor faults put into measured logs, whose own gaps nobody knows
+    log_score: Score | None
+    calibration_error: Score | None
+    reliability: tuple[Bin, ...]
+    sensor_or_physics: Score | None
+    locating_f1: Score | None
+    shrinkage: Score | None
+    shrinkage_of_oracle: Score | None
+    interval_coverage: Score | None
+    seconds: Score | None
+    confusions: tuple[tuple[str, str, int], ...]  # there, said, how often
+
+
+def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
+    """Score a method; `oracle` may be empty."""
+    single = [case for case in cases if case.stratum == "one-effect"]
+    no_gap = [case for case in cases if case.stratum == "no-gap"]
+    outside = [case for case in cases if case.stratum == "outside"]
+    pair = [case for case in cases if case.stratum == "two-effects"]
+    unclear = [case for case in cases if case.stratum == "indistinguishable"]
+    one_right = [case for case in cases if case.right_candidate is not None]
+    visible = [case for case in single if case.detectability >= _VISIBLE]
+    pairs = judged(cases)
+    named_one = [case for case in single if case.named]
+    located = [f1(case) for case in (*single, *pair, *outside)]
+    shrunk = [value for case in (*single, *pair) if (value := case.said["gap"].get("shrinkage")) is not None]
+    seconds = [case.said["elapsed_s"] for case in cases if "elapsed_s" in case.said]
+    return Scores(
+        cases=len(cases),
+        faults=sum(case.verdict == "fault" for case in cases),
+        visible=of_singles(visible),
+        singles=of_singles(single),
+        by_detectability=_by_detectability(single),
+        by_effect={
+            name: of_singles([case for case in single if name in case.truth])
+            for name in sorted({name for case in single for name in case.truth})
+        },
+        by_backbone={
+            name: of_singles([case for case in visible if case.answer["backbone"] == name])
+            for name in sorted({case.answer["backbone"] for case in visible if case.answer["backbone"]})
+        },
+        false_alarms=rate([case.verdict != "no-gap" for case in no_gap]),
+        false_alarms_wide=rate([case.verdict != "no-gap" for case in no_gap if case.answer["tolerances"] > 1.0]),
+        outside_caught=rate([case.verdict == "unexplained" for case in outside]),
+        outside_named=rate([bool(case.named) for case in outside]),
+        sure_of_wrong_name=rate([_sure_of(case, effects_only=True) for case in one_right]),
+        sure_of_wrong_answer=rate([_sure_of(case, effects_only=False) for case in one_right]),
+        named_wrong=rate([bool(case.group) and not (case.truth & case.group) for case in one_right]),
+        pair_f1=mean([case.set_f1 for case in pair]),
+        pair_exact=rate([case.named == case.truth for case in pair]),
+        pair_one_right=rate([bool(case.named & case.truth) for case in pair]),
+        unclear=Unclear(
+            rate([bool(case.truth & case.group) for case in unclear]),
+            rate([len(case.group & set(case.answer["group"])) > 1 for case in unclear]),
+            rate([case.said["next_experiment"].get("gain") is not None for case in unclear]),
+        ),
+        real_logs=of_singles([case for case in cases if case.stratum == "real-log"]),
+        log_score=log_score(cases),
+        calibration_error=calibration_error(pairs),
+        reliability=tuple(reliability(pairs)),
+        sensor_or_physics=rate([_class(case.named) == _class(case.truth) for case in named_one]),
+        locating_f1=mean([value for value in located if value is not None]),
+        shrinkage=mean(shrunk),
+        shrinkage_of_oracle=_of_oracle(single, oracle),
+        interval_coverage=_coverage(single, oracle),
+        seconds=mean(seconds),
+        confusions=_confusions(cases),
+    )
+
+
+def of_singles(cases: Sequence[Opened]) -> Singles:
+    """The scores of cases with one effect."""
+    return Singles(
+        alarm=rate([case.verdict in {"effect", "unexplained"} for case in cases]),
+        top_1=rate([frozenset(name for name, _ in case.ranked[:1]) == case.truth for case in cases]),
+        top_3=rate([case.truth <= {name for name, _ in case.ranked[:3]} for case in cases]),
+        in_group=rate([case.truth <= case.group for case in cases]),
+        group_size=mean([float(len(case.group)) for case in cases if case.named]),
+        wrong=rate([bool(case.group) and not case.truth <= case.group for case in cases]),
+    )
+
+
+def _by_detectability(cases: Sequence[Opened]) -> dict[str, Singles]:
+    found: dict[str, Singles] = {}
+    for low, high in pairwise(_DETECTABILITIES):
+        some = [case for case in cases if low <= case.detectability < high]
+        if some:
+            found[f"{low:g} to {high:g}" if math.isfinite(high) else f"{low:g} and more"] = of_singles(some)
+    return found
+
+
+def _sure_of(case: Opened, effects_only: bool) -> bool:
+    right = case.truth if effects_only else {case.right_candidate}
+    return any(
+        probability > _SURE and name not in right and not (effects_only and name in OTHER_NAMES)
+        for name, probability in case.ranked
+    )
+
+
+def _class(names: frozenset[str]) -> frozenset[bool]:
+    return frozenset(name in SENSOR_NAMES for name in names)
+
+
+def _of_oracle(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
+    """Of the gap that the true effect closes, the part that was closed; naming nothing closes nothing."""
+    return ratio(
+        [
+            (case.said["gap"].get("shrinkage") or 0.0, best)
+            for case in cases
+            if (best := oracle.get(case.name)) is not None and best > _LEAST_SHRINKAGE
+        ]
+    )
+
+
+def _coverage(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
+    """How often the 90 % interval of the shrinkage holds what the true effect closes.
+
+    Parameters cannot be compared, since the true formula is another one.
+    """
+    held: list[bool] = []
+    for case in cases:
+        interval, best = case.said["gap"].get("interval_90"), oracle.get(case.name)
+        if interval is not None and best is not None:
+            held.append(interval[0] <= best <= interval[1])
+    return rate(held)
+
+
+def _confusions(cases: Sequence[Opened]) -> tuple[tuple[str, str, int], ...]:
+    found: Counter[tuple[str, str]] = Counter()
+    for case in cases:
+        said = "+".join(sorted(case.named)) or case.verdict
+        there = "+".join(sorted(case.truth)) or "no-gap"
+        right = (
+            case.named == case.truth if case.answer["verdict"] == "effect" else case.verdict == case.answer["verdict"]
+        )
+        if case.stratum == "indistinguishable":
+            right = bool(case.truth & case.group)
+        if not right:
+            found[there, said] += 1
+    return tuple((there, said, count) for (there, said), count in found.most_common())
+
+
+def as_json(value: Any) -> Any:
+    """Scores as JSON: every named tuple an object."""
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        return {key: as_json(inner) for key, inner in value._asdict().items()}  # pyright: ignore[reportAttributeAccessIssue]
+    if isinstance(value, dict):
+        return {key: as_json(inner) for key, inner in value.items()}
+    if isinstance(value, tuple | list):
+        return [as_json(inner) for inner in value]
+    return value

@@ -1,0 +1,114 @@
+"""The scores as text: the answer first, then every score of every method, then where it goes wrong."""
+
+from typing import NamedTuple
+
+from diagnosis.blind.intervals import Score
+from diagnosis.blind.scoring import Scores, Singles
+
+TOOL = "diagnosis"
+_CONFUSIONS = 30
+
+
+class Row(NamedTuple):
+    """One score: of what, the bar it should pass, and of each method."""
+
+    name: str
+    bar: str
+    scores: tuple[Score | None, ...]
+
+
+def headline(scores: Scores, sealed: bool) -> str:
+    """The answer in one sentence."""
+    kind = "sealed set, opened once" if sealed else "DEVELOPMENT DATA: results were made after the answers were opened"
+    return (
+        f"{scores.cases} cases ({kind}): right effect first in {_percent(scores.visible.top_1)} of the visible single "
+        f"effects, false alarms {_percent(scores.false_alarms)}, sure of a wrong name {_percent(scores.sure_of_wrong_name)}"
+    )
+
+
+def rows(methods: dict[str, Scores]) -> list[Row]:
+    """All scores, one row each."""
+    every = tuple(methods.values())
+
+    def row(name: str, bar: str, of: list[Score | None]) -> Row:
+        return Row(name, bar, tuple(of))
+
+    return [
+        row("top-1, 2 limits or more", ">= 0.85", [one.visible.top_1 for one in every]),
+        row("top-3, 2 limits or more", ">= 0.97", [one.visible.top_3 for one in every]),
+        row("truth in the named group, same", ">= 0.95", [one.visible.in_group for one in every]),
+        row("mean group size, same", "<= 1.5", [one.visible.group_size for one in every]),
+        row("top-1, any size", "", [one.singles.top_1 for one in every]),
+        row("top-3, any size", "", [one.singles.top_3 for one in every]),
+        row("truth in the named group, same", "", [one.singles.in_group for one in every]),
+        row("false alarms", "<= 0.05", [one.false_alarms for one in every]),
+        row("  numbers as far off as may be", "", [one.false_alarms_wide for one in every]),
+        row("outside caught", ">= 0.80", [one.outside_caught for one in every]),
+        row("  outside, but an effect named", "", [one.outside_named for one in every]),
+        row("sure of a wrong name", "<= 0.05", [one.sure_of_wrong_name for one in every]),
+        row("sure of any wrong answer", "", [one.sure_of_wrong_answer for one in every]),
+        row("named, truth not in the group", "", [one.named_wrong for one in every]),
+        row("two effects: set F1", ">= 0.85", [one.pair_f1 for one in every]),
+        row("  both named, nothing else", "", [one.pair_exact for one in every]),
+        row("  one right at least", "", [one.pair_one_right for one in every]),
+        row("cannot be told: truth in group", "", [one.unclear.in_group for one in every]),
+        row("  two or more of them given", "", [one.unclear.group_told for one in every]),
+        row("  experiment that would tell", "", [one.unclear.experiment for one in every]),
+        row("fault in a real log: top-1", "", [one.real_logs.top_1 for one in every]),
+        row("  truth in the named group", "", [one.real_logs.in_group for one in every]),
+        row("log score", "", [one.log_score for one in every]),
+        row("calibration error", "<= 0.05", [one.calibration_error for one in every]),
+        row("sensor or physics", "", [one.sensor_or_physics for one in every]),
+        row("localisation F1", "", [one.locating_f1 for one in every]),
+        row("held-out shrinkage", "", [one.shrinkage for one in every]),
+        row("  of the oracle's", ">= 0.95", [one.shrinkage_of_oracle for one in every]),
+        row("  90 % intervals holding it", "0.85-0.95", [one.interval_coverage for one in every]),
+        row("seconds a case", "", [one.seconds for one in every]),
+    ]
+
+
+def table(methods: dict[str, Scores], sealed: bool) -> str:
+    """Everything for a person; the first method is the one that is judged, the others are for comparison."""
+    tool = next(iter(methods.values()))
+    lines = [headline(tool, sealed)]
+    if tool.faults:
+        lines.append(f"{tool.faults} cases ended in a fault and count as wrong")
+    others = list(methods)[1:]
+    lines += ["", f"{'':32} {'bar':>9}  {TOOL:26}" + "".join(f" {name:>12}" for name in others)]
+    for row in rows(methods):
+        if any(one is not None for one in row.scores):
+            cells = "".join(f" {_value(one):>12}" for one in row.scores[1:])
+            lines.append(f"{row.name:32} {row.bar:>9}  {with_interval(row.scores[0]):26}{cells}".rstrip())
+    for title, part in (
+        ("by detectability, in limits", tool.by_detectability),
+        ("by friction law, 2 limits or more", tool.by_backbone),
+        ("by effect, any size", tool.by_effect),
+    ):
+        if part:
+            lines += ["", f"{title:32}    n  alarm  top-1  top-3  group   size  wrong"]
+            lines += [_line(name, singles) for name, singles in part.items()]
+    if tool.confusions:
+        lines += ["", "said instead:"]
+        lines += [f"  {count:3} x {there} -> {said}" for there, said, count in tool.confusions[:_CONFUSIONS]]
+    return "\n".join(lines)
+
+
+def with_interval(score: Score | None) -> str:
+    """A score for people."""
+    return "-" if score is None else f"{score.value:.2f} ({score.low:.2f} to {score.high:.2f}) n {score.n}"
+
+
+def _line(name: str, singles: Singles) -> str:
+    n = singles.alarm.n if singles.alarm else 0
+    parts = (singles.alarm, singles.top_1, singles.top_3, singles.in_group, singles.group_size, singles.wrong)
+    return f"{name:32} {n:4}" + "".join(f" {_value(one):>6}" for one in parts)
+
+
+def _value(score: Score | None) -> str:
+    return "-" if score is None else f"{score.value:.2f}"
+
+
+def _percent(score: Score | None) -> str:
+    if score is None:
+        return "-"
+    return f"{100 * score.value:.0f} % ({100 * score.low:.0f} to {100 * score.high:.0f})"

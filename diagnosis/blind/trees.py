@@ -1,0 +1,125 @@
+"""A tree ensemble on the same features: what a classifier makes of them that never refits anything.
+
+It is trained on rough and noisy replicates of the twin with the nuisances and the effects of the library drawn at random, under
+the commands of some evidences of the set. A feature is its distance from the described rig, in floors, compressed; those of
+different evidences are matched by name. It knows `none`, and `unexplained` not.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
+
+from bridge.faults import Fault
+from diagnosis.evidence import load_evidence
+from diagnosis.gap import Floor, compress, floor_of, replicates
+from diagnosis.library import Trial, trials
+from diagnosis.nuisance import Nuisances
+from diagnosis.problem import Draw, Problem, prepare
+from diagnosis.twin import Effects, Roughness
+
+Floats = npt.NDArray[np.floating[Any]]
+Progress = Callable[[str, float], None]
+Row = dict[str, float]
+_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)
+_REPLICATES = 12
+_TEMPLATES = 10  # evidences whose commands are used
+_EACH = 4  # rigs a template of every effect, and as many times four without
+_NONE = "none"
+_TREES = 500
+
+
+class _Bench(NamedTuple):
+    """One evidence, its floor as described, and what its features are called."""
+
+    problem: Problem
+    nuisances: Nuisances
+    floor: Floor
+    described: Floats  # features
+    names: list[str]
+
+    def row(self, features: Floats) -> Row:
+        floor = self.floor
+        z = (floor.expected(features - floor.bias) - floor.expected(self.described))[floor.compared]
+        z = compress(z / floor.scatter[floor.compared])
+        return dict(zip(self.names, np.where(np.isfinite(z), z, 0.0).tolist(), strict=True))
+
+
+def tree_probabilities(folder: Path, cases: list[str], jobs: int, progress: Progress) -> dict[str, dict[str, float]]:
+    """Probabilities of every case's candidates. Raises Fault CONFIG without scikit-learn."""
+    try:
+        from sklearn.ensemble import ExtraTreesClassifier  # noqa: PLC0415  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        line = "--baselines: needs the package scikit-learn, which is not installed; pip install 'stickslip[dev]'"
+        raise Fault("CONFIG", line) from None
+    templates = cases[:: max(1, len(cases) // _TEMPLATES)][:_TEMPLATES]
+    tasks = (delayed(_training)(folder / name, number) for number, name in enumerate(templates))
+    made: Any = Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
+    rows: list[Row] = []
+    labels: list[str] = []
+    for number, (some, named) in enumerate(made, 1):
+        rows += some
+        labels += named
+        progress(f"trees: {number} of {len(templates)} training rigs", number / len(templates))
+    columns = sorted({name for row in rows for name in row})
+    model: Any = ExtraTreesClassifier(_TREES, min_samples_leaf=2, class_weight="balanced", random_state=1, n_jobs=jobs)
+    model.fit(_matrix(rows, columns), labels)
+    asked: Any = Parallel(n_jobs=jobs)(delayed(_measured)(folder / name) for name in cases)
+    found = model.predict_proba(_matrix(asked, columns)).tolist()
+    return {name: dict(zip(model.classes_.tolist(), row, strict=True)) for name, row in zip(cases, found, strict=True)}
+
+
+def _matrix(rows: list[Row], columns: list[str]) -> Floats:
+    return np.array([[row.get(name, 0.0) for name in columns] for row in rows])
+
+
+def _bench(folder: Path) -> _Bench:
+    evidence = load_evidence(folder)
+    problem = Problem(evidence.rig, [run for run in prepare(evidence) if not run.holdout])
+    nuisances = Nuisances(evidence.rig)
+    point = nuisances.point(np.zeros(len(nuisances)), {})
+    floor = floor_of(problem, point, replicates(problem, point, _ROUGHNESS, _REPLICATES, 1))
+    names = [
+        f"{file} {label.segment} {label.signal} {label.regime} {label.band_Hz} {label.name}"
+        for (file, label), used in zip(problem.labels, floor.compared, strict=True)
+        if used
+    ]
+    return _Bench(problem, nuisances, floor, problem.predicted(point), names)
+
+
+def _measured(folder: Path) -> Row:
+    bench = _bench(folder)
+    return bench.row(bench.problem.measured)
+
+
+def _training(folder: Path, number: int) -> tuple[list[Row], list[str]]:
+    bench = _bench(folder)
+    random = np.random.default_rng([4, number])
+    by_name: dict[str, list[Trial]] = {}
+    for trial in trials(bench.problem):
+        by_name.setdefault(trial.form.effects[0], []).append(trial)
+    rows: list[Row] = []
+    labels: list[str] = []
+    for name in [*by_name, *[_NONE] * 4]:
+        for _ in range(_EACH):
+            effects: Effects = {}
+            if name != _NONE:
+                own = by_name[name]
+                effects = _drawn(random, own[int(random.integers(len(own)))])
+            point = bench.nuisances.point(random.standard_normal(len(bench.nuisances)), effects)
+            surface = _ROUGHNESS._replace(seed=int(random.integers(1_000_000)))
+            features = bench.problem.predicted(point, Draw(random, surface))
+            if np.isfinite(features).any():  # no rig is like that
+                rows.append(bench.row(features))
+                labels.append(name)
+    return rows, labels
+
+
+def _drawn(random: np.random.Generator, trial: Trial) -> Effects:
+    """Sizes around the library's scales; coordinates with a sign get either one."""
+    axes = trial.form.axes
+    w = trial.w + np.array([axis.prior for axis in axes]) * random.standard_normal(len(axes))
+    return trial.form.tables(w)

@@ -1,0 +1,1 @@
+"""Checks of the diagnosis on rigs it has never seen."""

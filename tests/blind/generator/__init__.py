@@ -1,0 +1,17 @@
+"""Makes evidence folders of rigs that hide a gap; shares no line with the plant or the diagnosis it tests.
+
+kernel.py    the rig's equations of motion and their integrator     rig.py      the numbers of one rig
+surface.py   friction along the track                               runs.py     what is driven and vibrated when
+chain.py     the sensor chain: noise, hum, bandwidth, resolution    effect.py   what an effect is
+library.py   the 26 named effects                                   outside.py  effects that have no name
+evidence.py  one folder on disk                                     case.py     a case, from seed to folder
+
+Signs as in the paper: a force is positive when it pulls in +x. Sources of the formulas stand beside them.
+"""
+
+from tests.blind.generator.case import Case, make, simulate
+from tests.blind.generator.effect import Effect
+from tests.blind.generator.library import LIBRARY, draw_effect
+from tests.blind.generator.outside import OUTSIDE
+
+__all__ = ["LIBRARY", "OUTSIDE", "Case", "Effect", "draw_effect", "make", "simulate"]

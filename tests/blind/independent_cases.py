@@ -1,0 +1,36 @@
+"""Cases of the generator that shares nothing with plant and diagnosis."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tests.blind.generator import LIBRARY, OUTSIDE, Case, Effect, draw_effect, make
+from tests.blind.generators import Plan
+
+
+class Independent:
+    """Rigs with another integrator, other formulas and, in a third of the cases, another friction law."""
+
+    library = tuple(LIBRARY)
+    outside = tuple(OUTSIDE)
+    usual = "lugre"
+    backbones = ("multi-element", "lorentzian", "stretched")
+    strongest = 1.5
+    wide = 1.1  # its draws are cut at three tolerances before they are scaled, and 3.3 is the most that is no gap
+
+    def draw(self, random: np.random.Generator, name: str) -> Effect:
+        return draw_effect(random, name)
+
+    def formula(self, effect: Effect) -> str:
+        numbers = {name: float(value) for name, value in effect.numbers.items()}
+        return f"{effect.formula.name} {numbers}"
+
+    def make(self, folder: Path, plan: Plan, seed: int) -> None:
+        case = Case(
+            effects=plan.effects,
+            backbone=plan.backbone,
+            tolerances=plan.tolerances,
+            leave_out=plan.leave_out,
+            roughness=0.0 if plan.smooth else 1.0,
+        )
+        make(folder, case, seed)

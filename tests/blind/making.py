@@ -1,0 +1,173 @@
+"""Make a sealed set: draw the cases, size their effects, write the evidence, shuffle, seal."""
+
+import math
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import joblib
+import numpy as np
+
+from bridge.faults import Fault
+from diagnosis.blind.sealing import Answer, Secret, refuse_key_inside, write_key, write_set
+from tests.blind.generators import Effect, Generator, Plan, generator
+from tests.blind.real_logs import real_cases
+from tests.blind.sizing import Bench
+from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
+
+Progress = Callable[[str, float], None]
+_TRIES = 4  # strengths that are looked at
+_NEAR_ENOUGH = 1.25  # times the target, or its inverse
+_WEAKEST = 0.01
+_INVISIBLE = 0.02  # detection limits: less is not told from nothing
+_ONE_TIME_S = 946_684_800  # of every file: 2000-01-01, so that no time tells what was made after what
+
+
+class Seen(NamedTuple):
+    """What an effect does to the evidence."""
+
+    detectability: float  # detection limits
+    cells: list[list[Any]]  # signal, regime, run, and floors rms
+
+
+class Sized(NamedTuple):
+    """An effect at the strength that was found, and what it does alone."""
+
+    effect: Effect
+    strength: float
+    seen: Seen
+
+
+def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, progress: Progress) -> None:
+    """Make a set and its key, both or nothing. Raises Fault CONFIG and OSError."""
+    if cases < FEWEST:
+        raise Fault("CONFIG", f"--cases {cases}: must be {FEWEST} at least, one of each kind; 200 tell something")
+    refuse_key_inside(out, key)
+    for option, path in (("--out", out), ("--key", key)):
+        if path.exists():
+            raise Fault("CONFIG", f"{option} {path}: is there already and is never overwritten; choose another")
+    source = generator(name)
+    drawn = draw(source, cases, seed)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    try:
+        sealed: dict[str, Secret] = {}
+        for case, answer in made(source, drawn, part, jobs):
+            sealed[case] = Secret(secrets.token_hex(16), answer)
+            progress(f"{len(sealed)} of {cases} cases made", len(sealed) / cases)
+        write_set(part, sealed)
+        write_key(key, sealed)
+        _make_alike(part)
+        part.chmod(0o755)
+        try:
+            part.rename(out)
+        except OSError:
+            key.unlink(missing_ok=True)
+            raise
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def made(source: Generator, drawn: list[Drawn], folder: Path, jobs: int) -> Iterator[tuple[str, Answer]]:
+    """Make every case under a random name; name and answer of each as they come."""
+    names = [secrets.token_hex(6) for _ in drawn]
+    tasks = (joblib.delayed(_one)(source, case, folder / name) for name, case in zip(names, drawn, strict=True))
+    found: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
+    yield from found
+
+
+def _one(source: Generator, case: Drawn, folder: Path) -> tuple[str, Answer]:
+    if case.stratum == REAL:
+        return folder.name, _real(case, folder)
+    plan = Plan((), case.tolerances, case.leave_out, backbone=case.backbone)
+    sized: list[Sized] = []
+    cells: list[list[Any]] = []
+    if case.effects:
+        with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as scratch:
+            smooth, trial = plan._replace(smooth=True), Path(scratch) / "trial"
+
+            def made(effects: tuple[Effect, ...]) -> Path:
+                shutil.rmtree(trial, ignore_errors=True)
+                source.make(trial, smooth._replace(effects=effects), case.seed)
+                return trial
+
+            bench = Bench(made(()))
+
+            def seen(effect: Effect) -> Seen:
+                at = made((effect,))
+                return Seen(bench.detectability(at), bench.cells(at))
+
+            sized = [
+                size(seen, effect, target, source.strongest)
+                for effect, target in zip(case.effects, case.targets, strict=True)
+            ]
+            plan = plan._replace(effects=tuple(one.effect for one in sized))
+            cells = sized[0].seen.cells if len(sized) == 1 else bench.cells(made(plan.effects))
+    source.make(folder, plan, case.seed)
+    effects = [
+        {
+            "name": one.effect.name,
+            "formula": source.formula(one.effect),
+            "strength": round(one.strength, 4),
+            "target": target,
+            "detectability": round(one.seen.detectability, 3),
+        }
+        for one, target in zip(sized, case.targets, strict=True)
+    ]
+    return folder.name, _answer(case, effects, cells)
+
+
+def _real(case: Drawn, folder: Path) -> Answer:
+    """A fault in a measured log: neither its size in limits nor the rest of its gap is known."""
+    one = list(real_cases(np.random.default_rng(case.seed)))[case.number]
+    one.write(folder)
+    effects = [{"name": name, "formula": str(one.numbers), "detectability": None} for name in one.effects]
+    return _answer(case._replace(group=one.effects), effects, [])
+
+
+def size(seen: Callable[[Effect], Seen], effect: Effect, target: float, strongest: float) -> Sized:
+    """The strength at which an effect is worth about `target` detection limits, or the strongest where it never is.
+
+    Detectability grows nearly in proportion to the strength, so each try scales the last; where that leaves the bracket,
+    its geometric mean is next.
+    """
+    strength, low, high = min(target / max(TARGETS), strongest), _WEAKEST, strongest
+    tried: list[tuple[float, Sized]] = []
+    for _ in range(_TRIES):
+        scaled = effect.scaled(strength)
+        one = Sized(scaled, strength, seen(scaled))
+        reached = max(one.seen.detectability, _INVISIBLE) / target
+        tried.append((abs(math.log(reached)), one))
+        if 1.0 / _NEAR_ENOUGH < reached < _NEAR_ENOUGH:
+            break
+        low, high = (low, strength) if reached > 1.0 else (strength, high)
+        if low >= high:
+            break
+        ahead = min(max(strength / reached, _WEAKEST), strongest)
+        strength = ahead if low < ahead <= high else math.sqrt(low * high)
+    return min(tried, key=lambda item: item[0])[1]
+
+
+def _answer(case: Drawn, effects: list[dict[str, Any]], cells: list[list[Any]]) -> Answer:
+    return {
+        "stratum": case.stratum,
+        "verdict": {"no-gap": "no-gap", "outside": "unexplained"}.get(case.stratum, "effect"),
+        "effects": effects,
+        "group": list(case.group),
+        "tolerances": case.tolerances,
+        "leave_out": list(case.leave_out),
+        "backbone": case.backbone,
+        "counterfactual_seed": case.seed,
+        "cells": cells,
+    }
+
+
+def _make_alike(folder: Path) -> None:
+    """The same times and modes for every file."""
+    for path in (*folder.rglob("*"), folder):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+        os.utime(path, (_ONE_TIME_S, _ONE_TIME_S))

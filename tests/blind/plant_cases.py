@@ -1,0 +1,64 @@
+"""Cases of the plant's own generator: the formulas are those that the diagnosis tries."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.making import Case, make_evidence
+from tests.blind.generators import Plan
+from tests.blind.plant_sizes import EFFECT_SIZES, Sizes, possible
+
+PROTOCOL = "ladder"
+
+
+class PlantEffect(NamedTuple):
+    """An effect as in a rig file, with the size that counts as strength 1."""
+
+    name: str
+    size: str  # the parameter that is the size
+    large: float  # its value at strength 1
+    inverse: bool  # a smaller value is more: a corner frequency
+    others: dict[str, float | str]
+    strength: float = 1.0
+
+    def scaled(self, strength: float) -> "PlantEffect":
+        return self._replace(strength=strength)
+
+    @property
+    def numbers(self) -> dict[str, float | str]:
+        """The table of a rig file."""
+        value = self.large / self.strength if self.inverse else self.large * self.strength
+        return {self.size: value, **self.others}
+
+
+class Plant:
+    """Rigs of the plant on the protocol of the blind sets."""
+
+    library = tuple(possible("spring", vibrated=True))
+    outside = ()
+    usual = None
+    backbones = ()
+    strongest = 1.0  # beyond, some rigs cannot be: static friction below the Coulomb friction
+    wide = 1.5  # no number is drawn beyond three tolerances
+
+    def draw(self, random: np.random.Generator, name: str) -> PlantEffect:
+        forms = EFFECT_SIZES[name]
+        return drawn(random, name, forms[random.integers(len(forms))])
+
+    def formula(self, effect: PlantEffect) -> str:
+        return str(effect.numbers)
+
+    def make(self, folder: Path, plan: Plan, seed: int) -> None:
+        effects = {effect.name: effect.numbers for effect in plan.effects}
+        case = Case(PROTOCOL, effects, leave_out=plan.leave_out, spread=plan.tolerances, rough=not plan.smooth)
+        make_evidence(folder, case, seed)
+
+
+def drawn(random: np.random.Generator, name: str, sizes: Sizes) -> PlantEffect:
+    """One form of an effect: sign and everything else drawn."""
+    others: dict[str, float | str] = {"form": sizes.form} if sizes.form else {}
+    sign = float(random.choice(sizes.signs))
+    others |= {key: low * (high / low) ** random.random() for key, (low, high) in sizes.log.items()}
+    others |= {key: random.uniform(low, high) for key, (low, high) in sizes.even.items()}
+    return PlantEffect(name, sizes.parameter, sign * sizes.large, sizes.large < sizes.barely, others)

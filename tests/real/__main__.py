@@ -1,0 +1,48 @@
+"""Diagnose the measured logs beside the repository and print the figures of docs/real-evidence.md."""
+
+import argparse
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from diagnosis.diagnose import diagnose
+from diagnosis.evidence import load_evidence
+from diagnosis.report import write_report
+from diagnosis.result import to_json
+from tests.real.evidences import AXIS, EVIDENCES, MISSING, SLIDER
+from tests.real.known import known
+from tests.real.table import lines
+
+parser = argparse.ArgumentParser(prog="python -m tests.real", description=__doc__)
+parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(EVIDENCES)}; all if left out")
+parser.add_argument("--json", type=Path, metavar="FILE", help="write all results there")
+parser.add_argument("--out", type=Path, default=Path("runs/real"), metavar="DIR", help="reports and evidence folders")
+parser.add_argument("--known", action="store_true", help="only what plain rulers say, beforehand")
+parser.add_argument("--jobs", type=int, default=1)
+
+if __name__ == "__main__":
+    told = parser.parse_args()
+    if unknown := set(told.names) - EVIDENCES.keys():
+        parser.error(f"{', '.join(sorted(unknown))}: no such evidence; known here: {', '.join(EVIDENCES)}")
+    if not (SLIDER.is_dir() and AXIS.is_dir()):
+        print(f"nothing done: {MISSING}")
+        sys.exit()
+    if told.known:
+        print("\n".join(known()))
+        sys.exit()
+    told.out.mkdir(parents=True, exist_ok=True)
+    results = {}
+    for name in told.names or EVIDENCES:
+        with tempfile.TemporaryDirectory() as folder:
+            EVIDENCES[name](Path(folder))
+            found = diagnose(
+                load_evidence(Path(folder)),
+                lambda text, _share, name=name: print(f"{name}: {text}", file=sys.stderr, flush=True),
+                told.jobs,
+            )
+        write_report(found, name, told.out / f"{name}.html")
+        results[name] = to_json(found)
+        print("\n".join([name, *(f"  {line}" for line in lines(found))]), flush=True)
+    if told.json:
+        told.json.write_text(json.dumps(results, indent=1), encoding="utf-8")

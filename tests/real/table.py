@@ -1,0 +1,39 @@
+"""The figures of one diagnosis, a few lines of text: what docs/real-evidence.md quotes."""
+
+from diagnosis.result import Diagnosis, Shrinkage
+from diagnosis.wording import estimate_in_words, headline, percent, times
+
+_SHOWN = 4  # candidates
+
+
+def lines(found: Diagnosis) -> list[str]:
+    """Verdict, candidates with their parameters, gap on the held-out runs, where it lies, seconds."""
+    gap = found.gap
+    said = [f"verdict     {found.verdict}: {headline(found)}"]
+    for one in found.candidates[:_SHOWN]:
+        sizes = "; ".join(estimate_in_words(*item) for item in one.parameters.items())
+        said.append(f"candidate   {one.effect} {percent(one.probability)}{': ' if sizes else ''}{sizes}")
+    said += [f"alike       {', '.join(group)}" for group in found.not_distinguishable]
+    said.append(
+        f"held out    {times(gap.nominal)} as described, {times(gap.retuned)} retuned, {times(gap.with_effect)} as judged"
+    )
+    said += [f"  {_closed(one)}" for one in gap.compared]
+    said += [
+        f"where       {percent(cell.share)} {cell.signal} {cell.regime} {cell.band_Hz[0]:g}-{cell.band_Hz[1]:g} Hz {cell.run}"
+        for cell in found.where[:3]
+    ]
+    said += [
+        f"moved       {one.name} {one.described:.4g} -> {one.retuned:.4g}"
+        for one in found.rig
+        if abs(one.retuned / one.described - 1.0) > 2.0 * one.tolerance
+    ]
+    return [*said, f"next        {found.next_experiment.what}", f"took        {found.elapsed_s:.0f} s"]
+
+
+def _closed(one: Shrinkage) -> str:
+    if one.shrinkage is None:
+        return f"{one.who}: {times(one.gap)}"
+    interval = (
+        "" if one.interval_90 is None else " (90 %: {:.0f} to {:.0f})".format(*(100 * x for x in one.interval_90))
+    )
+    return f"{one.who}: {times(one.gap)}, closes {percent(one.shrinkage)}{interval}"
