@@ -31,6 +31,8 @@ POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
 _LEVELS = 8  # bins of a segment without slips
 _BREAKAWAY_WAVES = 5
+_ENOUGH_SLIPS = 0.5  # sum of their weights
+_LEVEL = 0.15  # of the static friction: sliding under a friction wave changes by less
 _TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
 _DRIVE_WAVES = 24
 _RESOLVED_M2 = (
@@ -89,6 +91,9 @@ class Slips(NamedTuple):
         return float(self.weights.sum()) > 0.1
 
 
+NO_SLIPS = Slips(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+
+
 def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Features:
     """All features of a run with a spring drive; which ones, depends on commands and channels only."""
     found = Features()
@@ -99,11 +104,13 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
             for name, values in signals.items()
         }
         slips = find_slips(cut, scales)
+        if not segment.slips:
+            slips = NO_SLIPS
         if "drive_force_N" in cut:
             travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
             expected = travel_m * scales.stiffness_N_per_m / scales.fall_N
             _cycles(found, number, cut["drive_force_N"], slips, expected)
-            _level(found, number, cut["drive_force_N"], slips, segment.at_the_edge)
+            _level(found, number, cut["drive_force_N"], slips, segment)
         _period(found, number, slips)
         _shapes(found, number, cut, slips, scales, segment.frequency_Hz)
         if segment.frequency_Hz > 0.0:
@@ -115,16 +122,28 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
 
 
 def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
-    """A segment without what its start decides: how loaded the spring was then, and how old the contact at the first slip.
+    """A segment without what its start decides, and with what it shows: slips, even sliding, or neither, as in a first climb.
 
-    With three slips or more it begins in the second stick; with fewer nothing would be left.
+    With three slips or more it begins in the second stick: how loaded the spring was and how old the contact is past then. A
+    single slip at an end or a climb that just does not slip would come and go with every parameter: nothing is read from them.
     """
     cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
     slips = find_slips(cut, scales)
+    segment = segment._replace(slips=float(slips.weights.sum()) > _ENOUGH_SLIPS)
+    if len(slips.tops) == 0:
+        return segment._replace(still="drive_force_N" not in cut or not _climbs(cut["drive_force_N"], scales))
     if len(slips.bottoms) < 3:
         return segment
     stick = int(slips.tops[1] - slips.bottoms[0])
     return segment._replace(first=segment.first + int(slips.bottoms[0]) + int(0.4 * stick))
+
+
+def _climbs(force_N: Floats, scales: Scales) -> bool:
+    """Or falls: its second half, over fiftieths of a segment, is not level."""
+    half = force_N[len(force_N) // 2 :]
+    width = max(len(force_N) // 50, 1)
+    level_N = half[: len(half) // width * width].reshape(-1, width).mean(axis=1)
+    return float(np.ptp(level_N)) > _LEVEL * scales.force_N
 
 
 def find_slips(cut: Signals, scales: Scales) -> Slips:
@@ -204,12 +223,12 @@ def _period(found: Features, number: int, slips: Slips) -> None:
     found.add("period", "drive_force_N", "stick", LOW, number, value)
 
 
-def _level(found: Features, number: int, force_N: Floats, slips: Slips, at_the_edge: bool) -> None:
+def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment) -> None:
     """Levels over whole cycles; over the segment where nothing slips."""
     name = "drive_force_N"
-    still = len(slips.tops) == 0 and not at_the_edge
+    still = segment.still and not segment.at_the_edge
     whole = force_N[slips.tops[0] : slips.tops[-1]] if len(slips.tops) > 2 else force_N
-    counted = still or (len(slips.tops) > 2 and not at_the_edge)
+    counted = still or (segment.slips and not segment.at_the_edge)
     low, high = np.quantile(whole, (0.05, 0.95))
     levels = {"mean level": whole.mean(), "deviation": whole.std(), "low level": low, "high level": high}
     for level, value in levels.items():

@@ -133,6 +133,10 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
             "ratio": _Scale(0.04, False),
             "settling_s": _Scale(0.3 * length_s, True, 0.7),
         },
+        ("friction-drift", "session"): {
+            "ratio": _Scale(0.04, False),
+            "settling_s": _Scale(length_s, True, 1.0),
+        },
         ("stribeck-velocity", ""): {"ratio": _Scale(0.5, False)},
         ("drive-damping", ""): {"damping_Ns_per_m": _Scale(0.03 * critical, True, 1.5)},
         ("drive-hardening", "cubic"): {"ratio": _Scale(0.1 * (1e-3 / reach_m) ** 2, False)},

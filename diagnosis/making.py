@@ -92,21 +92,32 @@ def make_evidence(folder: Path, case: Case, seed: int) -> None:
     plans = AXIS_PLANS if force_driven else PROTOCOLS[case.protocol]
     track_m = np.random.default_rng(of_runs).uniform(0.012, 0.030, len(plans))
     runs: list[RunTable] = []
+    before_s = 0.0
     for number, (plan, of_run) in enumerate(zip(plans, of_runs.spawn(len(plans)), strict=True), 1):
         random = np.random.default_rng(of_run)
         file = f"run-{number:02d}.parquet"
         velocity_mps = None
         if isinstance(plan, AxisPlan):
-            columns = axis_run(random, rig, plan)
+            columns = axis_run(random, _later(rig, before_s), plan)
         else:
-            columns = spring_run(random, rig, plan, float(track_m[plan.track]))
+            columns = spring_run(random, _later(rig, before_s), plan, float(track_m[plan.track]))
             if len(plan.velocity) == 1:
                 velocity_mps = plan.velocity[0][1]
+        before_s += plan.duration_s
         writer = ArrowTable(folder / file)
         writer.append({name: values for name, values in columns.items() if name not in case.leave_out})
         writer.finish()
         runs.append(RunTable(file=file, drive_velocity_mps=velocity_mps, holdout=plan.holdout))
     (folder / MANIFEST).write_text(manifest_text(table, runs, []))
+
+
+def _later(rig: MadeRig, before_s: float) -> MadeRig:
+    """The rig after so long a time in earlier runs."""
+    effects = rig.config.effects
+    if "before_s" not in effects.get("friction-drift", {}):
+        return rig
+    drift = effects["friction-drift"] | {"before_s": before_s}
+    return rig._replace(config=rig.config.model_copy(update={"effects": effects | {"friction-drift": drift}}))
 
 
 def _rig_table(rig: RigConfig, drive: str, tolerances: Mapping[str, float]) -> RigTable:

@@ -34,6 +34,7 @@ class Prepared(NamedTuple):
     signals: Signals
     commands: Commands
     start: Start
+    before_s: float  # how long the rig had run in the runs before, in the manifest's order
     noise: Noise
     clipped: dict[str, tuple[float, float]]  # by signal: limits that the sensor could not pass
 
@@ -91,6 +92,8 @@ class Problem:
         moving = {name: table for name, table in point.effects.items() if name not in SENSOR_EFFECTS}
         if not run.commands.frequency_Hz.any():
             moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
+        if "before_s" in moving.get("friction-drift", {}):
+            moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
         start, chain = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects)), point.chain
         roughness = None
         if draw is not None:
@@ -179,10 +182,15 @@ def scales_of(rig: RigTable) -> Scales:
 
 def prepare(evidence: Evidence) -> list[Prepared]:
     """Reduce every run and find its commands, start and noise. Raises Fault BAD_EVIDENCE when a run is too short."""
-    return [_prepare(evidence.rig, run) for run in evidence.runs]
+    prepared: list[Prepared] = []
+    before_s = 0.0
+    for run in evidence.runs:
+        prepared.append(_prepare(evidence.rig, run, before_s))
+        before_s += len(prepared[-1].commands.drive) * BLOCK_S
+    return prepared
 
 
-def _prepare(rig: RigTable, run: Run) -> Prepared:
+def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     start_s, signals = reduce_run(run)
     blocks = len(next(iter(signals.values())))
     if blocks * BLOCK_S < 1.0:
@@ -203,7 +211,7 @@ def _prepare(rig: RigTable, run: Run) -> Prepared:
         for name in run.clipped
         if name in signals
     }
-    return Prepared(run.file, run.holdout, signals, commands, start, noise, clipped)
+    return Prepared(run.file, run.holdout, signals, commands, start, before_s, noise, clipped)
 
 
 def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) -> Start:

@@ -29,7 +29,7 @@ def level(p: Record, t_s: float, x: float, v_r: float) -> float:
     """What the friction is multiplied by, here and now."""
     result = 1.0 + p.drift_per_s * t_s
     if p.drift_settling_s > 0.0:
-        result += p.drift_ratio * (1.0 - math.exp(-t_s / p.drift_settling_s))
+        result += p.drift_ratio * (1.0 - math.exp(-(p.drift_before_s + t_s) / p.drift_settling_s))
     if p.position_ratio != 0.0:
         result *= 1.0 + p.position_ratio * math.sin(TWO_PI * x / p.position_wavelength_m + p.position_phase_rad)
     if p.load_ratio != 0.0:

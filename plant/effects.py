@@ -115,6 +115,14 @@ EFFECTS: Final[dict[str, Effect]] = {
                 "friction times 1 + ratio (1 - exp(-t / settling_s))",
                 (_ratio(0.05, -0.9, 0.9), Parameter("settling_s", 0.1, 1e4, 5.0)),
             ),
+            "session": Form(
+                "as settling, on from earlier runs: t + before_s for t",
+                (
+                    _ratio(0.05, -0.9, 0.9),
+                    Parameter("settling_s", 0.1, 1e4, 15.0),
+                    Parameter("before_s", 0.0, 1e6, 0.0),
+                ),
+            ),
         },
     ),
     "coulomb-level": Effect("friction", _one("F_c times 1 + ratio", _ratio(0.1))),

@@ -38,7 +38,7 @@ PARAMS = np.dtype(
             *("position_ratio", "position_wavelength_m", "position_phase_rad", "forward_ratio", "backward_ratio"),
             "kinetic_backward_ratio",
             *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_seed"),
-            *("drift_per_s", "drift_ratio", "drift_settling_s"),
+            *("drift_per_s", "drift_ratio", "drift_settling_s", "drift_before_s"),
             *("roughness_ratio", "roughness_length_m", "roughness_seed", "elastic_ratio"),
             *("hardening_per_m2", "knee_m", "knee_ratio", "gap_m"),
             *("ripple_ratio", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
@@ -184,6 +184,7 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
     elif name == "friction-drift":
         p.drift_per_s = value.get("rate_per_s", 0.0)
         p.drift_ratio, p.drift_settling_s = value.get("ratio", 0.0), value.get("settling_s", 0.0)
+        p.drift_before_s = value.get("before_s", 0.0)
     elif name == "coulomb-level":
         p.F_c *= 1.0 + value["ratio"]
     elif name == "static-level":

@@ -58,6 +58,7 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
     "friction-drift": (
         Sizes("linear", "rate_per_s", 5e-4, 1e-2, BOTH_SIGNS),
         Sizes("settling", "ratio", 0.01, 0.15, BOTH_SIGNS, log={"settling_s": (1.0, 10.0)}),
+        Sizes("session", "ratio", 0.01, 0.15, BOTH_SIGNS, log={"settling_s": (5.0, 30.0)}),
     ),
     # beyond 2.5 tolerances; stick-slip ends where the Coulomb force meets the static one, 20 % up or 17 % down
     "coulomb-level": (Sizes("", "ratio", 0.08, 0.3, (-1.0,)), Sizes("", "ratio", 0.08, 0.14)),

@@ -67,8 +67,12 @@ def test_a_load_that_swings_swings_friction():
     [
         ({"form": "linear", "rate_per_s": 0.05}, lambda t_s: 1 + 0.05 * t_s),
         ({"form": "settling", "ratio": -0.2, "settling_s": 0.5}, lambda t_s: 1 - 0.2 * (1 - np.exp(-t_s / 0.5))),
+        (
+            {"form": "session", "ratio": -0.2, "settling_s": 2.0, "before_s": 1.0},
+            lambda t_s: 1 - 0.2 * (1 - np.exp(-(1.0 + t_s) / 2.0)),
+        ),
     ],
-    ids=["linear", "settling"],
+    ids=["linear", "settling", "session"],
 )
 def test_friction_drifts(values, course):
     result = towed({"friction-drift": values}, FAST_MPS, 2.0)

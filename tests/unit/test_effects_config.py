@@ -41,7 +41,7 @@ def test_every_name_is_there():
         ("viscous-friction", ["linear", "quadratic"]),
         ("direction-dependent-friction", ["backward", "both", "kinetic"]),
         ("normal-load-fluctuation", ["sine", "random"]),
-        ("friction-drift", ["linear", "settling"]),
+        ("friction-drift", ["linear", "settling", "session"]),
         ("drive-hardening", ["cubic", "bilinear"]),
         ("drive-speed-ripple", ["screw", "time"]),
         ("piezo-roll-off", ["first-order", "second-order"]),
