@@ -31,7 +31,7 @@ class Segment(NamedTuple):
     drive_velocity_mps: float  # 0 with a force drive
     frequency_Hz: float
     amplitude_m: float
-    slips: bool = False  # as measured; what is compared there must not depend on what a model does
+    slips: int = 0  # as measured: what is compared there must not depend on what a model does
     still: bool = False  # even sliding as measured
 
     @property

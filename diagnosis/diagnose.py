@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bridge.faults import Fault
 from diagnosis.evidence import Evidence
 from diagnosis.flexible import flexible_differences
 from diagnosis.gap import (
@@ -59,6 +60,12 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     roughness = _roughness(problem, first)
     floor = floor_of(problem, point, first)
     fitter = Fitter(problem, floor, nuisances)
+    if not floor.compared.any():
+        raise Fault(
+            "BAD_EVIDENCE",
+            f"{evidence.folder}: the rig as described shows nothing of what was measured: check the friction and the stiffness "
+            "of [rig] against the runs",
+        )
     apart = gap(floor, differences(floor, problem, problem.predicted(point)))
     progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
     retuned = fitter.retuned(described)

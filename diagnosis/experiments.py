@@ -124,7 +124,7 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
     counts = [round(step.seconds / BLOCK_S) for step in plan.steps]
     edges = np.concatenate([[0], np.cumsum(counts)]).tolist()
     segments = tuple(
-        Segment(first, last, step.velocity_mps, step.frequency_Hz, step.amplitude_m, slips=True, still=True)
+        Segment(first, last, step.velocity_mps, step.frequency_Hz, step.amplitude_m, slips=3, still=True)
         for first, last, step in zip(edges[:-1], edges[1:], plan.steps, strict=True)
     )
     commands = template.commands._replace(

@@ -104,7 +104,7 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
             for name, values in signals.items()
         }
         slips = find_slips(cut, scales)
-        if not segment.slips:
+        if segment.slips == 0:
             slips = NO_SLIPS
         if "drive_force_N" in cut:
             travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
@@ -129,7 +129,8 @@ def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
     """
     cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
     slips = find_slips(cut, scales)
-    segment = segment._replace(slips=float(slips.weights.sum()) > _ENOUGH_SLIPS)
+    if float(slips.weights.sum()) > _ENOUGH_SLIPS:
+        segment = segment._replace(slips=len(slips.tops))
     if len(slips.tops) == 0:
         return segment._replace(still="drive_force_N" not in cut or not _climbs(cut["drive_force_N"], scales))
     if len(slips.bottoms) < 3:
@@ -228,7 +229,7 @@ def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment:
     name = "drive_force_N"
     still = segment.still and not segment.at_the_edge
     whole = force_N[slips.tops[0] : slips.tops[-1]] if len(slips.tops) > 2 else force_N
-    counted = still or (segment.slips and not segment.at_the_edge)
+    counted = still or (segment.slips > 2 and not segment.at_the_edge)
     low, high = np.quantile(whole, (0.05, 0.95))
     levels = {"mean level": whole.mean(), "deviation": whole.std(), "low level": low, "high level": high}
     for level, value in levels.items():

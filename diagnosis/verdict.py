@@ -30,7 +30,8 @@ COST_OF_EFFECT = 8.0
 # Refits end in valleys that differ by this much of chi2: slips come and go as parameters move. Priors do not.
 JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
-_SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves
+_SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
+_SECOND_ADDS = 0.03  # and this share of what both close: less is what the first one's formula does not fit
 _TEMPERATURE = 3.0  # of the probabilities: a guess, they are not calibrated yet
 
 
@@ -87,7 +88,8 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
         gained = double.evidence - ranked[0].evidence
         left = max(ranked[0].fit.chi2 - perfect_chi2(base), 1.0)
         closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
-        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES:
+        adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
+        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or adds < _SECOND_ADDS:
             double = None
     best = double or (ranked[0] if ranked else None)
     beyond = max(base.chi2 - _WORST_OF_NO_GAP * len(base.residual), 0.0)
