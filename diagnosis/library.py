@@ -95,6 +95,8 @@ def _wave_trial(name: str, form: str, wave: Wave) -> Trial:
             axes.append(Axis(name, row.name, 1.0, False, 3.0, -20.0, 20.0))
         elif row.name == "ratio":
             axes.append(Axis(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
+        elif row.name in {"second_sin", "second_cos"}:
+            axes.append(Axis(name, row.name, 0.4, False, 1.0, row.low, row.high))
         else:
             size = wave.period if row.name == "wavelength_m" else 1.0 / wave.period
             axes.append(Axis(name, row.name, size, True, wave.spread, row.low, row.high))

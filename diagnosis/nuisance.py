@@ -25,6 +25,8 @@ _CHAIN = {
     "accel_lowest_Hz": (0.25, 0.25),
     "accel_rolled_off": (0.5, 0.5),
 }
+# A table states two friction levels and a velocity; the curve between them differs from law to law, and from a Gaussian by this.
+_TAIL = 0.4
 _NOT_NEGATIVE = ("accel_lowest_Hz", "accel_rolled_off")
 
 
@@ -37,7 +39,7 @@ class Nuisances:
         self.rig_names = tuple(name for name, share in rig.tolerance.items() if share > 0.0 and known[name] > 0.0)
         self._described = known
         self._tolerance = rig.tolerance
-        self.names = (*self.rig_names, *_CHAIN)
+        self.names = (*self.rig_names, "stribeck_tail", *_CHAIN)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -51,8 +53,9 @@ class Nuisances:
         """The model at these deviations, with these effects."""
         own = len(self.rig_names)
         values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
+        values["stribeck_tail"] = _TAIL * float(deviations[own])
         chain: dict[str, float] = {}
-        for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[own:].tolist(), strict=True):
+        for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[own + 1 :].tolist(), strict=True):
             chain[name] = mean + spread * deviation
             if name in _NOT_NEGATIVE:
                 chain[name] = max(chain[name], 0.0)

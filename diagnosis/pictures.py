@@ -26,7 +26,9 @@ def pictures(
     if named is not None:
         label = "with " + " and ".join(effects)
         models.append(Model(label, "effect", {run.file: problem.signals(run, named) for run in problem.runs}))
-    rig = problem.rig.model_copy(update=retuned.values)
+    rig = problem.rig.model_copy(
+        update={name: retuned.values[name] for name in problem.rig.tolerance if name in retuned.values}
+    )
     residuals = residual_pictures(rig, problem.runs, problem.scales, models[1:], effects)
     return (*_cycles(problem, models), *residuals)
 

@@ -81,7 +81,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
         hidden=[one.effect for one in diagnosis.candidates if one.probability < _SMALL_PROBABILITY],
         estimates=_estimates,
         meaning=_meaning,
-        gap_bars=gap_bars(diagnosis.gap),
+        gap_bars=gap_bars(diagnosis.gap, bool(diagnosis.effects)),
         floor_at=_floor_at(diagnosis.gap),
         runs=runs,
         rows=rows,
@@ -103,13 +103,11 @@ def _meaning(effect: str) -> str:
     return "; and ".join(words[name] for name in effect.split("+") if name in words)
 
 
-def gap_bars(gap: Gap) -> list[GapBar]:
-    """Rig as described, retuned, with effect; a bar that is no number has no width."""
-    bars = (
-        ("the rig as described", gap.nominal, "nominal"),
-        ("retuned inside its tolerances", gap.retuned, "retuned"),
-        ("with the best explanation", gap.with_effect, "effect"),
-    )
+def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
+    """Rig as described, retuned, and with the effect if one is named; a bar that is no number has no width."""
+    bars = [("the rig as described", gap.nominal, "nominal"), ("retuned inside its tolerances", gap.retuned, "retuned")]
+    if named:
+        bars.append(("with the best explanation", gap.with_effect, "effect"))
     widest = _widest(gap)
     return [
         GapBar(label, value, 100.0 * max(value, 0.0) / widest if math.isfinite(value) else 0.0, STYLES[style]["color"])

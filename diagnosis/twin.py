@@ -58,6 +58,7 @@ def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughn
         "coulomb_force_N": value["coulomb_force_N"],
         "static_force_N": max(value["static_force_N"], value["coulomb_force_N"]),
         "stribeck_velocity_mps": value["stribeck_velocity_mps"],
+        "stribeck_tail": value.get("stribeck_tail", 0.0),
     }
     if roughness is not None:
         contact |= {

@@ -25,6 +25,8 @@ class ContactConfig(Strict):
     coulomb_force_N: Positive
     static_force_N: Positive
     stribeck_velocity_mps: Positive = 0.0005  # [15] in the paper; the same for every pair
+    # the Stribeck curve falls with exp(-q^2), q = v / v_s, and with this share of it with 1 / (1 + q^2) (Hess and Soom 1990)
+    stribeck_tail: Annotated[float, Field(ge=-2, le=2)] = 0.0
     backbone: Literal["lugre", "elasto-plastic"] = "lugre"
     elastic_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.7  # elasto-plastic: elastic up to this share of its reach
     # a rough surface: friction scatters along the track with this rms, a new value every length, another track every seed

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from plant.contact import step as contact_step
-from plant.disturb import ageing_N, elasto_plastic_share, level, spring_N
+from plant.disturb import ageing_N, elasto_plastic_share, level, spring_N, wave
 from plant.piezo import accepted, delivered_share
 from plant.records import DELAY_LINE
 
@@ -146,8 +146,9 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                         turns = p.ripple_frequency_Hz * (t_s + 0.5 * dt)
                         if p.ripple_wavelength_m > 0.0:
                             turns = s_d / p.ripple_wavelength_m
+                        angle_rad = TWO_PI * turns + p.ripple_phase_rad
                         drive_velocity_mps = drive * (
-                            1.0 + p.ripple_ratio * math.sin(TWO_PI * turns + p.ripple_phase_rad)
+                            1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
                         )
                     anchor_mps = drive_velocity_mps - frame_mps
                     extension_m = s_d - frame_m - x
@@ -179,7 +180,10 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 else:
                     damping = h_v
                 q = v_g * per_v_s
-                g = F_c_now + (F_s_now - F_c_now) * math.exp(-q * q)
+                fall = math.exp(-q * q)
+                if disturbed and p.stribeck_tail != 0.0:
+                    fall += p.stribeck_tail * (1.0 / (1.0 + q * q) - fall)
+                g = F_c_now + (F_s_now - F_c_now) * fall
                 if disturbed:
                     least_N = least_N_per_m * math.fabs(z)
                     g = max(g, least_N)

@@ -25,17 +25,27 @@ def smooth_noise(at: float, seed: float) -> float:
 
 
 @kernel
+def wave(angle_rad: float, second_sin: float, second_cos: float) -> float:
+    """A sine with its second harmonic."""
+    result = math.sin(angle_rad)
+    if second_sin != 0.0 or second_cos != 0.0:
+        result += second_sin * math.sin(2.0 * angle_rad) + second_cos * math.cos(2.0 * angle_rad)
+    return result
+
+
+@kernel
 def level(p: Record, t_s: float, x: float, v_r: float) -> float:
     """What the friction is multiplied by, here and now."""
     result = 1.0 + p.drift_per_s * t_s
     if p.drift_settling_s > 0.0:
         result += p.drift_ratio * (1.0 - math.exp(-(p.drift_before_s + t_s) / p.drift_settling_s))
     if p.position_ratio != 0.0:
-        result *= 1.0 + p.position_ratio * math.sin(TWO_PI * x / p.position_wavelength_m + p.position_phase_rad)
+        angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
+        result *= 1.0 + p.position_ratio * wave(angle_rad, p.position_sin_2, p.position_cos_2)
     if p.load_ratio != 0.0:
         turns = p.load_frequency_Hz * t_s
         if p.load_seed < 0.0:
-            result *= 1.0 + p.load_ratio * math.sin(TWO_PI * turns + p.load_phase_rad)
+            result *= 1.0 + p.load_ratio * wave(TWO_PI * turns + p.load_phase_rad, p.load_sin_2, p.load_cos_2)
         else:
             result *= 1.0 + p.load_ratio * smooth_noise(2.0 * turns, p.load_seed)
     if p.roughness_ratio != 0.0:

@@ -40,7 +40,12 @@ LONGEST_DELAY = 254  # samples; 12.7 ms at 20 kHz
 
 _TAU = 2.0 * math.pi
 _SPRING = ("spring",)
-_PHASE = Parameter("phase_rad", -_TAU, _TAU, 0.0)
+# a wave is w(a) = sin a + second_sin sin 2a + second_cos cos 2a, a with the phase: few real ones are pure
+_SHAPE = (
+    Parameter("phase_rad", -_TAU, _TAU, 0.0),
+    Parameter("second_sin", -1.0, 1.0, 0.0),
+    Parameter("second_cos", -1.0, 1.0, 0.0),
+)
 
 
 def _ratio(default: float, low: float = -0.9, high: float = 10.0) -> Parameter:
@@ -78,10 +83,10 @@ EFFECTS: Final[dict[str, Effect]] = {
     "position-dependent-friction": Effect(
         "friction",
         _one(
-            "friction times 1 + ratio sin(2 pi x / wavelength_m + phase)",
+            "friction times 1 + ratio w(2 pi x / wavelength_m + phase)",
             _ratio(0.03, 0.0, 0.9),
             Parameter("wavelength_m", 1e-5, 1.0, 4e-3),
-            _PHASE,
+            *_SHAPE,
         ),
     ),
     "direction-dependent-friction": Effect(
@@ -98,8 +103,8 @@ EFFECTS: Final[dict[str, Effect]] = {
         "friction",
         {
             "sine": Form(
-                "friction times 1 + ratio sin(2 pi frequency_Hz t + phase)",
-                (_ratio(0.03, 0.0, 0.9), Parameter("frequency_Hz", 1e-3, 1e3, 3.0), _PHASE),
+                "friction times 1 + ratio w(2 pi frequency_Hz t + phase)",
+                (_ratio(0.03, 0.0, 0.9), Parameter("frequency_Hz", 1e-3, 1e3, 3.0), *_SHAPE),
             ),
             "random": Form(
                 "friction times 1 + ratio n(t), n smooth noise of unit rms, a new value every 1 / (2 frequency_Hz)",
@@ -153,12 +158,12 @@ EFFECTS: Final[dict[str, Effect]] = {
         "drive",
         {
             "screw": Form(
-                "drive velocity times 1 + ratio sin(2 pi s_d / wavelength_m + phase)",
-                (_ratio(0.05, 0.0, 0.95), Parameter("wavelength_m", 1e-5, 1.0, 1e-3), _PHASE),
+                "drive velocity times 1 + ratio w(2 pi s_d / wavelength_m + phase)",
+                (_ratio(0.05, 0.0, 0.95), Parameter("wavelength_m", 1e-5, 1.0, 1e-3), *_SHAPE),
             ),
             "time": Form(
-                "drive velocity times 1 + ratio sin(2 pi frequency_Hz t + phase)",
-                (_ratio(0.05, 0.0, 0.95), Parameter("frequency_Hz", 1e-3, 1e3, 1.0), _PHASE),
+                "drive velocity times 1 + ratio w(2 pi frequency_Hz t + phase)",
+                (_ratio(0.05, 0.0, 0.95), Parameter("frequency_Hz", 1e-3, 1e3, 1.0), *_SHAPE),
             ),
         },
         _SPRING,

@@ -35,13 +35,14 @@ PARAMS = np.dtype(
             *("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"),
             # the effects of `plant.effects`, all 0 in the nominal rig
             *("age_growth_N", "age_scale_s", "age_exponent", "age_length_m", "lag_s", "quadratic_Ns2_per_m2"),
-            *("position_ratio", "position_wavelength_m", "position_phase_rad", "forward_ratio", "backward_ratio"),
-            "kinetic_backward_ratio",
-            *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_seed"),
+            *("position_ratio", "position_wavelength_m", "position_phase_rad", "position_sin_2", "position_cos_2"),
+            *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
+            *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_sin_2", "load_cos_2", "load_seed"),
             *("drift_per_s", "drift_ratio", "drift_settling_s", "drift_before_s"),
-            *("roughness_ratio", "roughness_length_m", "roughness_seed", "elastic_ratio"),
+            *("roughness_ratio", "roughness_length_m", "roughness_seed", "elastic_ratio", "stribeck_tail"),
             *("hardening_per_m2", "knee_m", "knee_ratio", "gap_m"),
             *("ripple_ratio", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
+            *("ripple_sin_2", "ripple_cos_2"),
             *("frame_m_per_N", "frame_Hz", "frame_damping_ratio", "base_m_per_N", "base_Hz", "base_damping_ratio"),
             *("rolloff_Hz", "rolloff_order", "sag_ratio", "sag_settling_s"),
             *("force_lag_s", "force_lag_order", "force_delay_s", "force_ratio", "force_bias_N"),
@@ -62,11 +63,21 @@ PARAMS = np.dtype(
 _SWITCHES = (
     *("age_growth_N", "lag_s", "quadratic_Ns2_per_m2", "position_ratio", "forward_ratio", "backward_ratio"),
     "kinetic_backward_ratio",
-    *("load_ratio", "drift_per_s", "drift_ratio", "roughness_ratio", "hardening_per_m2", "knee_ratio", "gap_m"),
+    *(
+        "load_ratio",
+        "drift_per_s",
+        "drift_ratio",
+        "roughness_ratio",
+        "stribeck_tail",
+        "hardening_per_m2",
+        "knee_ratio",
+        "gap_m",
+    ),
     *("ripple_ratio", "frame_m_per_N", "base_m_per_N", "sag_ratio", "force_lag_s", "force_delay_s", "force_ratio"),
     *("force_bias_N", "force_drift_N_per_s", "force_drift_N", "mass_accel_ratio", "base_accel_ratio"),
 )
 
+_WAVE_SHAPE = ("phase_rad", "second_sin", "second_cos")
 DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the one before it, the one of now
 
 # x and z are kept half a step before v: the leapfrog of `contact`. `_f` marks what a sensor's filter remembers.
@@ -146,7 +157,7 @@ def _add_effects(p: Any, config: RigConfig) -> None:
     """Fold the effects that only change a number into it; hand the others to the kernel."""
     contact = config.contact
     p.elasto_plastic = contact.backbone == "elasto-plastic"
-    for name in ("elastic_ratio", "roughness_ratio", "roughness_length_m", "roughness_seed"):
+    for name in ("stribeck_tail", "elastic_ratio", "roughness_ratio", "roughness_length_m", "roughness_seed"):
         p[name] = getattr(contact, name)
     p.load_seed = -1.0
     p.age_scale_s = 1.0
@@ -171,7 +182,7 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.quadratic_Ns2_per_m2 = value.get("damping_Ns2_per_m2", 0.0)
     elif name == "position-dependent-friction":
         p.position_ratio, p.position_wavelength_m = value["ratio"], value["wavelength_m"]
-        p.position_phase_rad = value["phase_rad"]
+        p.position_phase_rad, p.position_sin_2, p.position_cos_2 = (value[key] for key in _WAVE_SHAPE)
     elif name == "direction-dependent-friction":
         if form == "kinetic":
             p.kinetic_backward_ratio = value["ratio"]
@@ -180,7 +191,8 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
             p.backward_ratio = -0.5 * value["ratio"] if form == "both" else value["ratio"]
     elif name == "normal-load-fluctuation":
         p.load_ratio, p.load_frequency_Hz = value["ratio"], value["frequency_Hz"]
-        p.load_phase_rad, p.load_seed = value.get("phase_rad", 0.0), value.get("seed", -1.0)
+        p.load_phase_rad, p.load_sin_2, p.load_cos_2 = (value.get(key, 0.0) for key in _WAVE_SHAPE)
+        p.load_seed = value.get("seed", -1.0)
     elif name == "friction-drift":
         p.drift_per_s = value.get("rate_per_s", 0.0)
         p.drift_ratio, p.drift_settling_s = value.get("ratio", 0.0), value.get("settling_s", 0.0)
@@ -201,7 +213,8 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
     elif name == "drive-backlash":
         p.gap_m = value["gap_m"]
     elif name == "drive-speed-ripple":
-        p.ripple_ratio, p.ripple_phase_rad = value["ratio"], value["phase_rad"]
+        p.ripple_ratio = value["ratio"]
+        p.ripple_phase_rad, p.ripple_sin_2, p.ripple_cos_2 = (value[key] for key in _WAVE_SHAPE)
         p.ripple_wavelength_m, p.ripple_frequency_Hz = value.get("wavelength_m", 0.0), value.get("frequency_Hz", 0.0)
     elif name == "frame-compliance":
         p.frame_m_per_N = value["ratio"] / p.k_d

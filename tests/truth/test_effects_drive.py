@@ -98,10 +98,12 @@ def test_a_drive_that_reverses_crosses_its_gap_before_it_pushes():
 
 def test_ripple_in_time_adds_up_to_its_integral():
     ratio, f_Hz, phase = 0.3, 7.0, 0.5
-    values = {"form": "time", "ratio": ratio, "frequency_Hz": f_Hz, "phase_rad": phase}
+    values = {"form": "time", "ratio": ratio, "frequency_Hz": f_Hz, "phase_rad": phase, "second_sin": 0.4}
     result = run(rig({"drive-speed-ripple": values}), np.full(1000, 5e-4))
     w, t_s = TAU * f_Hz, result.t_s
-    expected_m = 5e-4 * (t_s + ratio / w * (math.cos(phase) - np.cos(w * t_s + phase)))
+    first = math.cos(phase) - np.cos(w * t_s + phase)
+    second = 0.2 * (math.cos(2 * phase) - np.cos(2 * (w * t_s + phase)))
+    expected_m = 5e-4 * (t_s + ratio / w * (first + second))
     assert result.true_drive_position_m == pytest.approx(expected_m, abs=1e-12)
 
 

@@ -21,11 +21,12 @@ def test_viscous_friction_adds_to_the_stribeck_curve(form, power, v_mps):
     assert result.true_friction_force_N == pytest.approx(expected_N, rel=2e-4)
 
 
-def test_friction_along_the_track_is_a_sine():
-    values = {"ratio": 0.1, "wavelength_m": 2e-3, "phase_rad": 0.7}
+def test_friction_along_the_track_is_a_sine_with_its_second_harmonic():
+    values = {"ratio": 0.1, "wavelength_m": 2e-3, "phase_rad": 0.7, "second_sin": 0.4, "second_cos": -0.3}
     result = towed({"position-dependent-friction": values}, FAST_MPS, 1.0)
-    sine = np.sin(TAU * result.true_position_m / 2e-3 + 0.7)
-    assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 + 0.1 * sine), rel=2e-4)
+    angle = TAU * result.true_position_m / 2e-3 + 0.7
+    wave = np.sin(angle) + 0.4 * np.sin(2 * angle) - 0.3 * np.cos(2 * angle)
+    assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 + 0.1 * wave), rel=4e-4)
 
 
 @pytest.mark.parametrize(

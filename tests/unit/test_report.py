@@ -112,7 +112,7 @@ def test_a_diagnosis_with_nothing_in_it(verdict, tmp_path):
     )
     page = page_of(empty, tmp_path)
     assert f'class="verdict {verdict}"' in page
-    assert "There was no gap to close." in page
+    assert "with the best explanation" not in page
     assert "No place stands out." in page
     assert "base64" not in page
 
