@@ -41,7 +41,8 @@ Progress = Callable[[str, float], None]
 _ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
 _MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
 _FIRST_REPLICATES, _REPLICATES = 12, 32
-_RETRIED = 2  # best single effects whose nuisances the rig without effects is tried at
+_WORTH_A_SECOND = 5.0 * COST_OF_EFFECT  # of chi2 that the best single effect takes: of two that show, one takes more
+_RETRIED = 1  # best single effects whose nuisances the rig without effects is tried at
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
@@ -82,7 +83,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         origins.append((fitter.described(described), FAR_KNEE))
     singles = refitted(fitter, origins, tried, jobs)
     pairs: list[Fit] = []
-    if singles and retuned.chi2 - singles[0].chi2 > COST_OF_EFFECT:
+    if singles and retuned.chi2 - singles[0].chi2 > _WORTH_A_SECOND:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
         pairs = pairs_of_effects(fitter, retuned, singles, tried, jobs)
         singles = _again(fitter, singles, pairs)

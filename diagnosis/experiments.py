@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.commands import Segment
-from diagnosis.features import Scales
+from diagnosis.features import Scales, settled
 from diagnosis.manifest import RigTable
 from diagnosis.problem import Point, Prepared, Problem
 from diagnosis.reduced import BLOCK_S
@@ -124,7 +124,7 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
     counts = [round(step.seconds / BLOCK_S) for step in plan.steps]
     edges = np.concatenate([[0], np.cumsum(counts)]).tolist()
     segments = tuple(
-        Segment(first, last, step.velocity_mps, step.frequency_Hz, step.amplitude_m, slips=3, still=True)
+        Segment(first, last, step.velocity_mps, step.frequency_Hz, step.amplitude_m)
         for first, last, step in zip(edges[:-1], edges[1:], plan.steps, strict=True)
     )
     commands = template.commands._replace(
@@ -135,7 +135,9 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
     )
     start = template.start._replace(position_m=template.start.position_m + plan.shift_m)
     run = template._replace(file=plan.what, holdout=False, commands=commands, start=start, clipped={})
-    return run._replace(signals=problem.signals(run, point))
+    signals = problem.signals(run, point)
+    settled_ones = tuple(settled(signals, segment, problem.scales) for segment in segments)
+    return run._replace(signals=signals, commands=commands._replace(segments=settled_ones))
 
 
 def _cycle_m(rig: RigTable, scales: Scales) -> float:
