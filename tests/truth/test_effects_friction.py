@@ -21,6 +21,16 @@ def test_viscous_friction_adds_to_the_stribeck_curve(form, power, v_mps):
     assert result.true_friction_force_N == pytest.approx(expected_N, rel=2e-4)
 
 
+@pytest.mark.parametrize("v_ratio", [0.5, 1.0, 3.0])
+def test_a_stribeck_curve_with_a_tail(v_ratio):
+    """Seven tenths of Hess and Soom's curve, which at three Stribeck velocities has not fallen as the Gaussian has."""
+    v_mps = v_ratio * CONTACT.stribeck_velocity_mps
+    result = towed({}, v_mps, 0.5, contact={"stribeck_tail": 0.7})
+    fall = 0.3 * math.exp(-(v_ratio**2)) + 0.7 / (1.0 + v_ratio**2)
+    expected_N = CONTACT.coulomb_force_N + (CONTACT.static_force_N - CONTACT.coulomb_force_N) * fall
+    assert result.true_friction_force_N[-1] == pytest.approx(expected_N, rel=1e-5)
+
+
 def test_friction_along_the_track_is_a_sine_with_its_second_harmonic():
     values = {"ratio": 0.1, "wavelength_m": 2e-3, "phase_rad": 0.7, "second_sin": 0.4, "second_cos": -0.3}
     result = towed({"position-dependent-friction": values}, FAST_MPS, 1.0)
