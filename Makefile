@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 BLIND := $(or $(OUT),runs/blind)
 
-.PHONY: demo test check bench campaign real bless lock proto clean
+.PHONY: demo test check bench blind real bless lock proto clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap

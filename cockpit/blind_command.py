@@ -1,11 +1,9 @@
 """`stickslip blind ...`: make a set of rigs with sealed answers, diagnose it without them, open and score it."""
 
-import os
 import signal
 import sys
 import time
-from collections.abc import Generator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +12,7 @@ import typer
 
 from bridge.faults import Fault
 from cockpit.processes import guarded
+from cockpit.writing import check_writable, writing
 
 blind_app = typer.Typer(
     help="How good is the diagnosis? Sealed cases made, diagnosed without the answers, scored.", no_args_is_help=True
@@ -56,7 +55,7 @@ def blind_make(
             line = "blind make: the generators of cases are not installed; run it in a checkout of the source tree"
             raise Fault("CONFIG", line) from None
         _end_like_ctrl_c()
-        with _writing(), watched() as progress:
+        with writing(), watched() as progress:
             make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
         print(f"{cases} cases    {out}\nkey         {key}\nnext        stickslip blind run {out}")
 
@@ -76,7 +75,7 @@ def blind_run(folder: SetArgument, jobs: Jobs = None) -> None:
         _end_like_ctrl_c()
         todo = len(missing(folder))
         began = time.monotonic()
-        with _writing(), watched() as progress, closing(run(folder, jobs or cpu_count())) as outcomes:
+        with writing(), watched() as progress, closing(run(folder, jobs or cpu_count())) as outcomes:
             for done, outcome in enumerate(outcomes, 1):
                 left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
                 progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
@@ -110,13 +109,13 @@ def blind_score(
         from diagnosis.strict_json import write_json
 
         _end_like_ctrl_c()
-        _check_writable("--json", as_json)
-        _check_writable("--report", report)
-        with _writing(), watched() as progress:
+        _check_file("--json", as_json)
+        _check_file("--report", report)
+        with writing(), watched() as progress:
             cases, sealed = open_set(folder, key, partial)
             methods = scored(folder, cases, baselines, jobs or cpu_count(), progress)
         print(table(methods, sealed))
-        with _writing():
+        with writing():
             if as_json is not None:
                 write_json(as_json, {"format": "blind-scores/1", "sealed": sealed, "methods": plain(methods)})
             if report is not None:
@@ -131,23 +130,10 @@ def _end_like_ctrl_c() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
-def _check_writable(option: str, path: Path | None) -> None:
+def _check_file(option: str, path: Path | None) -> None:
     """Refuse before the answers are opened what could not be written afterwards. Raises Fault."""
     if path is None:
         return
     if path.is_dir():
         raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")
-    above = next(parent for parent in path.absolute().parents if parent.exists())
-    if not above.is_dir() or not os.access(above, os.W_OK):
-        raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {above} does not allow it; choose another")
-
-
-@contextmanager
-def _writing() -> Generator[None]:
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        line = f"{error.filename}: cannot be written: {error.strerror}; choose another place or free space"
-        raise Fault("LOG_WRITE", line) from None
+    check_writable(option, path)

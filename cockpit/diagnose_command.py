@@ -1,11 +1,10 @@
 """`stickslip diagnose`: what makes a rig differ from its description; for one evidence folder or for many."""
 
 import json
-import os
 import signal
 import sys
-from collections.abc import Callable, Generator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -13,6 +12,7 @@ import typer
 
 from bridge.faults import FAULTS, Fault
 from cockpit.processes import guarded
+from cockpit.writing import check_writable, writing
 
 if TYPE_CHECKING:
     from diagnosis.evidence import Evidence
@@ -79,9 +79,7 @@ def _check_destinations(wishes: _Wishes, one: bool) -> None:
         if path.exists() and path.is_dir() != folder_wanted:
             rule = "must be a folder, one report for each evidence" if folder_wanted else "must be a file, not a folder"
             raise Fault("CONFIG", f"{option} {path}: {rule}; choose another")
-        above = next(parent for parent in (path, *path.absolute().parents) if parent.exists())
-        if not os.access(above, os.W_OK) or (above != path and not above.is_dir()):
-            raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {above} does not allow it; choose another")
+        check_writable(option, path)
 
 
 def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
@@ -97,7 +95,7 @@ def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
     with watched() as progress:
         diagnosis = _result(source, evidence, wishes, progress)
     written: list[str] = []
-    with _writing():
+    with writing():
         if wishes.json is not None:
             _write_json(wishes.json, to_json(diagnosis))
         if wishes.report is not None:
@@ -108,7 +106,7 @@ def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
     if wishes.apply is not None:
         said = "not written: nothing explains the gap, there is no effect to apply"
         if diagnosis.verdict != "unexplained":
-            with _writing():
+            with writing():
                 write_rig(diagnosis, evidence, wishes.apply)
             said = str(wishes.apply)
         print(f"rig file   {said}", file=sys.stderr if wishes.json == _STDOUT else sys.stdout)
@@ -142,13 +140,13 @@ def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
         for outcome in outcomes:
             name = outcome.source.name
             if outcome.diagnosis is not None and wishes.report is not None:
-                with _writing():
+                with writing():
                     write_report(outcome.diagnosis, name, wishes.report / f"{_file_name(name)}.html")
             found[name] = _without_pictures(outcome)
             progress(f"{len(found)} of {len(sources)}: {in_a_line(outcome)}", len(found) / len(sources))
     results = [found[source.name] for source in sources]
     if wishes.json is not None:
-        with _writing():
+        with writing():
             _write_json(wishes.json, many_as_json(results))
     if wishes.json != _STDOUT:
         print("\n".join(in_a_line(outcome) for outcome in results))
@@ -176,15 +174,3 @@ def _write_json(path: Path, value: dict[str, Any]) -> None:
         print(json.dumps(strict_json(value), allow_nan=False, indent=1))
     else:
         write_json(path, value)
-
-
-@contextmanager
-def _writing() -> Generator[None]:
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise Fault(
-            "LOG_WRITE", f"{error.filename}: cannot be written: {error.strerror}; choose another place"
-        ) from None

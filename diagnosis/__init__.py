@@ -21,6 +21,7 @@ Fit
     nuisance                    what may differ without being a gap, in units of its tolerance
     library                     every effect in every formula, with coordinates and starts
     waves, axis_waves           periods at which a wave may be looked for
+    retuning                    the rig without effects, refitted: what all evidence is measured against
     refit                       Gauss-Newton over nuisances and the parameters of an effect
     search                      from all trials to the few that are refitted in full
 Verdict

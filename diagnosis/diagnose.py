@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridge.faults import Fault
 from diagnosis.evidence import Evidence
 from diagnosis.flexible import flexible_differences
 from diagnosis.gap import (
@@ -18,19 +17,16 @@ from diagnosis.gap import (
     cell_names,
     cell_squares,
     differences,
-    floor_of,
-    gap,
-    replicates,
 )
 from diagnosis.heldout import Closed, HeldOut
 from diagnosis.imitation import imitators
 from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
-from diagnosis.nuisance import Nuisances
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Parameter, Shrinkage
+from diagnosis.retuning import retuned_rig
 from diagnosis.search import much_left, pairs_of_effects, refitted
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
@@ -38,11 +34,7 @@ from diagnosis.verdict import COST_OF_EFFECT, Verdict, judge
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
-_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
-_MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
-_FIRST_REPLICATES, _REPLICATES = 12, 32
 _WORTH_A_SECOND = 5.0 * COST_OF_EFFECT  # of chi2 that the best single effect takes: of two that show, one takes more
-_RETRIED = 1  # best single effects whose nuisances the rig without effects is tried at
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
@@ -54,29 +46,8 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     runs = prepare(evidence)
     fitted = [run for run in runs if not run.holdout]
     problem = Problem(evidence.rig, fitted)
-    nuisances = Nuisances(evidence.rig)
-    described = np.zeros(len(nuisances))
-    point = nuisances.point(described, {})
-    first = replicates(problem, point, _ROUGHNESS, _FIRST_REPLICATES, 1)
-    roughness = _roughness(problem, first)
-    floor = floor_of(problem, point, first)
-    fitter = Fitter(problem, floor, nuisances)
-    if not floor.compared.any():
-        raise Fault(
-            "BAD_EVIDENCE",
-            f"{evidence.folder}: the rig as described shows nothing of what was measured: check the friction and the stiffness "
-            "of [rig] against the runs",
-        )
-    apart = gap(floor, differences(floor, problem, problem.predicted(point)))
-    progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
-    retuned = fitter.retuned(described)
-    point = nuisances.point(retuned.deviations, {})
-    floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2), floor)
-    fitter = Fitter(problem, floor, nuisances)
-    retuned = fitter.retuned(retuned.deviations)
-    left = differences(floor, problem, fitter.predicted(retuned.deviations, {}))
-    progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
-
+    fitter, retuned, roughness = retuned_rig(evidence, problem, progress)
+    described = np.zeros(len(fitter.nuisances))
     tried = trials(problem)
     origins = [(retuned, KNEE)]
     if much_left(retuned):  # then the effect is large, and may have pulled the refit into a valley of its own
@@ -88,10 +59,10 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         pairs = pairs_of_effects(fitter, retuned, singles, tried, jobs)
         singles = _again(fitter, singles, pairs)
     # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
-    for one in singles[:_RETRIED]:
-        retuned = min(retuned, fitter.refit(NOTHING, one.deviations, np.zeros(0)), key=lambda fit: fit.chi2)
-    for i, one in enumerate(singles[:_RETRIED]):
-        singles[i] = min(one, fitter.refit(one.form, retuned.deviations, one.w), key=lambda fit: fit.chi2)
+    if singles:
+        best = singles[0]
+        retuned = min(retuned, fitter.refit(NOTHING, best.deviations, np.zeros(0)), key=lambda fit: fit.chi2)
+        singles[0] = min(best, fitter.refit(best.form, retuned.deviations, best.w), key=lambda fit: fit.chi2)
     verdict = judge(retuned, singles, pairs)
     best = verdict.named or retuned
     progress(f"verdict: {verdict.kind}", 0.8)
@@ -112,22 +83,6 @@ def _again(fitter: Fitter, singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
         if before is None or fit.chi2 < before.chi2:
             found[name,] = fit
     return sorted(found.values(), key=lambda fit: fit.chi2)
-
-
-def _roughness(problem: Problem, drawn: Floats) -> Roughness:
-    """Roughness of the surface from the scatter of the breakaways, drawn towards what bench surfaces have."""
-    logs: list[float] = []
-    for i, (_, label) in enumerate(problem.labels):
-        if label.name == "scatter" and label.regime == "breakaway" and np.isfinite(problem.measured[i]):
-            known = drawn[np.isfinite(drawn[:, i]), i]
-            if len(known) and problem.measured[i] > 0.0:
-                logs.append(0.5 * math.log(problem.measured[i] / float(known.mean())))
-    if not logs:
-        return _ROUGHNESS
-    # one segment's scatter is known to a factor of 1.4 or so; surfaces lie within a factor of two of 0.3 %
-    weight = len(logs) / (len(logs) + 0.5)
-    ratio = _MARGIN * _ROUGHNESS.ratio * math.exp(weight * float(np.median(logs)))
-    return _ROUGHNESS._replace(ratio=min(max(ratio, 0.002), 0.008))
 
 
 def _assembled(

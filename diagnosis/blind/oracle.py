@@ -16,20 +16,17 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import Oracle
 from diagnosis.evidence import load_evidence
-from diagnosis.gap import KNEE, floor_of, replicates
+from diagnosis.gap import KNEE
 from diagnosis.heldout import HeldOut
 from diagnosis.library import trials
-from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
-from diagnosis.refit import FAR_KNEE, Fit, Fitter
+from diagnosis.refit import FAR_KNEE, Fit
+from diagnosis.retuning import retuned_rig
 from diagnosis.search import refitted
 from diagnosis.strict_json import write_json
-from diagnosis.twin import Roughness
 
 Progress = Callable[[str, float], None]
 KEPT = "oracle"
-_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)
-_REPLICATES = 24
 
 
 def oracle(folder: Path, cases: list[Opened], jobs: int, progress: Progress) -> Oracle:
@@ -63,30 +60,21 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     evidence = load_evidence(folder)
     runs = prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
-    nuisances = Nuisances(evidence.rig)
-    described = np.zeros(len(nuisances))
-    point = nuisances.point(described, {})
-    fitter = Fitter(
-        problem, floor_of(problem, point, replicates(problem, point, _ROUGHNESS, _REPLICATES, 1)), nuisances
-    )
-    retuned = fitter.retuned(described)
-    point = nuisances.point(retuned.deviations, {})
-    fitter = Fitter(
-        problem, floor_of(problem, point, replicates(problem, point, _ROUGHNESS, _REPLICATES, 2)), nuisances
-    )
-    retuned = fitter.retuned(retuned.deviations)
+    fitter, retuned, roughness = retuned_rig(evidence, problem, _untold)
     tried = trials(problem)
     best: Fit = retuned
     for effect in effects:  # one after the other, each on top of those before it
         own = [trial for trial in tried if trial.form.effects == (effect,)]
         origins = [(best, KNEE)]
         if best is retuned:
-            origins.append((fitter.described(described), FAR_KNEE))
+            origins.append((fitter.described(np.zeros(len(fitter.nuisances))), FAR_KNEE))
         found = refitted(fitter, origins, own)
         if not found:
             return None
         best = found[0]
-    held_out = HeldOut(
-        Problem(evidence.rig, [run for run in runs if run.holdout]), nuisances, best, retuned, _ROUGHNESS
-    )
-    return held_out.closed_by(best).shrinkage
+    unseen = Problem(evidence.rig, [run for run in runs if run.holdout])
+    return HeldOut(unseen, fitter.nuisances, best, retuned, roughness).closed_by(best).shrinkage
+
+
+def _untold(_said: str, _share: float) -> None:
+    """Cases are counted, not their steps."""

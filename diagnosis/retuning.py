@@ -1,0 +1,71 @@
+"""The rig without effects: its floor, and its numbers refitted inside their tolerances. All evidence is measured against it."""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.faults import Fault
+from diagnosis.evidence import Evidence
+from diagnosis.gap import differences, floor_of, gap, replicates
+from diagnosis.nuisance import Nuisances
+from diagnosis.problem import Problem
+from diagnosis.refit import Fit, Fitter
+from diagnosis.twin import Roughness
+
+Floats = npt.NDArray[np.floating[Any]]
+_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
+_MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
+_FIRST_REPLICATES, _REPLICATES = 12, 32
+
+
+class Retuned(NamedTuple):
+    """The refitted rig, the fitter with its floor, and the surface that the floor is made with."""
+
+    fitter: Fitter
+    fit: Fit
+    roughness: Roughness
+
+
+def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None]) -> Retuned:
+    """Refit the rig of an evidence to its fitted runs. Raises Fault BAD_EVIDENCE when nothing can be compared."""
+    nuisances = Nuisances(evidence.rig)
+    described = np.zeros(len(nuisances))
+    point = nuisances.point(described, {})
+    first = replicates(problem, point, _ROUGHNESS, _FIRST_REPLICATES, 1)
+    roughness = _roughness(problem, first)
+    floor = floor_of(problem, point, first)
+    if not floor.compared.any():
+        raise Fault(
+            "BAD_EVIDENCE",
+            f"{evidence.folder}: the rig as described shows nothing of what was measured: check the friction and the stiffness "
+            "of [rig] against the runs",
+        )
+    apart = gap(floor, differences(floor, problem, problem.predicted(point)))
+    progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
+    fit = Fitter(problem, floor, nuisances).retuned(described)
+    point = nuisances.point(fit.deviations, {})
+    floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2), floor)
+    fitter = Fitter(problem, floor, nuisances)
+    fit = fitter.retuned(fit.deviations)
+    left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
+    progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
+    return Retuned(fitter, fit, roughness)
+
+
+def _roughness(problem: Problem, drawn: Floats) -> Roughness:
+    """Roughness of the surface from the scatter of the breakaways, drawn towards what bench surfaces have."""
+    logs: list[float] = []
+    for i, (_, label) in enumerate(problem.labels):
+        if label.name == "scatter" and label.regime == "breakaway" and np.isfinite(problem.measured[i]):
+            known = drawn[np.isfinite(drawn[:, i]), i]
+            if len(known) and problem.measured[i] > 0.0:
+                logs.append(0.5 * math.log(problem.measured[i] / float(known.mean())))
+    if not logs:
+        return _ROUGHNESS
+    # one segment's scatter is known to a factor of 1.4 or so; surfaces lie within a factor of two of 0.3 %
+    weight = len(logs) / (len(logs) + 0.5)
+    ratio = _MARGIN * _ROUGHNESS.ratio * math.exp(weight * float(np.median(logs)))
+    return _ROUGHNESS._replace(ratio=min(max(ratio, 0.002), 0.008))
