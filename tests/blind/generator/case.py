@@ -133,7 +133,7 @@ def simulate(case: Case, seed: int, plans: tuple[Plan, ...] = PROTOCOL, finer: i
             effect.formula.surface(track_m(), level, effect.strength, effect.numbers)
     runs = []
     for number, (plan, start) in enumerate(zip(plans, starts, strict=True)):
-        tracks = tracks_of(plan, number)
+        tracks = tracks_of(plan, number, start.position_m)
         for effect in effects:
             if effect.formula.run:
                 effect.formula.run(tracks, effect.strength, effect.numbers)

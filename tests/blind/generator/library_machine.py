@@ -34,9 +34,9 @@ def _wave(angle: np.ndarray, n: Numbers) -> np.ndarray:
 
 
 def _ripple_pitch(tracks: Tracks, s: float, n: Numbers) -> None:
-    """The lead of the screw errs once and twice per turn."""
+    """The lead of the screw errs once and twice per turn; a run that starts elsewhere starts at another angle."""
     per_m = 2.0 * np.pi / n["pitch_m"]
-    _move_drive(tracks, s * n["depth"] / per_m * _wave(per_m * tracks.drive_m, n))
+    _move_drive(tracks, s * n["depth"] / per_m * _wave(per_m * (tracks.origin_m + tracks.drive_m), n))
 
 
 def _ripple_time(tracks: Tracks, s: float, n: Numbers) -> None:

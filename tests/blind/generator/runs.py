@@ -43,7 +43,8 @@ class Tracks:
 
     number: int  # of the run, from 0
     t_s: np.ndarray  # knots
-    drive_m: np.ndarray  # knots; from the drive's own zero, which is where it starts
+    origin_m: float  # where the drive starts, on the track
+    drive_m: np.ndarray  # knots; from there
     drive_mps: np.ndarray  # knots
     unseen_m: np.ndarray  # knots; what the spring's end moves beyond the measured drive position
     load: np.ndarray  # knots; factor on friction
@@ -68,7 +69,7 @@ def _vibration(plan: Plan, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return frequency, amplitude
 
 
-def tracks_of(plan: Plan, number: int) -> Tracks:
+def tracks_of(plan: Plan, number: int, origin_m: float = 0.0) -> Tracks:
     """The run as planned: a drive that moves as told, a piezo that delivers what it is told, no load change."""
     samples = round(plan.duration_s * SAMPLE_RATE_HZ)
     t_s = np.arange(samples + 1) / SAMPLE_RATE_HZ
@@ -84,6 +85,7 @@ def tracks_of(plan: Plan, number: int) -> Tracks:
     return Tracks(
         number=number,
         t_s=t_s,
+        origin_m=origin_m,
         drive_m=drive_m,
         drive_mps=drive_mps,
         unseen_m=np.zeros_like(t_s),
