@@ -34,7 +34,7 @@ _BREAKAWAY_WAVES = 5
 _ENOUGH_SLIPS = 0.5  # sum of their weights
 _LEVEL = 0.15  # of the static friction: sliding under a friction wave changes by less
 _TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
-_DRIVE_WAVES = 24
+DRIVE_WAVES = 24
 _RESOLVED_M2 = (
     1e-18  # (1 nm)^2: a commanded position that was logged as measured has no noise but the rounding of its sums
 )
@@ -337,7 +337,7 @@ def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
     for segment in commands.segments:
         rows = slice(segment.first, segment.last)
         rest_m[rows] = _without_line(position_m[rows], segment)
-    waves = np.asarray(dct(rest_m))[1 : _DRIVE_WAVES + 1] / len(rest_m)
+    waves = np.asarray(dct(rest_m))[1 : DRIVE_WAVES + 1] / len(rest_m)
     for wave, value in enumerate(waves.tolist(), start=1):
         found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
     fast = rest_m - uniform_filter1d(rest_m, 100)

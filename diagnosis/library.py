@@ -13,11 +13,13 @@ from diagnosis.axis_waves import axis_waves
 from diagnosis.manifest import RigTable
 from diagnosis.problem import Prepared, Problem
 from diagnosis.refit import Axis, Form
+from diagnosis.ringing import ringing_Hz
 from diagnosis.waves import Wave, drive_waves, friction_waves
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
+_STUCK = 1.1  # own frequency of a base over the one at which it rings with the slide stuck to it
 _AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 
 
@@ -70,9 +72,10 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
     if name == "frame-compliance":
         starts = [{"frequency_Hz": f} for f in (40.0, 90.0, 200.0)]
     elif name == "base-compliance":
-        starts = [{"frequency_Hz": f} for f in (50.0, 120.0, 300.0)]
+        rings_Hz = [_STUCK * f for f in ringing_Hz(runs, "base_accel_mps2", 2)]
+        starts = [{"frequency_Hz": f} for f in rings_Hz or (50.0, 120.0, 300.0)]
     elif name == "piezo-resonance":
-        starts = [{"resonance_Hz": share * highest_Hz} for share in (0.7, 1.2, 2.0)]
+        starts = [{"resonance_Hz": share * highest_Hz} for share in (0.5, 0.75, 0.9, 1.2, 2.0)]
     return [_trial(name, form, scale, start) for start in starts]
 
 
@@ -100,7 +103,8 @@ def _wave_trial(name: str, form: str, wave: Wave) -> Trial:
         else:
             size = wave.period if row.name == "wavelength_m" else 1.0 / wave.period
             axes.append(Axis(name, row.name, size, True, wave.spread, row.low, row.high))
-    w = np.array([wave.phase_rad if axis.name == "phase_rad" else 0.0 for axis in axes])
+    start = {"phase_rad": wave.phase_rad, "second_sin": wave.second_sin, "second_cos": wave.second_cos}
+    w = np.array([start.get(axis.name, 0.0) / axis.scale for axis in axes])
     return Trial(Form({name: form}, tuple(axes)), w)
 
 
@@ -120,6 +124,7 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
     # wide, so that the rig's number of the same name, which holds a part of it, goes back to where it was
     level = {"ratio": _Scale(0.1, False, 3.0)}
     wave = {"ratio": _Scale(0.02, True, 1.5), "phase_rad": _Scale(1.0, False, 3.0)}
+    mode = {"resonance_Hz": _Scale(1.0, True, 0.7), "damping_ratio": _Scale(0.05, True, 0.7)}
     table: dict[tuple[str, str], dict[str, _Scale]] = {
         ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)},
         ("static-friction-ageing", "power"): {"ratio": _Scale(0.04, True, 1.5), "exponent": _Scale(0.3, True, 0.5)},
@@ -156,7 +161,8 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
         },
         ("piezo-roll-off", "first-order"): {"corner_Hz": _Scale(2.0 * max(highest_Hz, 1.0), True, 1.5)},
         ("piezo-roll-off", "second-order"): {"corner_Hz": _Scale(3.0 * max(highest_Hz, 1.0), True, 1.5)},
-        ("piezo-resonance", ""): {"resonance_Hz": _Scale(1.0, True, 0.7), "damping_ratio": _Scale(0.05, True, 0.7)},
+        ("piezo-resonance", "mount"): mode,
+        ("piezo-resonance", "mode"): {"ratio": _Scale(0.3, True, 1.5)} | mode,
         ("piezo-sag", "load"): {"ratio": _Scale(0.2, False)},
         ("piezo-sag", "heat"): {"ratio": _Scale(0.2, False), "settling_s": _Scale(0.2 * length_s, True, 0.7)},
         ("force-sensor-gain", ""): {"ratio": _Scale(0.05, False)},

@@ -21,7 +21,9 @@ from diagnosis.refit import QUICK, Fit, Fitter, Form
 Floats = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
 R = TypeVar("R")
-_QUICK = 8  # trials of a screening that get two steps of a refit
+_QUICK = 8  # trials of a screening that get two steps of a refit,
+_QUICK_AT_LEAST = 4  # these whatever they promise,
+_PROMISING = 5.0  # the others if they would take this much of chi2
 _FULL = 3  # single effects that are refitted to the end,
 _FULL_PAIRS = 2  # and pairs of effects,
 _WORTH_FULL = 0.2  # of the best one's gain, or they are too far behind to matter
@@ -110,7 +112,8 @@ def refitted(fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Tria
     """
     starts: list[Screened] = []
     for base, knee in origins:
-        starts += _screened(fitter, base, knee, trials, jobs)[:_QUICK]
+        found = _screened(fitter, base, knee, trials, jobs)[:_QUICK]
+        starts += [one for i, one in enumerate(found) if i < _QUICK_AT_LEAST or one.chi2 < base.chi2 - _PROMISING]
     return _refitted(fitter, origins[0][0].chi2, starts, jobs, _FULL)
 
 

@@ -15,17 +15,20 @@ from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 
 Floats = npt.NDArray[np.floating[Any]]
-_GRID = 400
+_GRID = 1500
 _LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
-_LOBE = 3  # grid points within which peaks are one
+_LOBE = 10  # grid points within which peaks are one
+_STEEPEST = 0.8  # of a second harmonic, relative to the first
 
 
 class Wave(NamedTuple):
-    """ratio sin(2 pi u / period + phase_rad) over a coordinate u."""
+    """ratio (sin a + second_sin sin 2a + second_cos cos 2a), a = 2 pi u / period + phase_rad, over a coordinate u."""
 
     period: float
     ratio: float
     phase_rad: float
+    second_sin: float = 0.0
+    second_cos: float = 0.0
     spread: float = 0.2  # of the period, relative: one standard deviation
 
 
@@ -34,6 +37,7 @@ class Series(NamedTuple):
 
     at: Floats
     value: Floats  # relative to the mean of its stretch
+    weight: float = 1.0
 
 
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
@@ -83,19 +87,22 @@ def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
             mean = own[:whole].reshape(-1, 20).mean(axis=1)
             t_s = run.start.t_s + (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
             slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
-            series.append(Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0))
-    return _strongest(series, most)
+            # noise of the position is the smaller in a relative velocity the faster the drive
+            speed_mm_per_s = 1e3 * abs(segment.drive_velocity_mps)
+            series.append(Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0, speed_mm_per_s))
+    return _strongest(series, most, 2)
 
 
-def _strongest(series: list[Series], most: int) -> list[Wave]:
+def _strongest(series: list[Series], most: int, harmonics: int = 1) -> list[Wave]:
     if not series:
         return []
     span = max(float(np.ptp(one.at)) for one in series)
     spacing = min(float(np.median(np.abs(np.diff(one.at)))) for one in series)
     if span <= 0.0 or spacing <= 0.0:
         return []
+    reach = max(float(one.at.max()) for one in series) - min(float(one.at.min()) for one in series)
     periods = np.geomspace(max(0.3 * spacing, span / 100.0), 2.0 * span, _GRID)
-    found = [fitted(series, float(period)) for period in periods]
+    found = [fitted(series, float(period), harmonics) for period in periods]
     power = np.array([gain for gain, _ in found])
     # the best of every range of periods: short ones fit the few breakaways best whatever is there
     edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
@@ -103,16 +110,24 @@ def _strongest(series: list[Series], most: int) -> list[Wave]:
     for first, last in pairwise(edges.tolist()):
         peaks = [i for i in range(first, last) if power[i] == power[max(0, i - _LOBE) : i + _LOBE + 1].max()]
         best += sorted(peaks, key=lambda i: -power[i])[:_LOBES]
-    return [found[i][1] for i in best if power[i] > 0.0]
+    waves = [found[i][1] for i in best if power[i] > 0.0]
+    return [wave._replace(spread=min(0.5 * wave.period / reach, 0.2)) for wave in waves]
 
 
-def fitted(series: list[Series], period: float) -> tuple[float, Wave]:
-    """What a wave of this period takes of the sum of squares, and the wave."""
-    normal, right = np.zeros((2, 2)), np.zeros(2)
+def fitted(series: list[Series], period: float, harmonics: int = 1) -> tuple[float, Wave]:
+    """What a wave of this period, with up to two harmonics, takes of the sum of squares, and the wave."""
+    normal, right = np.zeros((2 * harmonics, 2 * harmonics)), np.zeros(2 * harmonics)
     for one in series:
-        columns = np.stack([np.sin(2 * np.pi * one.at / period), np.cos(2 * np.pi * one.at / period)], axis=1)
-        columns -= columns.mean(axis=0)
+        turns = 2.0 * np.pi * one.at / period
+        columns = np.stack([wave(k * turns) for k in range(1, harmonics + 1) for wave in (np.sin, np.cos)], axis=1)
+        columns = one.weight * (columns - columns.mean(axis=0))
         normal += columns.T @ columns
-        right += columns.T @ one.value
-    a, b = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(2), right)
-    return float(right @ (a, b)), Wave(period, float(np.hypot(a, b)), float(np.arctan2(b, a)))
+        right += one.weight * (columns.T @ one.value)
+    shares = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(2 * harmonics), right)
+    ratio, phase = float(np.hypot(*shares[:2])), float(np.arctan2(shares[1], shares[0]))
+    wave = Wave(period, ratio, phase)
+    if harmonics == 2 and ratio > 0.0:
+        turned = complex(*shares[2:]) * np.exp(-2j * phase) / ratio
+        second = np.clip((turned.real, turned.imag), -_STEEPEST, _STEEPEST).tolist()
+        wave = wave._replace(second_sin=second[0], second_cos=second[1])
+    return float(right @ shares), wave

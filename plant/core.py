@@ -69,6 +69,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         # into locals: through the record every store to an output array would force a reload (183 -> 2xx x real time)
         dt, m, k_d, h_d = p.dt_s, p.m, p.k_d, p.h_d
         k_t, h_t, h_v, F_c, F_s, per_v_s = p.k_t, p.h_t, p.h_v, p.F_c, p.F_s, 1.0 / p.v_s
+        tail = p.stribeck_tail
         force_share, accel_share = 1.0 - p.force_keep, 1.0 - p.accel_keep
         position_share, slow_share = 1.0 - p.position_keep, 1.0 - p.accel_highpass_keep
         steps_per_sample, samples = p.steps_per_sample, p.samples_per_block
@@ -181,8 +182,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     damping = h_v
                 q = v_g * per_v_s
                 fall = math.exp(-q * q)
-                if disturbed and p.stribeck_tail != 0.0:
-                    fall += p.stribeck_tail * (1.0 / (1.0 + q * q) - fall)
+                if tail != 0.0:
+                    fall += tail * (1.0 / (1.0 + q * q) - fall)
                 g = F_c_now + (F_s_now - F_c_now) * fall
                 if disturbed:
                     least_N = least_N_per_m * math.fabs(z)

@@ -5,7 +5,8 @@ out) and the form's parameters. Off is bit-identical to the nominal rig: effects
 folded into it by `plant.records.build`, the others run in a kernel of their own (`plant.core.advance_disturbed`).
 
 Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; lag: Hess & Soom 1990;
-log and power ageing, hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994.
+log and power ageing, hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; a mode that takes part by a
+share: Ewins, Modal Testing, 2000.
 """
 
 import math
@@ -198,11 +199,20 @@ EFFECTS: Final[dict[str, Effect]] = {
     ),
     "piezo-resonance": Effect(
         "piezo",
-        _one(
-            "amplitude times the gain of a mass on a spring, instead of what the rig's own mount does",
-            Parameter("resonance_Hz", 100.0, 1e6, 8000.0),
-            Parameter("damping_ratio", 0.005, 2.0, 0.05),
-        ),
+        {
+            "mount": Form(
+                "amplitude times the gain of a mass on a spring, instead of what the rig's own mount does",
+                (Parameter("resonance_Hz", 100.0, 1e6, 8000.0), Parameter("damping_ratio", 0.005, 2.0, 0.05)),
+            ),
+            "mode": Form(
+                "amplitude times |1 + ratio r^2 / (1 - r^2 + 2 i damping_ratio r)|, r = f / resonance_Hz, likewise instead",
+                (
+                    _ratio(0.3, 0.0, 10.0),
+                    Parameter("resonance_Hz", 100.0, 1e6, 8000.0),
+                    Parameter("damping_ratio", 0.005, 2.0, 0.05),
+                ),
+            ),
+        },
     ),
     "piezo-sag": Effect(
         "piezo",

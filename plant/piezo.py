@@ -16,7 +16,12 @@ def delivered_share(p: Record, frequency_Hz: float) -> float:
     if p.mount_resonance_Hz > 0.0:
         r = frequency_Hz / p.mount_resonance_Hz
         damped = 2.0 * p.mount_damping_ratio * r
-        share /= math.sqrt((1.0 - r * r) * (1.0 - r * r) + damped * damped)
+        squared = (1.0 - r * r) * (1.0 - r * r) + damped * damped
+        if p.mode_ratio > 0.0:
+            moved = p.mode_ratio * r * r / squared
+            share *= math.hypot(1.0 + moved * (1.0 - r * r), moved * damped)
+        else:
+            share /= math.sqrt(squared)
     if p.rolloff_Hz > 0.0:
         r = frequency_Hz / p.rolloff_Hz
         share /= math.sqrt(1.0 + r * r) if p.rolloff_order == 1.0 else 1.0 + r * r

@@ -44,7 +44,7 @@ PARAMS = np.dtype(
             *("ripple_ratio", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
             *("ripple_sin_2", "ripple_cos_2"),
             *("frame_m_per_N", "frame_Hz", "frame_damping_ratio", "base_m_per_N", "base_Hz", "base_damping_ratio"),
-            *("rolloff_Hz", "rolloff_order", "sag_ratio", "sag_settling_s"),
+            *("mode_ratio", "rolloff_Hz", "rolloff_order", "sag_ratio", "sag_settling_s"),
             *("force_lag_s", "force_lag_order", "force_delay_s", "force_ratio", "force_bias_N"),
             *("force_drift_N_per_s", "force_drift_N", "force_settling_s", "mass_accel_ratio", "base_accel_ratio"),
         )
@@ -63,16 +63,7 @@ PARAMS = np.dtype(
 _SWITCHES = (
     *("age_growth_N", "lag_s", "quadratic_Ns2_per_m2", "position_ratio", "forward_ratio", "backward_ratio"),
     "kinetic_backward_ratio",
-    *(
-        "load_ratio",
-        "drift_per_s",
-        "drift_ratio",
-        "roughness_ratio",
-        "stribeck_tail",
-        "hardening_per_m2",
-        "knee_ratio",
-        "gap_m",
-    ),
+    *("load_ratio", "drift_per_s", "drift_ratio", "roughness_ratio", "hardening_per_m2", "knee_ratio", "gap_m"),
     *("ripple_ratio", "frame_m_per_N", "base_m_per_N", "sag_ratio", "force_lag_s", "force_delay_s", "force_ratio"),
     *("force_bias_N", "force_drift_N_per_s", "force_drift_N", "mass_accel_ratio", "base_accel_ratio"),
 )
@@ -226,6 +217,9 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.rolloff_Hz, p.rolloff_order = value["corner_Hz"], 1.0 if form == "first-order" else 2.0
     elif name == "piezo-resonance":
         p.mount_resonance_Hz, p.mount_damping_ratio = value["resonance_Hz"], value["damping_ratio"]
+        if form == "mode":
+            p.mode_ratio = value["ratio"]
+            p.mount_resonance_Hz *= value["ratio"] > 0.0  # a mode that takes no part leaves a rigid mount
     elif name == "piezo-sag":
         p.sag_ratio, p.sag_settling_s = value["ratio"], value.get("settling_s", 0.0)
     elif name == "force-sensor-gain":

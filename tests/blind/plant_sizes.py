@@ -83,7 +83,10 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
         Sizes("first-order", "corner_Hz", 2e4, 2e3),
         Sizes("second-order", "corner_Hz", 2.5e4, 3e3),
     ),
-    "piezo-resonance": (Sizes("", "resonance_Hz", 3e4, 5.5e3, log=DAMPING),),
+    "piezo-resonance": (
+        Sizes("mount", "resonance_Hz", 3e4, 5.5e3, log=DAMPING),
+        Sizes("mode", "ratio", 0.01, 1.0, log=DAMPING | {"resonance_Hz": (5e3, 1e4)}),
+    ),
     "piezo-sag": (
         Sizes("load", "ratio", 0.03, 0.5),
         Sizes("heat", "ratio", 0.03, 0.5, log={"settling_s": (0.5, 5.0)}),

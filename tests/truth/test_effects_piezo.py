@@ -35,6 +35,15 @@ def test_resonance_is_that_of_a_mass_on_a_spring(frequency_Hz):
     assert delivered(effects, frequency_Hz) == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.parametrize("frequency_Hz", [500.0, 2900.0, 3000.0, 5000.0])
+@pytest.mark.parametrize("ratio", [0.15, 1.0])
+def test_a_mode_takes_part_by_its_ratio(frequency_Hz, ratio):
+    mode = {"form": "mode", "ratio": ratio, "resonance_Hz": 3000.0, "damping_ratio": 0.1}
+    r = frequency_Hz / 3000.0
+    expected = abs(1 + ratio * r**2 / (1 - r**2 + 2j * 0.1 * r))
+    assert delivered({"piezo-resonance": mode}, frequency_Hz) == pytest.approx(expected, rel=1e-3)
+
+
 def test_roll_off_and_resonance_multiply():
     roll_off = {"piezo-roll-off": {"corner_Hz": 2500.0}}
     resonance = {"piezo-resonance": {"resonance_Hz": 3000.0, "damping_ratio": 0.1}}

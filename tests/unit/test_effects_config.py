@@ -45,6 +45,7 @@ def test_every_name_is_there():
         ("drive-hardening", ["cubic", "bilinear"]),
         ("drive-speed-ripple", ["screw", "time"]),
         ("piezo-roll-off", ["first-order", "second-order"]),
+        ("piezo-resonance", ["mount", "mode"]),
         ("piezo-sag", ["load", "heat"]),
         ("force-sensor-drift", ["linear", "settling"]),
         ("force-sensor-lag", ["first-order", "second-order"]),
