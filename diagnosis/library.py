@@ -19,7 +19,7 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
-_STUCK = 1.1  # own frequency of a base over the one at which it rings with the slide stuck to it
+_STUCK = (1.05, 1.13)  # own frequency of a base over the one at which it rings with the slide stuck to it
 _AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 
 
@@ -72,7 +72,9 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
     if name == "frame-compliance":
         starts = [{"frequency_Hz": f} for f in (40.0, 90.0, 200.0)]
     elif name == "base-compliance":
-        rings_Hz = [_STUCK * f for f in ringing_Hz(runs, "base_accel_mps2", 2)]
+        rings_Hz = [times * f for f in ringing_Hz(runs, "base_accel_mps2", 2) for times in _STUCK]
+        if rings_Hz:  # several turns a slip: further off, a refit ends a turn away
+            scale |= {"frequency_Hz": scale["frequency_Hz"]._replace(prior=0.1)}
         starts = [{"frequency_Hz": f} for f in rings_Hz or (50.0, 120.0, 300.0)]
     elif name == "piezo-resonance":
         starts = [{"resonance_Hz": share * highest_Hz} for share in (0.5, 0.75, 0.9, 1.2, 2.0)]

@@ -226,7 +226,7 @@ class Fitter:
     def _axis_rates(self, form: Form, deviations: Floats, w: Floats, here: Floats) -> Floats:
         columns = np.zeros((int(self.floor.compared.sum()), len(w)))
         for i, axis in enumerate(form.axes):
-            step = 0.15 if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
+            step = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
             if axis.prior < _NARROW:  # the period of a wave that passes many times
                 step = 0.02 * axis.prior
             ahead = w.copy()
