@@ -230,4 +230,5 @@ def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) 
         at_m = float(signals["drive_position_m"][first].mean()) - force_N / scales_of(rig).stiffness_N_per_m
     else:
         at_m = 0.0
-    return Start(start_s, force_N, at_m)
+    drive_m = float(signals["drive_position_m"][first].mean()) if "drive_position_m" in signals else None
+    return Start(start_s, force_N, at_m, drive_m=drive_m)

@@ -38,6 +38,7 @@ class Start(NamedTuple):
     position_m: float
     velocity_mps: float = 0.0
     age_s: float = 10.0
+    drive_m: float | None = None  # as the drive's own sensor has it, whose zero is not that of the slide's
 
 
 class Roughness(NamedTuple):
@@ -126,6 +127,8 @@ def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
         s.frame_m = held_N * p.frame_m_per_N
         s.base_m = held_N * p.base_m_per_N
         s.s_d += s.frame_m
+        if start.drive_m is not None and p.ripple_wavelength_m > 0.0:
+            p.ripple_phase_rad += 2.0 * math.pi * (start.drive_m - s.s_d) / p.ripple_wavelength_m
         s.force_lag_1 = s.force_lag_2 = held_N
         s.delay_line[:] = held_N
 
