@@ -1,0 +1,62 @@
+"""Where refits start: what the evidence itself shows of a wave or of a ring, and a screw placed by the drive's own sensor."""
+
+import math
+
+import numpy as np
+import pytest
+
+from diagnosis.problem import Problem
+from diagnosis.ringing import ringing_Hz
+from diagnosis.twin import predict, rig_config
+from diagnosis.waves import drive_waves
+from tests.prepared import prepared
+
+PITCH_M = 1e-3
+
+
+@pytest.fixture(scope="module")
+def screw(tmp_path_factory):
+    ripple = {
+        "form": "screw",
+        "ratio": 0.08,
+        "wavelength_m": PITCH_M,
+        "phase_rad": 1.0,
+        "second_sin": 0.3,
+        "second_cos": -0.4,
+    }
+    return prepared(tmp_path_factory.mktemp("starts") / "screw", "ladder", {"drive-speed-ripple": ripple})
+
+
+def test_a_wave_of_the_drive_is_found_with_its_second_harmonic(screw):
+    _, runs = screw
+    wave = max(drive_waves(runs, "position", 4), key=lambda wave: wave.ratio * (abs(wave.period - PITCH_M) < 3e-5))
+    assert wave.period == pytest.approx(PITCH_M, rel=0.01)
+    assert wave.ratio == pytest.approx(0.08, rel=0.1)
+    assert (wave.second_sin**2 + wave.second_cos**2) ** 0.5 == pytest.approx(0.5, rel=0.15)
+
+
+def test_a_screw_stands_where_the_drives_own_sensor_says(screw):
+    """A quarter of a turn on the sensor is a quarter of a turn of the phase."""
+    evidence, runs = screw
+    run = runs[0]
+    wave = {"form": "screw", "ratio": 0.08, "wavelength_m": PITCH_M, "second_sin": 0.0, "second_cos": 0.0}
+
+    def drive_m(phase_rad: float, zero_m: float):
+        assert run.start.drive_m is not None
+        config = rig_config(evidence.rig, {}, {"drive-speed-ripple": wave | {"phase_rad": phase_rad}}, None)
+        start = run.start._replace(drive_m=run.start.drive_m + zero_m)
+        return predict(config, False, run.commands, start)["drive_position_m"]
+
+    assert drive_m(0.5 + 0.5 * math.pi, 0.0) == pytest.approx(drive_m(0.5, 0.25 * PITCH_M), abs=1e-9)
+    assert np.ptp(drive_m(0.5, 0.0) - drive_m(0.5, 0.25 * PITCH_M)) > 1e-6
+
+
+def test_a_base_that_rings_shows_its_frequency(tmp_path):
+    """Stuck to the base, the slide lowers it: 1 / (compliance omega^2) is 5 kg, and 1.5 kg more."""
+    ring = {"compliance_m_per_N": 2e-7, "frequency_Hz": 160.0, "damping_ratio": 0.03}
+    evidence, runs = prepared(tmp_path / "ring", "ladder", {"base-compliance": ring})
+    base_kg = 1.0 / (2e-7 * (2.0 * math.pi * 160.0) ** 2)
+    stuck_Hz = 160.0 / math.sqrt(1.0 + evidence.rig.mass_kg / base_kg)
+    found = ringing_Hz(Problem(evidence.rig, runs).runs, "base_accel_mps2", 2)
+    assert any(abs(one - stuck_Hz) < 5.0 for one in found)
+    assert ringing_Hz(runs, "nothing", 2) == []
