@@ -31,7 +31,9 @@ COST_OF_EFFECT = 8.0
 JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
-_SECOND_ADDS = 0.03  # and this share of what both close: less is what the first one's formula does not fit
+_SECOND_ADDS = 0.03  # and this share of what both close: less is what the first one's formula does not fit,
+# unless one alone leaves more of chi2 a compared feature than evidence without a gap does, 0.15 to 0.6, and both do not
+_RIGHT_LEAVES = 0.6
 _TEMPERATURE = 3.0  # of the probabilities: a guess, they are not calibrated yet
 
 
@@ -89,13 +91,18 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
         left = max(ranked[0].fit.chi2 - perfect_chi2(base), 1.0)
         closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
         adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
-        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or adds < _SECOND_ADDS:
+        most = _RIGHT_LEAVES * len(base.residual)
+        completes = ranked[0].fit.chi2 > most > double.fit.chi2
+        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or (adds < _SECOND_ADDS and not completes):
             double = None
     best = double or (ranked[0] if ranked else None)
     beyond = max(base.chi2 - _WORST_OF_NO_GAP * len(base.residual), 0.0)
     certain = max(base.chi2 - _NEVER_WITHOUT_GAP * len(base.residual), 0.0)
-    scores: dict[str, float] = {"none": COST_OF_EFFECT - 0.5 * certain / JITTER}
-    scores["unexplained"] = 0.5 * _CLOSED_BY_UNKNOWN * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
+    against_none = 0.5 * certain / JITTER
+    scores: dict[str, float] = {"none": COST_OF_EFFECT - against_none}
+    # what an effect must pay it owes to `unexplained` where `none` is out: every model wrong, the least wrong one is no cause
+    unknown = 0.5 * _CLOSED_BY_UNKNOWN * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
+    scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT)) if against_none > 0.0 else unknown
     for one in ranked:
         scores[one.fit.form.effects[0]] = one.evidence
     if double is not None:

@@ -1,0 +1,50 @@
+"""The verdict over made-up fits of 100 compared features, of which a right model leaves 20 to 60 of chi2."""
+
+import numpy as np
+import pytest
+
+from diagnosis.refit import NOTHING, Axis, Fit, Form
+from diagnosis.verdict import judge
+
+FEATURES = 100
+NUISANCES = 2
+
+
+def fit(chi2, *effects):
+    form = Form(dict.fromkeys(effects, ""), tuple(Axis(name, "ratio", 0.1, False, 1.0, -1.0, 1.0) for name in effects))
+    columns = np.eye(FEATURES, NUISANCES + len(effects)) * 10.0
+    residual = np.full(FEATURES, (chi2 / FEATURES) ** 0.5)
+    return Fit(form if effects else NOTHING, np.zeros(NUISANCES), np.zeros(len(effects)), chi2, residual, columns)
+
+
+def test_what_fits_well_without_effects_is_no_gap():
+    assert judge(fit(50.0), [fit(48.0, "coulomb-level")], []).kind == "no-gap"
+
+
+def test_an_effect_that_takes_most_is_named():
+    verdict = judge(fit(400.0), [fit(50.0, "coulomb-level"), fit(380.0, "static-level")], [])
+    assert verdict.kind == "effect"
+    assert verdict.named is not None
+    assert verdict.named.form.effects == ("coulomb-level",)
+    assert sum(verdict.probabilities.values()) == pytest.approx(1.0)
+
+
+def test_a_gap_that_nothing_takes_is_unexplained():
+    assert judge(fit(4000.0), [fit(3900.0, "coulomb-level")], []).kind == "unexplained"
+
+
+@pytest.mark.parametrize(
+    ("base", "single", "double", "named"),
+    [
+        (1000.0, 400.0, 50.0, 2),  # the second closes what the first leaves
+        (1000.0, 400.0, 350.0, 1),  # it closes little of it
+        (20000.0, 59.0, 45.0, 1),  # nothing was left
+        (20000.0, 300.0, 50.0, 2),  # a gap was left and is closed, although it is small beside what both close
+        (20000.0, 600.0, 200.0, 1),  # neither does: the rest is what the first one's formula does not fit
+    ],
+)
+def test_a_second_effect_must_pay(base, single, double, named):
+    pairs = [fit(double, "coulomb-level", "drive-backlash")]
+    verdict = judge(fit(base), [fit(single, "coulomb-level")], pairs)
+    assert verdict.named is not None
+    assert len(verdict.named.form.effects) == named
