@@ -27,14 +27,15 @@ from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Parameter, Shrinkage
 from diagnosis.retuning import retuned_rig
-from diagnosis.search import much_left, pairs_of_effects, refitted
+from diagnosis.search import middle_fits, much_left, pairs_of_effects, refitted
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
-from diagnosis.verdict import COST_OF_EFFECT, Verdict, judge
+from diagnosis.verdict import COST_OF_EFFECT, Verdict, judge, perfect_chi2
 
 Floats = npt.NDArray[np.floating[Any]]
+_SURE = COST_OF_EFFECT + 10.0  # log evidence that no choice of valleys makes
 Progress = Callable[[str, float], None]
-_WORTH_A_SECOND = 5.0 * COST_OF_EFFECT  # of chi2 that the best single effect takes: of two that show, one takes more
+_WORTH_A_SECOND = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
@@ -54,7 +55,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         origins.append((fitter.described(described), FAR_KNEE))
     singles = refitted(fitter, origins, tried, jobs)
     pairs: list[Fit] = []
-    if singles and retuned.chi2 - singles[0].chi2 > _WORTH_A_SECOND:
+    if singles and retuned.chi2 - singles[0].chi2 > _WORTH_A_SECOND and singles[0].chi2 > perfect_chi2(retuned):
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
         pairs = pairs_of_effects(fitter, retuned, singles, tried, jobs)
         singles = _again(fitter, singles, pairs)
@@ -64,6 +65,11 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         retuned = min(retuned, fitter.refit(NOTHING, best.deviations, np.zeros(0)), key=lambda fit: fit.chi2)
         singles[0] = min(best, fitter.refit(best.form, retuned.deviations, best.w), key=lambda fit: fit.chi2)
     verdict = judge(retuned, singles, pairs)
+    if verdict.named is not None and len(verdict.named.form.effects) == 1 and verdict.ranked[0].evidence < _SURE:
+        without, again = middle_fits(fitter, retuned, singles, verdict.named)
+        checked = judge(without, [again], [])
+        if checked.named is None:
+            retuned, singles, verdict = without, [again], checked
     best = verdict.named or retuned
     progress(f"verdict: {verdict.kind}", 0.8)
     return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began)

@@ -144,8 +144,9 @@ class Fitter:
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
     def retuned(self, deviations: Floats) -> Fit:
-        """The rig without effects, refitted from near by; other fits start from its nuisances' derivatives."""
-        fit = self.fit(NOTHING, deviations, np.zeros(0), _RETUNE)
+        """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
+        fit = self.refit(NOTHING, deviations, np.zeros(0))
+        fit = self.fit(NOTHING, fit.deviations, fit.w, _RETUNE)
         here = self.predicted(fit.deviations, {})
         self._rates = self._nuisance_rates(fit.deviations, {}, here, _STEPS[0])
         return fit

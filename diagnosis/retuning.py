@@ -12,7 +12,7 @@ from diagnosis.evidence import Evidence
 from diagnosis.gap import differences, floor_of, gap, replicates
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
-from diagnosis.refit import NOTHING, Fit, Fitter
+from diagnosis.refit import Fit, Fitter
 from diagnosis.twin import Roughness
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -45,7 +45,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
         )
     apart = gap(floor, differences(floor, problem, problem.predicted(point)))
     progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
-    fit = Fitter(problem, floor, nuisances).refit(NOTHING, described, np.zeros(0))
+    fit = Fitter(problem, floor, nuisances).retuned(described)
     point = nuisances.point(fit.deviations, {})
     floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2), floor)
     fitter = Fitter(problem, floor, nuisances)
