@@ -16,7 +16,7 @@ from diagnosis.refit import Fit, Fitter
 from diagnosis.twin import Roughness
 
 Floats = npt.NDArray[np.floating[Any]]
-_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
+ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
 _MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
 _FIRST_REPLICATES, _REPLICATES = 12, 32
 
@@ -34,8 +34,8 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     nuisances = Nuisances(evidence.rig)
     described = np.zeros(len(nuisances))
     point = nuisances.point(described, {})
-    first = replicates(problem, point, _ROUGHNESS, _FIRST_REPLICATES, 1)
-    roughness = _roughness(problem, first)
+    first = replicates(problem, point, ROUGHNESS, _FIRST_REPLICATES, 1)
+    roughness = roughness_of(problem, first)
     floor = floor_of(problem, point, first)
     if not floor.compared.any():
         raise Fault(
@@ -55,8 +55,11 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     return Retuned(fitter, fit, roughness)
 
 
-def _roughness(problem: Problem, drawn: Floats) -> Roughness:
-    """Roughness of the surface from the scatter of the breakaways, drawn towards what bench surfaces have."""
+def roughness_of(problem: Problem, drawn: Floats) -> Roughness:
+    """Roughness of the surface from the scatter of the breakaways, drawn towards what bench surfaces have.
+
+    `drawn` [replicates, features] are features of the model on surfaces of `ROUGHNESS`.
+    """
     logs: list[float] = []
     for i, (_, label) in enumerate(problem.labels):
         if label.name == "scatter" and label.regime == "breakaway" and np.isfinite(problem.measured[i]):
@@ -64,8 +67,8 @@ def _roughness(problem: Problem, drawn: Floats) -> Roughness:
             if len(known) and problem.measured[i] > 0.0:
                 logs.append(0.5 * math.log(problem.measured[i] / float(known.mean())))
     if not logs:
-        return _ROUGHNESS
+        return ROUGHNESS
     # one segment's scatter is known to a factor of 1.4 or so; surfaces lie within a factor of two of 0.3 %
     weight = len(logs) / (len(logs) + 0.5)
-    ratio = _MARGIN * _ROUGHNESS.ratio * math.exp(weight * float(np.median(logs)))
-    return _ROUGHNESS._replace(ratio=min(max(ratio, 0.002), 0.008))
+    ratio = _MARGIN * ROUGHNESS.ratio * math.exp(weight * float(np.median(logs)))
+    return ROUGHNESS._replace(ratio=min(max(ratio, 0.002), 0.008))

@@ -95,7 +95,9 @@ def _one(source: Generator, case: Drawn, folder: Path) -> tuple[str, Answer]:
                 source.make(trial, smooth._replace(effects=effects), case.seed)
                 return trial
 
-            bench = Bench(made(()))
+            rough = Path(scratch) / "rough"
+            source.make(rough, plan, case.seed)
+            bench = Bench(rough, made(()))
 
             def seen(effect: Effect) -> Seen:
                 at = made((effect,))

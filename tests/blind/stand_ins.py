@@ -47,8 +47,8 @@ class StandIn:
 class StandInBench:
     """Reads the strength off the force."""
 
-    def __init__(self, without: Path) -> None:
-        self.force_N = _first_N(without)
+    def __init__(self, _rough: Path, smooth: Path) -> None:
+        self.force_N = _first_N(smooth)
 
     def detectability(self, folder: Path) -> float:
         return 4.0 * (_first_N(folder) - self.force_N)
