@@ -1,4 +1,4 @@
-"""Sizes in detection limits: nothing for what a refit can imitate, more for more."""
+"""Sizes in detection limits: little for what a refit can imitate, much for what it cannot."""
 
 import numpy as np
 import pytest
@@ -22,10 +22,10 @@ def detectability(tmp_path_factory):
     )
 
 
-def test_what_the_tolerances_can_imitate_is_worth_nothing(detectability):
-    assert detectability("coulomb-level", 1.0) < 0.3  # 16 % lower
+def test_what_the_tolerances_can_imitate_is_worth_little(detectability):
+    # Coulomb friction 6.5 % lower, two of its tolerances
+    assert detectability("coulomb-level", 0.4) < 1.5
 
 
-def test_more_is_worth_more(detectability):
-    small, large = (detectability("drive-backlash", share) for share in (0.2, 0.6))
-    assert 0.3 < small < 0.7 * large
+def test_what_they_cannot_is_worth_much(detectability):
+    assert detectability("force-sensor-drift", 0.5) > 5.0
