@@ -40,7 +40,7 @@ def blind_make(
     ] = Source.independent,
     jobs: Jobs = None,
 ) -> None:
-    """Make evidence folders whose names tell nothing, and a key with the answers (10 to 20 s a case and core)."""
+    """Make evidence folders whose names tell nothing, and a key with the answers (half a minute to a minute a case and core)."""
 
     def work() -> None:
         from joblib import cpu_count

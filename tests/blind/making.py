@@ -20,8 +20,8 @@ from tests.blind.sizing import Bench
 from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
 
 Progress = Callable[[str, float], None]
-_TRIES = 4  # strengths that are looked at
-_NEAR_ENOUGH = 1.25  # times the target, or its inverse
+_TRIES = 3  # strengths that are looked at
+_NEAR_ENOUGH = 1.4  # times the target, or its inverse
 _WEAKEST = 0.01
 _INVISIBLE = 0.02  # detection limits: less is not told from nothing
 _ONE_TIME_S = 946_684_800  # of every file: 2000-01-01, so that no time tells what was made after what
@@ -84,31 +84,12 @@ def _one(source: Generator, case: Drawn, folder: Path) -> tuple[str, Answer]:
     if case.stratum == REAL:
         return folder.name, _real(case, folder)
     plan = Plan((), case.tolerances, case.leave_out, backbone=case.backbone)
-    sized: list[Sized] = []
+    sizes: list[Sized] = []
     cells: list[list[Any]] = []
     if case.effects:
         with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as scratch:
-            smooth, trial = plan._replace(smooth=True), Path(scratch) / "trial"
-
-            def made(effects: tuple[Effect, ...]) -> Path:
-                shutil.rmtree(trial, ignore_errors=True)
-                source.make(trial, smooth._replace(effects=effects), case.seed)
-                return trial
-
-            rough = Path(scratch) / "rough"
-            source.make(rough, plan, case.seed)
-            bench = Bench(rough, made(()))
-
-            def seen(effect: Effect) -> Seen:
-                at = made((effect,))
-                return Seen(bench.detectability(at), bench.cells(at))
-
-            sized = [
-                size(seen, effect, target, source.strongest)
-                for effect, target in zip(case.effects, case.targets, strict=True)
-            ]
-            plan = plan._replace(effects=tuple(one.effect for one in sized))
-            cells = sized[0].seen.cells if len(sized) == 1 else bench.cells(made(plan.effects))
+            sizes, cells = sized(source, case, plan, Path(scratch))
+        plan = plan._replace(effects=tuple(one.effect for one in sizes))
     source.make(folder, plan, case.seed)
     effects = [
         {
@@ -118,9 +99,33 @@ def _one(source: Generator, case: Drawn, folder: Path) -> tuple[str, Answer]:
             "target": target,
             "detectability": round(one.seen.detectability, 3),
         }
-        for one, target in zip(sized, case.targets, strict=True)
+        for one, target in zip(sizes, case.targets, strict=True)
     ]
     return folder.name, _answer(case, effects, cells)
+
+
+def sized(source: Generator, case: Drawn, plan: Plan, scratch: Path) -> tuple[list[Sized], list[list[Any]]]:
+    """Every effect of a case at the strength of its target, and where all of them together show."""
+    smooth, trial, rough = plan._replace(smooth=True), scratch / "trial", scratch / "rough"
+
+    def made(effects: tuple[Effect, ...]) -> Path:
+        shutil.rmtree(trial, ignore_errors=True)
+        source.make(trial, smooth._replace(effects=effects), case.seed)
+        return trial
+
+    source.make(rough, plan, case.seed)
+    bench = Bench(rough, made(()))
+
+    def seen(effect: Effect) -> Seen:
+        at = made((effect,))
+        return Seen(bench.detectability(at), bench.cells(at))
+
+    sizes = [
+        size(seen, effect, target, source.strongest) for effect, target in zip(case.effects, case.targets, strict=True)
+    ]
+    if len(sizes) == 1:
+        return sizes, sizes[0].seen.cells
+    return sizes, bench.cells(made(tuple(one.effect for one in sizes)))
 
 
 def _real(case: Drawn, folder: Path) -> Answer:

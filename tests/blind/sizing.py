@@ -33,6 +33,7 @@ LIMIT = math.sqrt(2.0 * JITTER * (_ALARM + _OCCAM))
 _FEW_REPLICATES = 12  # are enough for the roughness;
 _REPLICATES = 32  # with 12, as correlations are not seen, the same effect would count for twice as many limits
 _AGAIN, _GAINED = 4, 0.95
+_FITS = 0.6  # of chi2 a compared feature: less is left where nothing is missing
 _APPEARED = 4.0  # floors, where one evidence shows a feature that the other lacks
 
 
@@ -95,6 +96,8 @@ def _refitted(fitter: Fitter, deviations: Floats) -> Fit:
     """The rig refitted again from where a refit ended, as long as that gains: one alone ended at 5783 of 1230."""
     fit = fitter.refit(NOTHING, deviations, np.zeros(0))
     for _ in range(_AGAIN):
+        if fit.chi2 < _FITS * len(fit.residual):
+            break
         before, fit = fit, fitter.refit(NOTHING, fit.deviations, np.zeros(0))
         if fit.chi2 > _GAINED * before.chi2:
             break
