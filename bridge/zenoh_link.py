@@ -22,6 +22,8 @@ from bridge.faults import Fault
 from bridge.messages import parsed
 from bridge.topics import Topic
 
+_CONNECT_S = 30.0  # a first start of the plant compiles before it listens: longer than 10 s on a busy machine
+
 
 class BusConfig(Strict):
     """Where the processes of one rig meet."""
@@ -80,7 +82,7 @@ def session_config(config: BusConfig, hub: bool) -> zenoh.Config:
         "mode": "peer" if hub else "client",
         "listen/endpoints": [config.endpoint] if hub else [],
         "connect/endpoints": [] if hub else [config.endpoint],
-        "connect/timeout_ms": 0 if hub else 10_000,
+        "connect/timeout_ms": 0 if hub else round(_CONNECT_S * 1e3),
         "connect/exit_on_failure": not hub,
         "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
         "scouting/multicast/enabled": False,
@@ -117,8 +119,8 @@ class Bus:
             if hub:
                 line = f"{config.endpoint}: cannot listen there, another process holds it ({_brief(error)})"
                 raise Fault("ENDPOINT_BUSY", f"{line}; end it or choose another --endpoint") from None
-            line = f"{config.endpoint}: no plant answers there after 10 s; start `stickslip plant` with this --endpoint"
-            raise Fault("NO_PEER", line) from None
+            line = f"{config.endpoint}: no plant answers there after {_CONNECT_S:g} s"
+            raise Fault("NO_PEER", f"{line}; start `stickslip plant` with this --endpoint") from None
         self._keep.append(
             self._session.liveliness().declare_subscriber(
                 self._key("alive/*"), zenoh.handlers.Callback(self._on_alive, indirect=False), history=True

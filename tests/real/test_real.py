@@ -50,7 +50,6 @@ def test_the_wave_of_the_track_leads_on_the_stiff_spring(tmp_path: Path) -> None
     assert 0.0034 < wavelength_m < 0.0044
 
 
-@pytest.mark.xfail(reason="a stretch of 8 s that is mostly noise still ends in a name")
 def test_no_effect_is_sure_where_noise_hides_the_slips(tmp_path: Path) -> None:
     cuts = (Cut("k2254Nm_v42", 4.2e-5, 0.0, 8.0), Cut("k2254Nm_v42", 4.2e-5, 8.0, 16.0, holdout=True))
     slider(tmp_path, 2254.0, Levels(0.40, 0.367), cuts)
