@@ -13,7 +13,7 @@ from tests.blind.generator import Case, draw_effect, make
 
 def diagnosed(folder: Path, case: Case, seed: int) -> Diagnosis:
     make(folder, case, seed)
-    return diagnose(load_evidence(folder), lambda *_: None, jobs=1)
+    return diagnose(load_evidence(folder), lambda *_: None, jobs=2)
 
 
 @pytest.mark.parametrize("backbone", ["lorentzian", "multi-element"])

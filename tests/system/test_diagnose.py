@@ -99,7 +99,7 @@ def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(tmp_path):
     missing = ("mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
     case = Case("constant", {"drive-damping": {"damping_Ns_per_m": 12.0}}, leave_out=missing)
     make_evidence(tmp_path / "force", case, seed=22)
-    found = diagnosis.diagnose.diagnose(load_evidence(tmp_path / "force"), quiet)
+    found = diagnosis.diagnose.diagnose(load_evidence(tmp_path / "force"), quiet, jobs=2)
     best = found.candidates[0]
     group = {*found.effects, *(name for names in found.not_distinguishable for name in names)}
     assert "drive-damping" in group or best.effect in {"none", "unexplained"} or best.probability < 0.9
