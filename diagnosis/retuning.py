@@ -18,7 +18,7 @@ from diagnosis.twin import Roughness
 Floats = npt.NDArray[np.floating[Any]]
 ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
 _MARGIN = 1.25  # on the roughness: too small a floor makes causes out of scatter
-_FIRST_REPLICATES, _REPLICATES = 12, 32
+FIRST_REPLICATES, REPLICATES = 12, 32
 
 
 class Retuned(NamedTuple):
@@ -34,7 +34,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     nuisances = Nuisances(evidence.rig)
     described = np.zeros(len(nuisances))
     point = nuisances.point(described, {})
-    first = replicates(problem, point, ROUGHNESS, _FIRST_REPLICATES, 1)
+    first = replicates(problem, point, ROUGHNESS, FIRST_REPLICATES, 1)
     roughness = roughness_of(problem, first)
     floor = floor_of(problem, point, first)
     if not floor.compared.any():
@@ -47,7 +47,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
     fit = Fitter(problem, floor, nuisances).retuned(described)
     point = nuisances.point(fit.deviations, {})
-    floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, 2), floor)
+    floor = floor_of(problem, point, replicates(problem, point, roughness, REPLICATES, 2), floor)
     fitter = Fitter(problem, floor, nuisances)
     fit = fitter.retuned(fit.deviations)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))

@@ -17,6 +17,7 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 from diagnosis.gap import KNEE
 from diagnosis.library import Trial
 from diagnosis.refit import NOTHING, QUICK, Fit, Fitter, Form
+from diagnosis.verdict import much_left
 
 Floats = npt.NDArray[np.floating[Any]]
 T = TypeVar("T")
@@ -31,8 +32,7 @@ _FURTHEST = 8.0  # times the starting size that a screening may go
 _FURTHEST_TOLERANCES = 3.0
 _PAIRED = 3  # single effects that get a second one: the strongest of two need not fit best alone,
 _WORTH_PAIRING = 0.25  # if they close this share of what the best one closes
-_SAME_STARTS = 5
-_MUCH = 0.6  # of chi2 a compared feature; evidence without a gap leaves 0.15 to 0.5
+_SAME_STARTS = 5  # at most, for the middle of several fits
 _LEAST_OF_SECOND = 15.0  # of chi2 that a second effect would take by its direction; less never pays
 
 
@@ -118,11 +118,6 @@ def refitted(fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Tria
     return _refitted(fitter, origins[0][0].chi2, starts, jobs, _FULL)
 
 
-def much_left(fit: Fit) -> bool:
-    """Whether a fit leaves more than a model that is right would."""
-    return fit.chi2 > _MUCH * len(fit.residual)
-
-
 def pairs_of_effects(fitter: Fitter, base: Fit, singles: list[Fit], trials: list[Trial], jobs: int = 1) -> list[Fit]:
     """The best fits of two effects at once, best first; none where no second effect would take anything.
 
@@ -150,7 +145,7 @@ def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit) -> tu
     """The rig without effects and the named effect again, each from the same starts: the middle fit of each.
 
     Effects were refitted from many starts, the rig without from few: the best of many valleys of a jagged chi2 is deeper by
-    chance. With drift on evidence without a gap that was 222 against 262, the middle ones 256 and 270.
+    chance. With the Stribeck velocity on evidence without a gap that was 209 against 243, the middle ones 247 and 239.
     """
     starts = [named, none, *(fit for fit in singles if fit is not named)][:_SAME_STARTS]
 

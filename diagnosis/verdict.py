@@ -25,16 +25,16 @@ _WORST_OF_NO_GAP = 0.8
 _NEVER_WITHOUT_GAP = 1.2
 _CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
-# log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise. 23 evidences without a
-# gap gave up to 11, a drift of friction by 1 % that a rough surface makes too.
+# log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise. Of 23
+# evidences without a gap the most was 12, 11 from the same starts: a drift of friction by 1 % that a rough surface makes too.
 COST_OF_EFFECT = 12.0
 # Refits end in valleys that differ by this much of chi2: slips come and go as parameters move. Priors do not.
 JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
 _SECOND_ADDS = 0.03  # and this share of what both close: less is what the first one's formula does not fit,
-# unless one alone leaves more of chi2 a compared feature than evidence without a gap does, 0.15 to 0.6, and both do not
-_RIGHT_LEAVES = 0.6
+# unless one alone leaves much and both do not
+_MUCH = 0.6  # of chi2 a compared feature: most evidence without a gap leaves 0.15 to 0.6
 _TEMPERATURE = 3.0  # of the probabilities: a guess, they are not calibrated yet
 
 
@@ -67,6 +67,11 @@ def perfect_chi2(base: Fit) -> float:
     return _PERFECT * len(base.residual)
 
 
+def much_left(fit: Fit) -> bool:
+    """Whether a fit leaves more than a model that is right would."""
+    return fit.chi2 > _MUCH * len(fit.residual)
+
+
 def occam(fit: Fit) -> float:
     """Log evidence that the freedom of the effects' parameters costs."""
     if not fit.form.axes:
@@ -92,8 +97,7 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
         left = max(ranked[0].fit.chi2 - perfect_chi2(base), 1.0)
         closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
         adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
-        most = _RIGHT_LEAVES * len(base.residual)
-        completes = ranked[0].fit.chi2 > most > double.fit.chi2
+        completes = much_left(ranked[0].fit) and not much_left(double.fit)
         if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or (adds < _SECOND_ADDS and not completes):
             double = None
     best = double or (ranked[0] if ranked else None)

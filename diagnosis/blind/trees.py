@@ -19,13 +19,12 @@ from diagnosis.gap import Floor, compress, floor_of, replicates
 from diagnosis.library import Trial, trials
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Draw, Problem, prepare
-from diagnosis.twin import Effects, Roughness
+from diagnosis.retuning import FIRST_REPLICATES, ROUGHNESS
+from diagnosis.twin import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
 Row = dict[str, float]
-_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)
-_REPLICATES = 12
 _TEMPLATES = 10  # evidences whose commands are used
 _EACH = 4  # rigs a template of every effect, and as many times four without
 _NONE = "none"
@@ -81,7 +80,7 @@ def _bench(folder: Path) -> _Bench:
     problem = Problem(evidence.rig, [run for run in prepare(evidence) if not run.holdout])
     nuisances = Nuisances(evidence.rig)
     point = nuisances.point(np.zeros(len(nuisances)), {})
-    floor = floor_of(problem, point, replicates(problem, point, _ROUGHNESS, _REPLICATES, 1))
+    floor = floor_of(problem, point, replicates(problem, point, ROUGHNESS, FIRST_REPLICATES, 1))
     names = [
         f"{file} {label.segment} {label.signal} {label.regime} {label.band_Hz} {label.name}"
         for (file, label), used in zip(problem.labels, floor.compared, strict=True)
@@ -110,7 +109,7 @@ def _training(folder: Path, number: int) -> tuple[list[Row], list[str]]:
                 own = by_name[name]
                 effects = _drawn(random, own[int(random.integers(len(own)))])
             point = bench.nuisances.point(random.standard_normal(len(bench.nuisances)), effects)
-            surface = _ROUGHNESS._replace(seed=int(random.integers(1_000_000)))
+            surface = ROUGHNESS._replace(seed=int(random.integers(1_000_000)))
             features = bench.problem.predicted(point, Draw(random, surface))
             if np.isfinite(features).any():  # no rig is like that
                 rows.append(bench.row(features))

@@ -2,9 +2,8 @@
 
 The rig without effects is refitted to two evidences of one rig, with the effect and without; how much more chi2 is left with it
 is the square of the length that a matched filter would see. Both have a smooth surface: on a rough one an effect also moves every
-slip to another place, which alone looks like two limits. The floor is that of the rough one: 0.2 % of Coulomb friction between
-the directions are two limits on a surface of 0.3 % roughness and one on 0.6 %. A detection limit is the length at which the log
-evidence of a single effect with one parameter reaches 8.
+slip to another place, which alone looks like two limits. The floor is that of the rough one. A detection limit is the length at
+which the log evidence of a single effect with one parameter reaches 8.
 
 A linear estimate (the difference freed of the nuisances' directions) is not enough: it called a Coulomb friction 18 % lower worth
 10 limits, of which a refit leaves nothing.
@@ -22,18 +21,15 @@ from diagnosis.gap import Floor, cell_names, cell_squares, floor_of, replicates
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.refit import NOTHING, Fit, Fitter
-from diagnosis.retuning import ROUGHNESS, roughness_of
-from diagnosis.verdict import JITTER
+from diagnosis.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
+from diagnosis.verdict import JITTER, much_left
 
 Floats = npt.NDArray[np.floating[Any]]
 # The ruler stays where the diagnosis' own threshold moves, or scores of two versions could not be compared.
 _ALARM = 8.0  # log evidence; the diagnosis asks for 12
 _OCCAM = 5.0  # of one parameter, as it comes out of most refits
 LIMIT = math.sqrt(2.0 * JITTER * (_ALARM + _OCCAM))
-_FEW_REPLICATES = 12  # are enough for the roughness;
-_REPLICATES = 32  # with 12, as correlations are not seen, the same effect would count for twice as many limits
-_AGAIN, _GAINED = 4, 0.95
-_FITS = 0.6  # of chi2 a compared feature: less is left where nothing is missing
+_AGAIN, _GAINED = 4, 0.95  # refits at most, while each leaves this share of chi2 or less
 _APPEARED = 4.0  # floors, where one evidence shows a feature that the other lacks
 
 
@@ -53,7 +49,9 @@ class Bench:
         self._nuisances = Nuisances(evidence.rig)
         self._described = self._nuisances.point(np.zeros(len(self._nuisances)), {})
         scattered = Problem(evidence.rig, [run for run in _runs(rough) if not run.holdout])
-        self._roughness = roughness_of(scattered, replicates(scattered, self._described, ROUGHNESS, _FEW_REPLICATES, 1))
+        self._roughness = roughness_of(
+            scattered, replicates(scattered, self._described, ROUGHNESS, FIRST_REPLICATES, 1)
+        )
         self._drawn: dict[tuple[Any, ...], Floats] = {}
         self._parts = [
             (problem, self._floor(problem))
@@ -78,7 +76,7 @@ class Bench:
     def _floor(self, problem: Problem) -> Floor:
         features = tuple(problem.labels)
         if features not in self._drawn:
-            self._drawn[features] = replicates(problem, self._described, self._roughness, _REPLICATES, 1)
+            self._drawn[features] = replicates(problem, self._described, self._roughness, REPLICATES, 1)
         return floor_of(problem, self._described, self._drawn[features])
 
     def cells(self, folder: Path) -> list[list[Any]]:
@@ -96,7 +94,7 @@ def _refitted(fitter: Fitter, deviations: Floats) -> Fit:
     """The rig refitted again from where a refit ended, as long as that gains: one alone ended at 5783 of 1230."""
     fit = fitter.refit(NOTHING, deviations, np.zeros(0))
     for _ in range(_AGAIN):
-        if fit.chi2 < _FITS * len(fit.residual):
+        if not much_left(fit):
             break
         before, fit = fit, fitter.refit(NOTHING, fit.deviations, np.zeros(0))
         if fit.chi2 > _GAINED * before.chi2:
