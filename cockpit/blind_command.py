@@ -40,7 +40,10 @@ def blind_make(
     ] = Source.independent,
     jobs: Jobs = None,
 ) -> None:
-    """Make evidence folders whose names tell nothing, and a key with the answers (half a minute to a minute a case and core)."""
+    """Make evidence folders whose names tell nothing, and a key with the answers.
+
+    That takes half a minute to a minute a case and core. It can be stopped and taken up again.
+    """
 
     def work() -> None:
         from joblib import cpu_count

@@ -1,5 +1,6 @@
 """Make a sealed set: draw the cases, size their effects, write the evidence, shuffle, seal."""
 
+import json
 import math
 import os
 import secrets
@@ -13,13 +14,15 @@ import joblib
 import numpy as np
 
 from bridge.faults import Fault
-from diagnosis.blind.sealing import Answer, Secret, refuse_key_inside, write_key, write_set
+from diagnosis.blind.sealing import Answer, Secret, refuse_key_inside, tool_version, write_key, write_set
+from diagnosis.strict_json import write_json
 from tests.blind.generators import Effect, Generator, Plan, generator
 from tests.blind.real_logs import real_cases
 from tests.blind.sizing import Bench
 from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
 
 Progress = Callable[[str, float], None]
+_ANSWERS, _ASKED = "answers", "asked.txt"  # of a set in the making
 _TRIES = 3  # strengths that are looked at
 _NEAR_ENOUGH = 1.4  # times the target, or its inverse
 _WEAKEST = 0.01
@@ -43,7 +46,10 @@ class Sized(NamedTuple):
 
 
 def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, progress: Progress) -> None:
-    """Make a set and its key, both or nothing. Raises Fault CONFIG and OSError."""
+    """Make a set and its key, both or neither; what was made before an interruption is not made again.
+
+    Raises Fault CONFIG and OSError.
+    """
     if cases < FEWEST:
         raise Fault("CONFIG", f"--cases {cases}: must be {FEWEST} at least, one of each kind; 200 tell something")
     refuse_key_inside(out, key)
@@ -51,43 +57,71 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
         if path.exists():
             raise Fault("CONFIG", f"{option} {path}: is there already and is never overwritten; choose another")
     source = generator(name)
-    drawn = draw(source, cases, seed)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    part = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    part = out.parent / f".{out.name}-in-the-making"
+    answers = _taken_up(part, f"--generator {name} --cases {cases} --seed {seed} with version {tool_version()}")
     try:
-        sealed: dict[str, Secret] = {}
-        for case, answer in made(source, drawn, part, jobs):
-            sealed[case] = Secret(secrets.token_hex(16), answer)
-            progress(f"{len(sealed)} of {cases} cases made", len(sealed) / cases)
-        write_set(part, sealed)
-        write_key(key, sealed)
-        _make_alike(part)
-        part.chmod(0o755)
-        try:
-            part.rename(out)
-        except OSError:
-            key.unlink(missing_ok=True)
-            raise
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        todo = {number: case for number, case in enumerate(draw(source, cases, seed)) if number not in answers}
+        for number, answer in made(source, todo, part, jobs):
+            write_json(part / _ANSWERS / f"{number}.json", answer)
+            answers[number] = answer
+            progress(f"{len(answers)} of {cases} cases made", len(answers) / cases)
+    except BaseException:
+        if not answers:
+            shutil.rmtree(part)
+        raise
+    _clear(part, set(answers))
+    sealed = {secrets.token_hex(6): Secret(secrets.token_hex(16), answer) for answer in answers.values()}
+    for number, case in zip(answers, sealed, strict=True):
+        (part / str(number)).rename(part / case)
+    shutil.rmtree(part / _ANSWERS)
+    write_set(part, sealed)
+    write_key(key, sealed)
+    _make_alike(part)
+    try:
+        part.rename(out)
+    except OSError:
+        key.unlink(missing_ok=True)
+        raise
 
 
-def made(source: Generator, drawn: list[Drawn], folder: Path, jobs: int) -> Iterator[tuple[str, Answer]]:
-    """Make every case under a random name; name and answer of each as they come."""
-    names = [secrets.token_hex(6) for _ in drawn]
-    tasks = (joblib.delayed(_one)(source, case, folder / name) for name, case in zip(names, drawn, strict=True))
+def _taken_up(part: Path, asked: str) -> dict[int, Answer]:
+    """The answers of the cases that are there already, by number. Raises Fault CONFIG where they are of another set."""
+    note = part / _ANSWERS / _ASKED
+    if not part.exists():
+        note.parent.mkdir(parents=True)
+        note.write_text(asked, encoding="utf-8")
+        return {}
+    before = note.read_text(encoding="utf-8") if note.is_file() else "something else"
+    if before != asked:
+        line = f"{part}: holds the beginnings of {before}, not of {asked}; finish that, or delete the folder"
+        raise Fault("CONFIG", line)
+    answers = {int(path.stem): json.loads(path.read_text(encoding="utf-8")) for path in note.parent.glob("*.json")}
+    _clear(part, set(answers))
+    return answers
+
+
+def _clear(part: Path, done: set[int]) -> None:
+    """Remove what ended half-way."""
+    for path in part.iterdir():
+        if path.name not in {_ANSWERS, *map(str, done)}:
+            shutil.rmtree(path)
+
+
+def made(source: Generator, drawn: dict[int, Drawn], folder: Path, jobs: int) -> Iterator[tuple[int, Answer]]:
+    """Make every case in a folder named by its number; number and answer of each as they come."""
+    tasks = (joblib.delayed(_one)(source, case, folder / str(number)) for number, case in drawn.items())
     found: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
     yield from found
 
 
-def _one(source: Generator, case: Drawn, folder: Path) -> tuple[str, Answer]:
+def _one(source: Generator, case: Drawn, folder: Path) -> tuple[int, Answer]:
     if case.stratum == REAL:
-        return folder.name, _real(case, folder)
+        return int(folder.name), _real(case, folder)
     plan = Plan((), case.tolerances, case.leave_out, backbone=case.backbone)
     sizes: list[Sized] = []
     cells: list[list[Any]] = []
     if case.effects:
-        with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as scratch:
+        with tempfile.TemporaryDirectory(prefix=f"{folder.name}-", dir=folder.parent) as scratch:
             sizes, cells = sized(source, case, plan, Path(scratch))
         plan = plan._replace(effects=tuple(one.effect for one in sizes))
     source.make(folder, plan, case.seed)
@@ -101,7 +135,7 @@ def _one(source: Generator, case: Drawn, folder: Path) -> tuple[str, Answer]:
         }
         for one, target in zip(sizes, case.targets, strict=True)
     ]
-    return folder.name, _answer(case, effects, cells)
+    return int(folder.name), _answer(case, effects, cells)
 
 
 def sized(source: Generator, case: Drawn, plan: Plan, scratch: Path) -> tuple[list[Sized], list[list[Any]]]:

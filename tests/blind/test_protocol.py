@@ -135,6 +135,35 @@ def test_a_generator_that_breaks_leaves_nothing(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
+    options = {"out": tmp_path / "again", "key": tmp_path / "again.json"}
+    part = tmp_path / ".again-in-the-making"
+    whole = making._one
+
+    def made_three(source, case, folder):
+        if folder.name == "3":
+            (folder / "half").mkdir(parents=True)
+            raise KeyboardInterrupt
+        return whole(source, case, folder)
+
+    monkeypatch.setattr(making, "_one", made_three)
+    assert make(tmp_path, **options).exit_code == FAULTS["INTERRUPTED"].exit_status
+    assert {path.name for path in part.iterdir()} == {"0", "1", "2", "3", "answers"}
+    result = make(tmp_path, **options, cases=CASES + 1)
+    assert result.exit_code == 2
+    assert f"{part}: holds the beginnings of" in result.stderr
+    again = []
+    monkeypatch.setattr(making, "_one", lambda *case: again.append(case[2].name) or whole(*case))
+    assert make(tmp_path, **options).exit_code == 0
+    assert again == ["3", "4", "5", "6", "7"]
+    assert not part.exists()
+    first, second = (sealing.read_set(tmp_path / name) for name in ("set", "again"))
+    assert sorted(one.evidence_sha256 for one in first.values()) == sorted(
+        one.evidence_sha256 for one in second.values()
+    )
+    assert sealing.opened_answers(tmp_path / "again", tmp_path / "again.json")
+
+
 def test_without_the_source_tree_one_line_says_so(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "tests.blind.making", None)
     result = make(tmp_path)
