@@ -229,17 +229,19 @@ def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment:
     name = "drive_force_N"
     still = segment.still and not segment.at_the_edge
     whole = force_N[slips.tops[0] : slips.tops[-1]] if len(slips.tops) > 2 else force_N
-    counted = still or (segment.slips > 2 and not segment.at_the_edge)
-    low, high = np.quantile(whole, (0.05, 0.95))
-    levels = {"mean level": whole.mean(), "deviation": whole.std(), "low level": low, "high level": high}
-    for level, value in levels.items():
-        found.add(level, name, "steady", LOW, number, float(value) if counted else math.nan)
+    levels = np.full(4, np.nan)
+    if still or (segment.slips > 2 and not segment.at_the_edge):
+        levels = np.array([whole.mean(), whole.std(), *np.quantile(whole, (0.05, 0.95))])
+    for level, value in zip(("mean level", "deviation", "low level", "high level"), levels.tolist(), strict=True):
+        found.add(level, name, "steady", LOW, number, value)
     edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64)
     for bin_ in range(_LEVELS):
         value = float(force_N[edges[bin_] : edges[bin_ + 1]].mean()) if still else math.nan
         found.add(f"level {bin_}", name, "steady", LOW, number, value)
-    short, long = uniform_filter1d(force_N, 5), uniform_filter1d(force_N, 100)
-    middle, fast = (float(np.var(short - long)), float(np.var(force_N - short))) if still else (math.nan, math.nan)
+    middle = fast = math.nan
+    if still:
+        short = uniform_filter1d(force_N, 5)
+        middle, fast = float(np.var(short - uniform_filter1d(force_N, 100))), float(np.var(force_N - short))
     found.add("ripple", name, "steady", MIDDLE, number, middle)
     found.add("ripple", name, "steady", HIGH, number, fast)
 

@@ -45,6 +45,15 @@ class Screened(NamedTuple):
     chi2: float
 
 
+class _Origin(NamedTuple):
+    """A fit that trials are added to, what it predicts [features] and the slope of the compression there [compared]."""
+
+    fit: Fit
+    predicted: Floats
+    slope: Floats
+    directions: "Directions"
+
+
 class Directions:
     """The nuisances' columns at a fit, to let them move along with any other direction."""
 
@@ -73,12 +82,11 @@ def added(base: Form, more: Form) -> Form:
     return Form(base.forms | more.forms, (*base.axes, *more.axes))
 
 
-def _screen(fitter: Fitter, base: Fit, knee: float, directions: Directions, trial: Trial) -> Screened | None:
+def _screen(fitter: Fitter, origin: _Origin, trial: Trial) -> Screened | None:
     """Scale a trial's start so that it explains most; nothing where it changes nothing."""
-    here = fitter.predicted(base.deviations, base.effects)
-    _, slope = fitter.whitened(here, knee)
+    base, directions = origin.fit, origin.directions
     there = fitter.predicted(base.deviations, base.effects | trial.form.tables(trial.w))
-    column = fitter.column(here, there, slope)
+    column = fitter.column(origin.predicted, there, origin.slope)
     direction = directions.freed(column)
     power = float(direction @ direction)
     if power < 1e-6:
@@ -186,8 +194,9 @@ def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs:
 
 def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened]:
     base, knee, trials = work
-    directions = Directions(base)
-    return [one for trial in trials if (one := _screen(fitter, base, knee, directions, trial)) is not None]
+    predicted = fitter.predicted(base.deviations, base.effects)
+    origin = _Origin(base, predicted, fitter.whitened(predicted, knee)[1], Directions(base))
+    return [one for trial in trials if (one := _screen(fitter, origin, trial)) is not None]
 
 
 def _quick(fitter: Fitter, one: Screened) -> Fit:

@@ -5,11 +5,18 @@ from pathlib import Path
 import numpy as np
 
 from tests.blind.generator import LIBRARY, OUTSIDE, Case, Effect, draw_effect, make
+from tests.blind.generator.runs import PROTOCOL
+from tests.blind.generator.runs import Plan as RunPlan
 from tests.blind.generators import Plan
 
 
 class Independent:
-    """Rigs with another integrator, other formulas and, in a third of the cases, another friction law."""
+    """Rigs with another integrator, other formulas and, in a third of the cases, another friction law.
+
+    Args:
+        runs: of every evidence.
+
+    """
 
     library = tuple(LIBRARY)
     outside = tuple(OUTSIDE)
@@ -17,6 +24,9 @@ class Independent:
     backbones = ("multi-element", "lorentzian", "stretched")
     strongest = 1.5
     wide = 1.1  # its draws are cut at three tolerances before they are scaled, and 3.3 is the most that is no gap
+
+    def __init__(self, runs: tuple[RunPlan, ...] = PROTOCOL) -> None:
+        self._runs = runs
 
     def draw(self, random: np.random.Generator, name: str) -> Effect:
         return draw_effect(random, name)
@@ -33,4 +43,4 @@ class Independent:
             leave_out=plan.leave_out,
             roughness=0.0 if plan.smooth else 1.0,
         )
-        make(folder, case, seed)
+        make(folder, case, seed, self._runs)
