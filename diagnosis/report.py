@@ -10,7 +10,7 @@ from diagnosis.result import Candidate, Cell, Diagnosis, Gap, Parameter
 
 _REGIMES = ("stick", "breakaway", "slip", "restick", "steady")
 _SMALL = 0.005  # a row of the map that no run brings above this is left out, and counted
-_SMALL_PROBABILITY = 0.005
+_SMALL_PROBABILITY = 0.015
 _BANNERS: Final = {"effect": "An effect was found", "no-gap": "No gap", "unexplained": "Unexplained gap"}
 
 

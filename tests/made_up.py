@@ -97,9 +97,9 @@ def diagnosis() -> Diagnosis:
         ),
         candidates=(
             Candidate("drive-backlash", 0.93, "", {"gap_m": gap_m}),
-            Candidate("drive-hardening", 0.04, "cubic", {"ratio": Estimate(0.21, (-0.02, 0.44))}),
+            Candidate("drive-hardening", 0.03, "cubic", {"ratio": Estimate(0.21, (-0.02, 0.44))}),
             Candidate("unexplained", 0.02),
-            Candidate("drive-damping", 0.008, "", {"damping_Ns_per_m": Estimate(41.0, (float("nan"), float("nan")))}),
+            Candidate("drive-damping", 0.018, "", {"damping_Ns_per_m": Estimate(41.0, (float("nan"), float("nan")))}),
             *(Candidate(name, 0.002 / len(others)) for name in others),
         ),
         not_distinguishable=(("force-sensor-delay", "drive-damping"),),

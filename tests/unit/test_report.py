@@ -33,7 +33,7 @@ def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
         "The drive has play",
         "Which explanation?",
         "gap 81 µm (90 %: 76 to 86)",
-        "Below 0.5 % each: force-sensor-lag",
+        "Below 1.5 % each: force-sensor-lag",
         "Cannot be told apart with these runs: force-sensor-delay, drive-damping",
         "How far is the model off?",
         "closes 98 % of the gap that tuning the described numbers leaves open (90 %: 95 % to 100 %)",

@@ -48,3 +48,19 @@ def test_a_second_effect_must_pay(base, single, double, named):
     verdict = judge(fit(base), [fit(single, "coulomb-level")], pairs)
     assert verdict.named is not None
     assert len(verdict.named.form.effects) == named
+
+
+def test_no_gap_leaves_room_for_what_is_too_small_to_see():
+    probabilities = judge(fit(50.0), [fit(48.0, "coulomb-level")], []).probabilities
+    assert sum(probabilities.values()) == pytest.approx(1.0)
+    assert next(iter(probabilities)) == "none"
+    assert probabilities["none"] == pytest.approx(0.5, abs=0.03)
+    assert probabilities["unexplained"] == pytest.approx(0.24, abs=0.02)
+    assert probabilities["drive-backlash"] == pytest.approx(0.01, abs=0.005)
+
+
+def test_no_gap_stays_the_likeliest_where_it_is_the_verdict():
+    verdict = judge(fit(70.0), [fit(30.0, "coulomb-level")], [])
+    assert verdict.kind == "no-gap"
+    assert list(verdict.probabilities)[:2] == ["none", "coulomb-level"]
+    assert verdict.probabilities["coulomb-level"] > 0.1
