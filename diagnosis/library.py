@@ -76,6 +76,8 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         if rings_Hz:  # several turns a slip: further off, a refit ends a turn away
             scale |= {"frequency_Hz": scale["frequency_Hz"]._replace(prior=0.1)}
         starts = [{"frequency_Hz": f} for f in rings_Hz or (50.0, 120.0, 300.0)]
+    elif name == "frictional-lag" and form == "distance":
+        starts = [{"distance_m": times * scale["distance_m"].scale} for times in (0.4, 1.0, 3.0)]
     elif name == "piezo-resonance":
         starts = [{"resonance_Hz": share * highest_Hz} for share in (0.5, 0.75, 0.9, 1.2, 2.0)]
     return [_trial(name, form, scale, start) for start in starts]
@@ -130,7 +132,11 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
     table: dict[tuple[str, str], dict[str, _Scale]] = {
         ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)},
         ("static-friction-ageing", "power"): {"ratio": _Scale(0.04, True, 1.5), "exponent": _Scale(0.3, True, 0.5)},
-        ("frictional-lag", ""): {"lag_s": _Scale(0.06 * slip_s, True, 1.5)},
+        ("frictional-lag", "time"): {"lag_s": _Scale(0.06 * slip_s, True, 1.5)},
+        ("frictional-lag", "distance"): {
+            "distance_m": _Scale(0.005 * reach_m, True, 1.5),
+            "share": _Scale(0.5, True, 0.7),
+        },
         ("viscous-friction", "linear"): {"damping_Ns_per_m": _Scale(0.02 * critical, True, 1.5)},
         ("viscous-friction", "quadratic"): {"damping_Ns2_per_m2": _Scale(0.02 * critical / slip_mps, True, 1.5)},
         ("position-dependent-friction", ""): wave | {"wavelength_m": _Scale(1.0, True, 0.2)},

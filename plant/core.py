@@ -43,6 +43,15 @@ def _force_reading(p: Record, s: Record, force_N: float, t_s: float) -> float:
     return force_N * (1.0 + p.force_ratio) + offset_N
 
 
+@kernel
+def stribeck_share(q: float, tail: float) -> float:
+    """Share of F_s - F_c that is left at q times the Stribeck velocity."""
+    share = math.exp(-q * q)
+    if tail != 0.0:
+        share += tail * (1.0 / (1.0 + q * q) - share)
+    return share
+
+
 def _compiled(disturbed: bool) -> Callable[..., None]:
     @kernel
     def advance(
@@ -170,8 +179,13 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                         base_free_mps = (base_mps - 0.5 * dt * spring_mps2) / (1.0 + base_loss)
                         base_mid_mps += base_free_mps
                     friction = level(p, t_s, x - base_m, v_r)
-                    v_lag += lag_share * (v_r - v_lag)
-                    v_g = v_lag if p.lag_s > 0.0 else v_r
+                    v_g = v_r
+                    if p.lag_distance_m > 0.0:
+                        slid_m = math.fabs(v_r) * dt
+                        v_lag += (1.0 - math.exp(-slid_m / p.lag_distance_m)) * (math.fabs(v_r) - v_lag)
+                    elif p.lag_s > 0.0:
+                        v_lag += lag_share * (v_r - v_lag)
+                        v_g = v_lag
                     age_s = (age_s + dt) / (1.0 + math.fabs(v_r) / p.age_length_m * dt)
                     F_c_now = F_c * friction * (1.0 + (p.kinetic_backward_ratio if v_r < 0.0 else 0.0))
                     F_s_now = F_s * friction
@@ -180,10 +194,9 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     damping = h_v + p.quadratic_Ns2_per_m2 * math.fabs(v_r)
                 else:
                     damping = h_v
-                q = v_g * per_v_s
-                fall = math.exp(-q * q)
-                if tail != 0.0:
-                    fall += tail * (1.0 / (1.0 + q * q) - fall)
+                fall = stribeck_share(v_g * per_v_s, tail)
+                if disturbed and p.lag_distance_m > 0.0:
+                    fall += p.late_share * (stribeck_share(v_lag * per_v_s, tail) - fall)
                 g = F_c_now + (F_s_now - F_c_now) * fall
                 if disturbed:
                     least_N = least_N_per_m * math.fabs(z)

@@ -4,9 +4,10 @@ A name means a mechanism; a form is one formula for it. `[effects.NAME]` in a ri
 out) and the form's parameters. Off is bit-identical to the nominal rig: effects that only change a number of the rig are
 folded into it by `plant.records.build`, the others run in a kernel of their own (`plant.core.advance_disturbed`).
 
-Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; lag: Hess & Soom 1990;
-log and power ageing, hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; a mode that takes part by a
-share: Ewins, Modal Testing, 2000.
+Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; lag over time:
+Hess & Soom 1990; over a distance: Rabinowicz 1958, of a share: Ruina 1983, two state variables; log and power ageing,
+hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; a mode that takes part by a share: Ewins, Modal
+Testing, 2000.
 """
 
 import math
@@ -72,7 +73,16 @@ EFFECTS: Final[dict[str, Effect]] = {
         },
     ),
     "frictional-lag": Effect(
-        "friction", _one("the Stribeck curve sees v_r through a first-order lag", Parameter("lag_s", 0.0, 1.0, 2e-3))
+        "friction",
+        {
+            "time": Form(
+                "the Stribeck curve sees v_r through a first-order lag", (Parameter("lag_s", 0.0, 1.0, 2e-3),)
+            ),
+            "distance": Form(
+                "a share of it sees |v_r| through a lag over the path slid, and rests while the contact does",
+                (Parameter("distance_m", 0.0, 1.0, 3e-6), Parameter("share", 0.0, 1.0, 1.0)),
+            ),
+        },
     ),
     "viscous-friction": Effect(
         "friction",

@@ -34,7 +34,8 @@ PARAMS = np.dtype(
             *("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"),
             *("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"),
             # the effects of `plant.effects`, all 0 in the nominal rig
-            *("age_growth_N", "age_scale_s", "age_exponent", "age_length_m", "lag_s", "quadratic_Ns2_per_m2"),
+            *("age_growth_N", "age_scale_s", "age_exponent", "age_length_m", "lag_s", "lag_distance_m", "late_share"),
+            "quadratic_Ns2_per_m2",
             *("position_ratio", "position_wavelength_m", "position_phase_rad", "position_sin_2", "position_cos_2"),
             *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
             *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_sin_2", "load_cos_2", "load_seed"),
@@ -61,8 +62,8 @@ PARAMS = np.dtype(
 
 # an effect that runs in the kernel is off while its switch is 0
 _SWITCHES = (
-    *("age_growth_N", "lag_s", "quadratic_Ns2_per_m2", "position_ratio", "forward_ratio", "backward_ratio"),
-    "kinetic_backward_ratio",
+    *("age_growth_N", "lag_s", "lag_distance_m", "quadratic_Ns2_per_m2", "position_ratio"),
+    *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
     *("load_ratio", "drift_per_s", "drift_ratio", "roughness_ratio", "hardening_per_m2", "knee_ratio", "gap_m"),
     *("ripple_ratio", "frame_m_per_N", "base_m_per_N", "sag_ratio", "force_lag_s", "force_delay_s", "force_ratio"),
     *("force_bias_N", "force_drift_N_per_s", "force_drift_N", "mass_accel_ratio", "base_accel_ratio"),
@@ -167,7 +168,8 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.age_growth_N = value["ratio"] * p.F_s
         p.age_scale_s, p.age_exponent = value.get("age_scale_s", 1.0), value.get("exponent", 0.0)
     elif name == "frictional-lag":
-        p.lag_s = value["lag_s"]
+        p.lag_s = value.get("lag_s", 0.0)
+        p.lag_distance_m, p.late_share = value.get("distance_m", 0.0), value.get("share", 0.0)
     elif name == "viscous-friction":
         p.h_v += value.get("damping_Ns_per_m", 0.0)
         p.quadratic_Ns2_per_m2 = value.get("damping_Ns2_per_m2", 0.0)

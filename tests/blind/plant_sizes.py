@@ -37,7 +37,10 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
         Sizes("log", "ratio", 0.004, 0.06, log={"age_scale_s": (0.01, 1.0)}),
         Sizes("power", "ratio", 0.01, 0.12, log={"exponent": (0.1, 0.5)}),
     ),
-    "frictional-lag": (Sizes("", "lag_s", 1e-3, 1e-1),),
+    "frictional-lag": (
+        Sizes("time", "lag_s", 1e-3, 1e-1),
+        Sizes("distance", "share", 0.03, 0.6, log={"distance_m": (1e-6, 1e-5)}),
+    ),
     # a slip reaches 22 mm/s; sqrt(k m) = 132 N s/m
     "viscous-friction": (
         Sizes("linear", "damping_Ns_per_m", 2.0, 40.0),

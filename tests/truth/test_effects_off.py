@@ -16,7 +16,7 @@ from tests.effects_rig import run
 # parameters that leave nothing of their effect at 0
 SIZES = {
     *("ratio", "lag_s", "damping_Ns_per_m", "damping_Ns2_per_m2", "rate_per_s", "gap_m", "compliance_m_per_N"),
-    *("bias_N", "rate_N_per_s", "drift_N", "delay_s"),
+    *("bias_N", "rate_N_per_s", "drift_N", "delay_s", "distance_m"),
 }
 NEVER_NOTHING = {"piezo-roll-off", "piezo-resonance"}  # a corner cannot be infinitely high
 FORMS = [(name, form) for name, effect in EFFECTS.items() for form in effect.forms]

@@ -29,6 +29,7 @@ def model(**changes):
         "drive_m": lambda t_s: DRIVE_MPS * t_s,
         "alpha": lambda _z, _v_r, _g: 1.0,
         "lag_s": 0.0,
+        "lag_m": 0.0,
         "frame": None,  # stiffness, mass, loss
         "base": None,
     }
@@ -43,11 +44,16 @@ def slips_s(pieces):
         v_r = v - b_rate
         seen = v_lag if pieces.lag_s else v_r
         level = pieces.level(t_s, x, v_r)
-        g = level * (F_C + (F_S + pieces.growth_N(max(age_s, 0.0)) - F_C) * math.exp(-((seen / V_S) ** 2)))
+        share = math.exp(-((seen / V_S) ** 2))
+        if pieces.lag_m:
+            share += pieces.late_share * (math.exp(-((v_lag / V_S) ** 2)) - share)
+        g = level * (F_C + (F_S + pieces.growth_N(max(age_s, 0.0)) - F_C) * share)
         z_rate = v_r - pieces.alpha(z, v_r, g) * K_T * abs(v_r) * z / g
         friction_N = K_T * z + H_T * z_rate + pieces.viscous_N(v_r)
         pull_N = pieces.spring_N(pieces.drive_m(t_s) - q - x)
         lag_rate = (v_r - v_lag) / pieces.lag_s if pieces.lag_s else 0.0
+        if pieces.lag_m:
+            lag_rate = abs(v_r) / pieces.lag_m * (abs(v_r) - v_lag)
         q_accel = b_accel = 0.0
         if pieces.frame:
             stiffness, mass, loss = pieces.frame
@@ -92,7 +98,11 @@ CASES = {
         {"static-friction-ageing": {"form": "power", "ratio": 0.1, "exponent": 0.4}},
         model(growth_N=lambda age_s: 0.1 * F_S * age_s**0.4),
     ),
-    "frictional-lag": ({"frictional-lag": {"lag_s": 0.003}}, model(lag_s=0.003)),
+    "frictional-lag, time": ({"frictional-lag": {"lag_s": 0.003}}, model(lag_s=0.003)),
+    "frictional-lag, distance": (
+        {"frictional-lag": {"form": "distance", "distance_m": 1e-6, "share": 0.3}},
+        model(lag_m=1e-6, late_share=0.3),
+    ),
     "viscous-friction, linear": (
         {"viscous-friction": {"damping_Ns_per_m": 20.0}},
         model(viscous_N=lambda v_r: 20.0 * v_r),
