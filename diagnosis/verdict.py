@@ -32,8 +32,8 @@ COST_OF_EFFECT = 12.0
 JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
-_SECOND_ADDS = 0.03  # and this share of what both close: less is what the first one's formula does not fit,
-# unless one alone leaves much and both do not
+_SECOND_ADDS = 0.06  # and this share of what both close: less is what the first one's formula does not fit,
+_COMPLETE = 0.5  # unless one alone leaves much and both less than this of chi2 a compared feature
 _MUCH = 0.6  # of chi2 a compared feature: most evidence without a gap leaves 0.15 to 0.6
 _TEMPERATURE = 3.0  # of the probabilities: a guess
 # What shows no gap need not be without: of 25 such rigs of a sealed set 7 had an effect of the library, most of them near two
@@ -100,7 +100,7 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
         left = max(ranked[0].fit.chi2 - perfect_chi2(base), 1.0)
         closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
         adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
-        completes = much_left(ranked[0].fit) and not much_left(double.fit)
+        completes = much_left(ranked[0].fit) and double.fit.chi2 <= _COMPLETE * len(base.residual)
         if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or (adds < _SECOND_ADDS and not completes):
             double = None
     best = double or (ranked[0] if ranked else None)

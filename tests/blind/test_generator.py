@@ -213,6 +213,19 @@ def test_the_base_s_acceleration_is_that_of_the_commanded_vibration(busy):
 # the folder
 
 
+def test_a_screw_errs_alike_wherever_a_run_begins():
+    """The phase of its wave over the drive's own position is the same in two runs, although the spring starts stretched."""
+    case = _with("drive-speed-ripple", "screw-pitch", pitch_m=1e-3, depth=0.03, harmonic=0.0)
+    phases = []
+    for signals in simulate(case, 3, (replace(SLOW[0], duration_s=6.0),) * 2):
+        position_m, t_s = signals["drive_position_m"], signals["t_s"]
+        angle = 2.0 * np.pi * position_m / 1e-3
+        columns = np.stack([np.sin(angle), np.cos(angle), t_s, np.ones_like(t_s)], axis=1)
+        sine, cosine, *_ = np.linalg.lstsq(columns, position_m, rcond=None)[0]
+        phases.append(np.arctan2(cosine, sine))
+    assert phases[0] == pytest.approx(phases[1], abs=0.05)
+
+
 def test_same_case_and_seed_same_bytes_other_seed_other_bytes(tmp_path):
     case = Case(effects=(draw_effect(np.random.default_rng(1), "debris-bursts"),))
     for name, seed in (("a", 3), ("b", 3), ("c", 4)):

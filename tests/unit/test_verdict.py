@@ -41,6 +41,8 @@ def test_a_gap_that_nothing_takes_is_unexplained():
         (20000.0, 59.0, 45.0, 1),  # nothing was left
         (20000.0, 300.0, 50.0, 2),  # a gap was left and is closed, although it is small beside what both close
         (20000.0, 600.0, 200.0, 1),  # neither does: the rest is what the first one's formula does not fit
+        (7200.0, 80.0, 55.0, 1),  # the same, less of it
+        (3000.0, 50.0, 20.0, 1),  # one alone left nothing that evidence without a gap does not leave
     ],
 )
 def test_a_second_effect_must_pay(base, single, double, named):

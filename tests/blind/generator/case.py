@@ -85,19 +85,26 @@ def _steps_of(params: np.ndarray, level: np.ndarray, tracks: Tracks) -> int:
     return max(SUBSTEPS, int(np.ceil(rate_1_per_s / SAMPLE_RATE_HZ / 1.5)))
 
 
+def _frame_m(params: np.ndarray, force_N: float) -> float:
+    """How far the frame gives way to a force."""
+    p = params[0]
+    if p["frame_inverse_mass_1_per_kg"] == 0.0:
+        return 0.0
+    return float(force_N * p["frame_inverse_mass_1_per_kg"] / p["frame_omega_radps"] ** 2)
+
+
 def _run(params: np.ndarray, level: np.ndarray, start: Start, force: float, tracks: Tracks, finer: int) -> Signals:
     """The true signals of one run, at rest at t = 0 under the spring's start force [N]."""
     p = params[0]
-    stretch, slider = _stretch_m(params, force)
+    slider = _stretch_m(params, force)[1]
     y = np.zeros(STATES)
     y[0] = y[11] = start.position_m
     carried = force + place_force_N(p, start.position_m)  # by the contact, so that the slide is at rest
     y[2:6] = carried / p["contact_stiffness_N_per_m"]
-    if p["frame_inverse_mass_1_per_kg"] > 0.0:
-        y[6] = -force * p["frame_inverse_mass_1_per_kg"] / p["frame_omega_radps"] ** 2
+    y[6] = -_frame_m(params, force)
     if p["base_inverse_mass_1_per_kg"] > 0.0:
         y[8] = carried * p["base_inverse_mass_1_per_kg"] / p["base_omega_radps"] ** 2
-    drive_m = start.position_m + stretch - y[6] + tracks.drive_m
+    drive_m = tracks.origin_m + tracks.drive_m
     out = np.zeros((4, len(tracks.frequency_Hz)))
     integrate(
         params, y, start.age_s, slider, level, STEP_m, drive_m + tracks.unseen_m, tracks.drive_mps, tracks.load,
@@ -133,11 +140,13 @@ def simulate(case: Case, seed: int, plans: tuple[Plan, ...] = PROTOCOL, finer: i
             effect.formula.surface(track_m(), level, effect.strength, effect.numbers)
     runs = []
     for number, (plan, start) in enumerate(zip(plans, starts, strict=True)):
-        tracks = tracks_of(plan, number, start.position_m)
+        force_N = start.force_share * coulomb_N
+        origin_m = start.position_m + _stretch_m(params, force_N)[0] + _frame_m(params, force_N)
+        tracks = tracks_of(plan, number, origin_m)
         for effect in effects:
             if effect.formula.run:
                 effect.formula.run(tracks, effect.strength, effect.numbers)
-        signals = _run(params, level, start, start.force_share * coulomb_N, tracks, finer)
+        signals = _run(params, level, start, force_N, tracks, finer)
         for effect in effects:
             if effect.formula.sense:
                 effect.formula.sense(signals, effect.strength, effect.numbers)
