@@ -17,7 +17,7 @@ from tests.blind.independent_cases import Independent
 from tests.blind.making import Seen, Sized, sized
 from tests.blind.strata import Drawn, draw
 
-CASES, SEED = 20, 7003
+CASES, SEED = 18, 7003
 RUNS = (
     RunPlan(drive=((0.0, 2e-3), (2.5, -2e-3)), duration_s=5.0),
     RunPlan(drive=((0.0, 0.6e-3),), vibration=((1.5, 3000.0), (2.7, 1200.0), (3.9, 4500.0)), duration_s=5.0),
