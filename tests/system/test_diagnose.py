@@ -17,7 +17,6 @@ from diagnosis.protocols import PROTOCOLS, RunPlan
 from plant.config import load_rig
 from plant.effects import EFFECTS
 
-
 # a tenth of the work of the whole protocol
 SHORT = (
     RunPlan(((0.0, 0.002),), duration_s=5.0),
