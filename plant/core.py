@@ -44,7 +44,7 @@ def _force_reading(p: Record, s: Record, force_N: float, t_s: float) -> float:
 
 
 @kernel
-def stribeck_share(q: float, tail: float) -> float:
+def _stribeck_share(q: float, tail: float) -> float:
     """Share of F_s - F_c that is left at q times the Stribeck velocity."""
     share = math.exp(-q * q)
     if tail != 0.0:
@@ -194,9 +194,9 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     damping = h_v + p.quadratic_Ns2_per_m2 * math.fabs(v_r)
                 else:
                     damping = h_v
-                fall = stribeck_share(v_g * per_v_s, tail)
+                fall = _stribeck_share(v_g * per_v_s, tail)
                 if disturbed and p.lag_distance_m > 0.0:
-                    fall += p.late_share * (stribeck_share(v_lag * per_v_s, tail) - fall)
+                    fall += p.late_share * (_stribeck_share(v_lag * per_v_s, tail) - fall)
                 g = F_c_now + (F_s_now - F_c_now) * fall
                 if disturbed:
                     least_N = least_N_per_m * math.fabs(z)
