@@ -69,7 +69,6 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
         if not answers:
             shutil.rmtree(part)
         raise
-    _clear(part, set(answers))
     sealed = {secrets.token_hex(6): Secret(secrets.token_hex(16), answer) for answer in answers.values()}
     for number, case in zip(answers, sealed, strict=True):
         (part / str(number)).rename(part / case)
@@ -96,15 +95,10 @@ def _taken_up(part: Path, asked: str) -> dict[int, Answer]:
         line = f"{part}: holds the beginnings of {before}, not of {asked}; finish that, or delete the folder"
         raise Fault("CONFIG", line)
     answers = {int(path.stem): json.loads(path.read_text(encoding="utf-8")) for path in note.parent.glob("*.json")}
-    _clear(part, set(answers))
-    return answers
-
-
-def _clear(part: Path, done: set[int]) -> None:
-    """Remove what ended half-way."""
     for path in part.iterdir():
-        if path.name not in {_ANSWERS, *map(str, done)}:
+        if path.name not in {_ANSWERS, *map(str, answers)}:  # ended half-way
             shutil.rmtree(path)
+    return answers
 
 
 def made(source: Generator, drawn: dict[int, Drawn], folder: Path, jobs: int) -> Iterator[tuple[int, Answer]]:

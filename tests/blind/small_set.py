@@ -1,4 +1,4 @@
-"""A small set with shorter runs, whose sizes are known: sizing would take longer than all the rest.
+"""A small set with shorter runs, whose sizes are known: sizing takes minutes that `make test` has better use for.
 
 `python -m tests.blind.small_set` sizes its effects anew and writes `small_set.toml`.
 """

@@ -210,9 +210,6 @@ def test_the_base_s_acceleration_is_that_of_the_commanded_vibration(busy):
     assert amplitude == pytest.approx(0.02e-6 * (2.0 * np.pi * 2000.0) ** 2, rel=1e-4)
 
 
-# the folder
-
-
 def test_a_screw_errs_alike_wherever_a_run_begins():
     """The phase of its wave over the drive's own position is the same in two runs, although the spring starts stretched."""
     case = _with("drive-speed-ripple", "screw-pitch", pitch_m=1e-3, depth=0.03, harmonic=0.0)
@@ -224,6 +221,9 @@ def test_a_screw_errs_alike_wherever_a_run_begins():
         sine, cosine, *_ = np.linalg.lstsq(columns, position_m, rcond=None)[0]
         phases.append(np.arctan2(cosine, sine))
     assert phases[0] == pytest.approx(phases[1], abs=0.05)
+
+
+# the folder
 
 
 def test_same_case_and_seed_same_bytes_other_seed_other_bytes(tmp_path):
