@@ -153,7 +153,11 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
             "settling_s": _Scale(length_s, True, 1.0),
         },
         ("stribeck-velocity", ""): {"ratio": _Scale(0.5, False)},
-        ("drive-damping", ""): {"damping_Ns_per_m": _Scale(0.03 * critical, True, 1.5)},
+        ("drive-damping", "viscous"): {"damping_Ns_per_m": _Scale(0.03 * critical, True, 1.5)},
+        ("drive-damping", "relaxing"): {
+            "damping_Ns_per_m": _Scale(0.1 * critical, True, 1.5),
+            "relaxation_s": _Scale(0.1 * slip_s, True, 1.0),
+        },
         ("drive-hardening", "cubic"): {"ratio": _Scale(0.1 * (1e-3 / reach_m) ** 2, False)},
         ("drive-hardening", "bilinear"): {"ratio": _Scale(0.2, False), "knee_m": _Scale(0.75 * reach_m, True, 0.3)},
         ("drive-backlash", ""): {"gap_m": _Scale(0.05 * reach_m, True, 1.5)},

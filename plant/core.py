@@ -101,12 +101,13 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         base_free_mps = 0.0
         accel = 0.0
         drive_velocity_mps = drive
-        h_d_now, F_c_now, F_s_now, sliding_share, base_give = h_d, F_c, F_s, 1.0, 0.0
+        h_d_now, h_d_step, F_c_now, F_s_now, sliding_share, base_give = h_d, h_d, F_c, F_s, 1.0, 0.0
         force_N = s.drive_N
         # only the disturbed kernel looks at what follows
         t_s = s.t_s
         frame_m, frame_mps, base_m, base_mps, yield_mps2 = s.frame_m, s.frame_mps, s.base_m, s.base_mps, 0.0
-        age_s, v_lag = s.age_s, s.v_lag
+        age_s, v_lag, arm_N = s.age_s, s.v_lag, s.arm_N
+        arm_keep_half = math.exp(-0.5 * dt / p.relaxation_s) if p.relaxing_Ns_per_m > 0.0 else 1.0
         lag_share = 1.0 - math.exp(-dt / p.lag_s) if p.lag_s > 0.0 else 1.0
         frame_omega, base_omega = TWO_PI * p.frame_Hz, TWO_PI * p.base_Hz
         frame_loss, base_loss = p.frame_damping_ratio * frame_omega * dt, p.base_damping_ratio * base_omega * dt
@@ -164,7 +165,12 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     extension_m = s_d - frame_m - x
                     pull_N = drive if p.force_driven else spring_N(p, extension_m + 0.5 * dt * (anchor_mps - v))
                     # a slack drive damps nothing, and a force has none
-                    h_d_now = 0.0 if p.force_driven or math.fabs(extension_m) < 0.5 * p.gap_m else h_d
+                    slack = math.fabs(extension_m) < 0.5 * p.gap_m
+                    h_d_now = 0.0 if p.force_driven or slack else h_d
+                    h_d_step = h_d_now
+                    if p.relaxing_Ns_per_m > 0.0:  # what it keeps to mid-step, and a damper for what it gains
+                        pull_N += arm_keep_half * arm_N
+                        h_d_step += 0.0 if slack else p.relaxing_Ns_per_m * (1.0 - arm_keep_half)
                 else:
                     anchor_mps = drive_velocity_mps
                     pull_N = k_d * (s_d + 0.5 * dt * drive_velocity_mps - x - 0.5 * dt * v)
@@ -205,7 +211,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed and p.elasto_plastic:
                     sliding_share = elasto_plastic_share(z, v_r, g, k_t, p.elastic_ratio)
                 v, v_mid, z = contact_step(
-                    dt, z_dt, m, h_d_now, k_t, h_t, damping, g, sliding_share, base_give, disturbed,
+                    dt, z_dt, m, h_d_step, k_t, h_t, damping, g, sliding_share, base_give, disturbed,
                     pull_N, anchor_mps, base_mid_mps, v, v_r, z, v_r_before, g_before,
                 )  # fmt: skip
                 z_dt = dt
@@ -216,13 +222,19 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed:
                     t_s += dt
                     if p.base_m_per_N != 0.0:
-                        base_gain_mps = base_give * (pull_N + h_d_now * (anchor_mps - v_mid) - m * accel)
+                        base_gain_mps = base_give * (pull_N + h_d_step * (anchor_mps - v_mid) - m * accel)
                         base_mean_mps = base_free_mps + base_gain_mps
                         base_m += dt * base_mean_mps
                         yield_mps2 = 2.0 * (base_mean_mps - base_mps) / dt
                         base_mps = 2.0 * base_mean_mps - base_mps
                     frame_m += dt * frame_mps  # its velocity is that of the middle of the step
                     spring_force_N = spring_N(p, s_d - frame_m - x) + h_d_now * (anchor_mps - v)
+                    if p.relaxing_Ns_per_m > 0.0:
+                        arm_keep = arm_keep_half * arm_keep_half
+                        arm_N = arm_keep * arm_N
+                        if not slack:
+                            arm_N += p.relaxing_Ns_per_m * (1.0 - arm_keep) * (anchor_mps - v_mid)
+                        spring_force_N += arm_N
                     force_N = drive if p.force_driven else spring_force_N
                     if p.frame_m_per_N != 0.0:  # m q'' = F_d - q / c - damping, m = 1 / (c omega^2)
                         per_m = dt * frame_omega * frame_omega
@@ -265,7 +277,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         s.base_accel_f, s.base_accel_slow_f = base_f, base_slow_f
         if disturbed:
             s.frame_m, s.frame_mps, s.base_m, s.base_mps = frame_m, frame_mps, base_m, base_mps
-            s.t_s, s.age_s, s.v_lag, s.drive_N = t_s, age_s, v_lag, force_N
+            s.t_s, s.age_s, s.v_lag, s.drive_N, s.arm_N = t_s, age_s, v_lag, force_N, arm_N
             s.vibrating_s = vibrating_s + block_s if vibrating else 0.0
 
     return advance

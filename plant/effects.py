@@ -145,7 +145,15 @@ EFFECTS: Final[dict[str, Effect]] = {
     "static-level": Effect("friction", _one("F_s times 1 + ratio", _ratio(0.1))),
     "stribeck-velocity": Effect("friction", _one("v_s times 1 + ratio", _ratio(0.5))),
     "drive-damping": Effect(
-        "drive", _one("h_d grows by damping", Parameter("damping_Ns_per_m", 0.0, 1e6, 10.0)), _SPRING
+        "drive",
+        {
+            "viscous": Form("h_d grows by damping", (Parameter("damping_Ns_per_m", 0.0, 1e6, 10.0),)),
+            "relaxing": Form(
+                "a damper beside the spring that hangs on a spring of its own, damping / relaxation_s (Maxwell)",
+                (Parameter("damping_Ns_per_m", 0.0, 1e6, 10.0), Parameter("relaxation_s", 1e-4, 100.0, 4e-3)),
+            ),
+        },
+        _SPRING,
     ),
     "drive-stiffness": Effect("drive", _one("k_d times 1 + ratio", _ratio(0.1)), _SPRING),
     "drive-hardening": Effect(

@@ -41,7 +41,7 @@ PARAMS = np.dtype(
             *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_sin_2", "load_cos_2", "load_seed"),
             *("drift_per_s", "drift_ratio", "drift_settling_s", "drift_before_s"),
             *("roughness_ratio", "roughness_length_m", "roughness_seed", "elastic_ratio", "stribeck_tail"),
-            *("hardening_per_m2", "knee_m", "knee_ratio", "gap_m"),
+            *("hardening_per_m2", "knee_m", "knee_ratio", "gap_m", "relaxing_Ns_per_m", "relaxation_s"),
             *("ripple_ratio", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
             *("ripple_sin_2", "ripple_cos_2"),
             *("frame_m_per_N", "frame_Hz", "frame_damping_ratio", "base_m_per_N", "base_Hz", "base_damping_ratio"),
@@ -65,7 +65,8 @@ _SWITCHES = (
     *("age_growth_N", "lag_s", "lag_distance_m", "quadratic_Ns2_per_m2", "position_ratio"),
     *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
     *("load_ratio", "drift_per_s", "drift_ratio", "roughness_ratio", "hardening_per_m2", "knee_ratio", "gap_m"),
-    *("ripple_ratio", "frame_m_per_N", "base_m_per_N", "sag_ratio", "force_lag_s", "force_delay_s", "force_ratio"),
+    *("relaxing_Ns_per_m", "ripple_ratio"),
+    *("frame_m_per_N", "base_m_per_N", "sag_ratio", "force_lag_s", "force_delay_s", "force_ratio"),
     *("force_bias_N", "force_drift_N_per_s", "force_drift_N", "mass_accel_ratio", "base_accel_ratio"),
 )
 
@@ -84,7 +85,7 @@ STATE = np.dtype(
             *("mass_position_f", "drive_position_f"),
             # what the effects remember
             *("age_s", "v_lag", "frame_m", "frame_mps", "base_m", "base_mps", "vibrating_s", "drive_N", "t_s"),
-            *("force_lag_1", "force_lag_2"),
+            *("arm_N", "force_lag_1", "force_lag_2"),
         )
     ]
     + [("delay_line", "f8", (DELAY_LINE,)), ("delay_at", "i8")],
@@ -197,7 +198,10 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
     elif name == "stribeck-velocity":
         p.v_s *= 1.0 + value["ratio"]
     elif name == "drive-damping":
-        p.h_d += value["damping_Ns_per_m"]
+        if form == "viscous":
+            p.h_d += value["damping_Ns_per_m"]
+        else:
+            p.relaxing_Ns_per_m, p.relaxation_s = value["damping_Ns_per_m"], value["relaxation_s"]
     elif name == "drive-stiffness":
         p.k_d *= 1.0 + value["ratio"]
     elif name == "drive-hardening":

@@ -67,7 +67,10 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
     "coulomb-level": (Sizes("", "ratio", 0.08, 0.3, (-1.0,)), Sizes("", "ratio", 0.08, 0.14)),
     "static-level": (Sizes("", "ratio", 0.08, 0.3), Sizes("", "ratio", 0.08, 0.12, (-1.0,))),
     "stribeck-velocity": (Sizes("", "ratio", 0.4, 8.0), Sizes("", "ratio", 0.4, 0.9, (-1.0,))),
-    "drive-damping": (Sizes("", "damping_Ns_per_m", 1.0, 30.0),),
+    "drive-damping": (
+        Sizes("viscous", "damping_Ns_per_m", 1.0, 30.0),
+        Sizes("relaxing", "damping_Ns_per_m", 2.0, 60.0, log={"relaxation_s": (1e-3, 1e-2)}),
+    ),
     "drive-stiffness": (Sizes("", "ratio", 0.06, 0.3, BOTH_SIGNS),),
     # the spring works between 0.9 and 1.5 mm
     "drive-hardening": (

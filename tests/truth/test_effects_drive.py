@@ -37,6 +37,27 @@ def test_damping_makes_the_free_oscillation_decay_as_its_closed_form():
     assert result.true_position_m == pytest.approx(2e-3 * (1 - course), abs=1e-7)
 
 
+@pytest.mark.parametrize("relaxation_s", [5e-4, 5e-3, 50e-3])
+def test_a_damper_on_a_spring_of_its_own_swings_as_its_equations(relaxation_s):
+    damping = 30.0
+    table = {"form": "relaxing", "damping_Ns_per_m": damping, "relaxation_s": relaxation_s}
+    result = released({"drive-damping": table})
+
+    def slope(_, state):
+        x, v, arm_N = state
+        return v, (STIFFNESS * (2e-3 - x) + arm_N) / MASS_KG, -damping / relaxation_s * v - arm_N / relaxation_s
+
+    x, _, arm_N = solve_ivp(slope, (0, 0.5), (0, 0, 0), t_eval=result.t_s, rtol=1e-10, atol=1e-13, max_step=1e-3).y
+    assert result.true_position_m == pytest.approx(x, abs=1e-7)
+    assert result.true_drive_force_N == pytest.approx(STIFFNESS * (2e-3 - x) + arm_N, abs=2e-3)
+
+
+def test_a_damper_that_relaxes_at_once_is_the_viscous_one():
+    relaxing = released({"drive-damping": {"form": "relaxing", "damping_Ns_per_m": 30.0, "relaxation_s": 1e-4}})
+    viscous = released({"drive-damping": {"damping_Ns_per_m": 30.0}})
+    assert relaxing.true_position_m == pytest.approx(viscous.true_position_m, abs=2e-5)
+
+
 def test_stiffness_sets_the_frequency():
     result = released({"drive-stiffness": {"ratio": 0.21}})
     course = np.cos(1.1 * math.sqrt(STIFFNESS / MASS_KG) * result.t_s)
