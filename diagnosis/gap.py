@@ -132,8 +132,13 @@ def _slips_under_vibration(problem: Problem) -> npt.NDArray[np.bool_]:
 
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     """Measured less predicted in floors, [compared], not compressed."""
-    apart = _logarithms(problem.measured, floor.powers) - floor.expected(predicted)
-    z = apart[floor.compared] / floor.scatter[floor.compared]
+    return between(floor, predicted, problem.measured)
+
+
+def between(floor: Floor, predicted: Floats, seen: Floats) -> Floats:
+    """Features as seen [..., features] less predicted ones [features] in floors, [..., compared], not compressed."""
+    apart = _logarithms(seen, floor.powers) - floor.expected(predicted)
+    z = apart[..., floor.compared] / floor.scatter[floor.compared]
     return np.where(np.isfinite(z), z, _MISSING)
 
 

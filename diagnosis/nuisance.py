@@ -16,12 +16,14 @@ from diagnosis.twin import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
 # Mean and standard deviation of what no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz displacement by 200 us,
-# an open one by nothing; displacement sensors are linear to 0.2 % of their range, up to 0.8 % in slope; accelerometers of the
-# bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.
+# an open one by nothing; displacement sensors are linear to 0.2 % of their range: up to 0.8 % in slope, and of 40 mm 0.2 / m;
+# accelerometers of the bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.
 _CHAIN = {
     "force_delay_s": (4e-5, 4e-5),
     "position_delay_s": (1e-4, 1e-4),
     "position_scale": (1.0, 0.004),
+    "drive_slope": (0.0, 0.006),
+    "drive_bow_per_m": (0.0, 0.2),
     "accel_lowest_Hz": (0.25, 0.25),
     "accel_rolled_off": (0.5, 0.5),
 }

@@ -75,6 +75,7 @@ class Stage(NamedTuple):
     steps: int
     renewals: int  # how often the nuisances' derivatives may be computed anew when no step gains any more
     knee: float  # of the compression
+    columns: bool = True  # whether the derivatives are wanted where the fit ends; else those of the step before do
 
 
 # Far off, compressed differences pull at nothing: there a fit is nearly one of plain squares.
@@ -82,7 +83,7 @@ FAR_KNEE = 60.0
 _FAR = Stage(4, 1, FAR_KNEE)
 _NEAR = Stage(6, 1, KNEE)
 _RETUNE = Stage(9, 3, KNEE)  # what everything is measured against
-QUICK = Stage(2, 0, FAR_KNEE)
+QUICK = Stage(2, 0, FAR_KNEE, columns=False)
 _FAR_OFF = 3.0 * KNEE
 # of a tolerance, for derivatives: large against the grid, small against the curvature; the second and third time the other
 # way and wider, over the jumps that slips make where they come and go
@@ -186,6 +187,8 @@ class Fitter:
         renewed = 0
         columns = np.zeros((len(residual), len(now)))
         for step in range(stage.steps + 1):
+            if step == stage.steps and not stage.columns:
+                break
             rates = np.column_stack([nuisance_rates, self._axis_rates(form, now[:own], now[own:], here)])
             columns = self.floor.whitening @ (rates * slope[:, None])
             if step == stage.steps:

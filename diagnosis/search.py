@@ -126,7 +126,9 @@ def refitted(fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Tria
     return _refitted(fitter, origins[0][0].chi2, starts, jobs, _FULL)
 
 
-def pairs_of_effects(fitter: Fitter, base: Fit, singles: list[Fit], trials: list[Trial], jobs: int = 1) -> list[Fit]:
+def pairs_of_effects(
+    fitter: Fitter, base: Fit, singles: list[Fit], trials: list[Trial], expected_chi2: float, jobs: int = 1
+) -> list[Fit]:
     """The best fits of two effects at once, best first; none where no second effect would take anything.
 
     Args:
@@ -134,12 +136,13 @@ def pairs_of_effects(fitter: Fitter, base: Fit, singles: list[Fit], trials: list
         base: the rig without effects.
         singles: single effects, best first, at least one.
         trials: what to add to them.
+        expected_chi2: of a perfect model.
         jobs: processes.
 
     """
     best = singles[0].chi2
     firsts = singles[:1]
-    if much_left(singles[0]):
+    if much_left(singles[0], expected_chi2):
         firsts = [one for one in singles[:_PAIRED] if base.chi2 - one.chi2 > _WORTH_PAIRING * (base.chi2 - best)]
     starts: list[Screened] = []
     for first in firsts:

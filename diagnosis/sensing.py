@@ -25,6 +25,8 @@ class Chain(NamedTuple):
     force_delay_s: float = 0.0
     position_delay_s: float = 0.0
     position_scale: float = 1.0
+    drive_slope: float = 0.0  # of the drive's displacement sensor against the slide's, at zero,
+    drive_bow_per_m: float = 0.0  # and how it changes along the track
     accel_lowest_Hz: float = 0.0  # corner of the high-pass that every piezoelectric accelerometer is
     accel_rolled_off: float = 0.0  # its gain is 1 / sqrt(1 + this (f / 10 kHz)^2)
 
@@ -70,6 +72,8 @@ def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chai
         result[name] = result[name] * gain
     for name in ("mass_position_m", "drive_position_m"):
         result[name] = chain.position_scale * delayed(result[name], chain.position_delay_s)
+    drive_m = result["drive_position_m"]
+    result["drive_position_m"] = drive_m + drive_m * (chain.drive_slope + chain.drive_bow_per_m * drive_m)
     return result
 
 

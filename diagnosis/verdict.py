@@ -17,12 +17,11 @@ from diagnosis.refit import Fit
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
-# chi2 of a perfect model per compared feature: the replicates' correlation and the least floors keep it below 1.
-_PERFECT = 0.4
-# A gap that nothing explains, or that a second effect must explain, leaves more than no-gap evidence does: 0.25 to 0.75.
-_WORST_OF_NO_GAP = 0.8
+# What follows is in chi2 of a perfect model on this evidence, of which 11 of 12 rigs without a gap left 0.6 to 1.6, one 2.0.
 # What is beyond this counts against `none` in full: however wrong every model is, that there is a gap stays certain.
-_NEVER_WITHOUT_GAP = 1.2
+_NEVER_WITHOUT_GAP = 2.2
+_NO_ALARM = 1.0  # log evidence that `unexplained` stays behind `none` up to there
+_MUCH = 1.6  # more than a model that is right leaves
 _CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise. Of 23
@@ -33,8 +32,7 @@ JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
 _SECOND_ADDS = 0.06  # and this share of what both close: less is what the first one's formula does not fit,
-_COMPLETE = 0.5  # unless one alone leaves much and both less than this of chi2 a compared feature
-_MUCH = 0.6  # of chi2 a compared feature: most evidence without a gap leaves 0.15 to 0.6
+_COMPLETE = 1.3  # unless one alone leaves much and both less than this
 _TEMPERATURE = 3.0  # of the probabilities: a guess
 # What shows no gap need not be without: of 25 such rigs of a sealed set 7 had an effect of the library, most of them near two
 # detection limits, and 6 one that the library lacks.
@@ -59,20 +57,9 @@ class Verdict(NamedTuple):
     scale: float  # the misfit that all evidence is divided by
 
 
-def misfit(base: Fit, fits: list[Fit]) -> float:
-    """How many times chi2 of a perfect model the best fit leaves; 1 at least."""
-    best = min([base.chi2, *(fit.chi2 for fit in fits)])
-    return max(best / perfect_chi2(base), 1.0)
-
-
-def perfect_chi2(base: Fit) -> float:
-    """chi2 that a perfect model would leave."""
-    return _PERFECT * len(base.residual)
-
-
-def much_left(fit: Fit) -> bool:
-    """Whether a fit leaves more than a model that is right would."""
-    return fit.chi2 > _MUCH * len(fit.residual)
+def much_left(fit: Fit, expected_chi2: float) -> bool:
+    """Whether a fit leaves more than a model that is right would; that leaves `expected_chi2` on average."""
+    return fit.chi2 > _MUCH * expected_chi2
 
 
 def occam(fit: Fit) -> float:
@@ -84,9 +71,9 @@ def occam(fit: Fit) -> float:
     return sum(math.log(axis.prior) for axis in fit.form.axes) - 0.5 * float(volume)
 
 
-def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
-    """The verdict over single effects and pairs of them, each list best first."""
-    scale = misfit(base, [*singles, *pairs])
+def judge(base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> Verdict:
+    """The verdict over single effects and pairs of them, each list best first; `expected_chi2` is a perfect model's."""
+    scale = max(min(fit.chi2 for fit in (base, *singles, *pairs)) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> Model:
         closer = _square(base.residual) - _square(fit.residual)
@@ -97,20 +84,23 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit]) -> Verdict:
     double = max((model(fit) for fit in pairs), key=lambda one: one.evidence, default=None)
     if double is not None and ranked:
         gained = double.evidence - ranked[0].evidence
-        left = max(ranked[0].fit.chi2 - perfect_chi2(base), 1.0)
+        left = max(ranked[0].fit.chi2 - expected_chi2, 1.0)
         closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
         adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
-        completes = much_left(ranked[0].fit) and double.fit.chi2 <= _COMPLETE * len(base.residual)
+        completes = much_left(ranked[0].fit, expected_chi2) and double.fit.chi2 <= _COMPLETE * expected_chi2
         if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or (adds < _SECOND_ADDS and not completes):
             double = None
     best = double or (ranked[0] if ranked else None)
-    beyond = max(base.chi2 - _WORST_OF_NO_GAP * len(base.residual), 0.0)
-    certain = max(base.chi2 - _NEVER_WITHOUT_GAP * len(base.residual), 0.0)
+    beyond = max(base.chi2 - expected_chi2, 0.0)
+    certain = max(base.chi2 - _NEVER_WITHOUT_GAP * expected_chi2, 0.0)
     against_none = 0.5 * certain / JITTER
     scores: dict[str, float] = {"none": COST_OF_EFFECT - against_none}
     # what an effect must pay it owes to `unexplained` where `none` is out: every model wrong, the least wrong one is no cause
     unknown = 0.5 * _CLOSED_BY_UNKNOWN * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
-    scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT)) if against_none > 0.0 else unknown
+    if against_none > 0.0:
+        scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
+    else:
+        scores["unexplained"] = min(unknown, scores["none"] - _NO_ALARM)
     for one in ranked:
         scores[one.fit.form.effects[0]] = one.evidence
     if double is not None:

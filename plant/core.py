@@ -102,7 +102,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         accel = 0.0
         drive_velocity_mps = drive
         h_d_now, h_d_step, F_c_now, F_s_now, sliding_share, base_give = h_d, h_d, F_c, F_s, 1.0, 0.0
-        force_N = s.drive_N
+        force_N, slack = s.drive_N, False
         # only the disturbed kernel looks at what follows
         t_s = s.t_s
         frame_m, frame_mps, base_m, base_mps, yield_mps2 = s.frame_m, s.frame_mps, s.base_m, s.base_mps, 0.0

@@ -60,7 +60,7 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     evidence = load_evidence(folder)
     runs = prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
-    fitter, retuned, roughness = retuned_rig(evidence, problem, _untold)
+    fitter, retuned, roughness, _ = retuned_rig(evidence, problem, _untold)
     tried = trials(problem)
     best: Fit = retuned
     for effect in effects:  # one after the other, each on top of those before it

@@ -22,7 +22,7 @@ from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.refit import NOTHING, Fit, Fitter
 from diagnosis.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
-from diagnosis.verdict import JITTER, much_left
+from diagnosis.verdict import JITTER
 
 Floats = npt.NDArray[np.floating[Any]]
 # The ruler stays where the diagnosis' own threshold moves, or scores of two versions could not be compared.
@@ -30,6 +30,7 @@ _ALARM = 8.0  # log evidence; the diagnosis asks for 12
 _OCCAM = 5.0  # of one parameter, as it comes out of most refits
 LIMIT = math.sqrt(2.0 * JITTER * (_ALARM + _OCCAM))
 _AGAIN, _GAINED = 4, 0.95  # refits at most, while each leaves this share of chi2 or less
+_MUCH = 0.6  # of chi2 a compared feature: less need not be refitted again
 _APPEARED = 4.0  # floors, where one evidence shows a feature that the other lacks
 
 
@@ -94,7 +95,7 @@ def _refitted(fitter: Fitter, deviations: Floats) -> Fit:
     """The rig refitted again from where a refit ended, as long as that gains: one alone ended at 5783 of 1230."""
     fit = fitter.refit(NOTHING, deviations, np.zeros(0))
     for _ in range(_AGAIN):
-        if not much_left(fit):
+        if fit.chi2 <= _MUCH * len(fit.residual):
             break
         before, fit = fit, fitter.refit(NOTHING, fit.deviations, np.zeros(0))
         if fit.chi2 > _GAINED * before.chi2:

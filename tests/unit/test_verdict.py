@@ -8,6 +8,7 @@ from diagnosis.verdict import judge
 
 FEATURES = 100
 NUISANCES = 2
+EXPECTED = 40.0  # chi2 of a perfect model
 
 
 def fit(chi2, *effects):
@@ -18,11 +19,11 @@ def fit(chi2, *effects):
 
 
 def test_what_fits_well_without_effects_is_no_gap():
-    assert judge(fit(50.0), [fit(48.0, "coulomb-level")], []).kind == "no-gap"
+    assert judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED).kind == "no-gap"
 
 
 def test_an_effect_that_takes_most_is_named():
-    verdict = judge(fit(400.0), [fit(50.0, "coulomb-level"), fit(380.0, "static-level")], [])
+    verdict = judge(fit(400.0), [fit(50.0, "coulomb-level"), fit(380.0, "static-level")], [], EXPECTED)
     assert verdict.kind == "effect"
     assert verdict.named is not None
     assert verdict.named.form.effects == ("coulomb-level",)
@@ -30,7 +31,7 @@ def test_an_effect_that_takes_most_is_named():
 
 
 def test_a_gap_that_nothing_takes_is_unexplained():
-    assert judge(fit(4000.0), [fit(3900.0, "coulomb-level")], []).kind == "unexplained"
+    assert judge(fit(4000.0), [fit(3900.0, "coulomb-level")], [], EXPECTED).kind == "unexplained"
 
 
 @pytest.mark.parametrize(
@@ -47,13 +48,13 @@ def test_a_gap_that_nothing_takes_is_unexplained():
 )
 def test_a_second_effect_must_pay(base, single, double, named):
     pairs = [fit(double, "coulomb-level", "drive-backlash")]
-    verdict = judge(fit(base), [fit(single, "coulomb-level")], pairs)
+    verdict = judge(fit(base), [fit(single, "coulomb-level")], pairs, EXPECTED)
     assert verdict.named is not None
     assert len(verdict.named.form.effects) == named
 
 
 def test_no_gap_leaves_room_for_what_is_too_small_to_see():
-    probabilities = judge(fit(50.0), [fit(48.0, "coulomb-level")], []).probabilities
+    probabilities = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED).probabilities
     assert sum(probabilities.values()) == pytest.approx(1.0)
     assert next(iter(probabilities)) == "none"
     assert probabilities["none"] == pytest.approx(0.5, abs=0.03)
@@ -62,7 +63,7 @@ def test_no_gap_leaves_room_for_what_is_too_small_to_see():
 
 
 def test_no_gap_stays_the_likeliest_where_it_is_the_verdict():
-    verdict = judge(fit(70.0), [fit(30.0, "coulomb-level")], [])
+    verdict = judge(fit(70.0), [fit(30.0, "coulomb-level")], [], EXPECTED)
     assert verdict.kind == "no-gap"
     assert list(verdict.probabilities)[:2] == ["none", "coulomb-level"]
     assert verdict.probabilities["coulomb-level"] > 0.1

@@ -1,0 +1,40 @@
+"""The rig without effects: what an ordinary chain does is found as such, and a perfect model leaves what it is expected to."""
+
+import numpy as np
+import pytest
+
+from diagnosis.problem import Problem
+from diagnosis.retuning import retuned_rig
+from tests.prepared import prepared
+
+
+def untold(_what, _share):
+    """No progress."""
+
+
+@pytest.fixture(scope="module")
+def evidence_and_runs(tmp_path_factory):
+    evidence, runs = prepared(tmp_path_factory.mktemp("retuned") / "one", "ladder", {})
+    return evidence, [run for run in runs if not run.holdout]
+
+
+def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs):
+    evidence, runs = evidence_and_runs
+    straight = retuned_rig(evidence, Problem(evidence.rig, runs), untold)
+
+    def bent(run):
+        drive_m = run.signals["drive_position_m"]
+        return run._replace(signals=run.signals | {"drive_position_m": drive_m * (1.0 + 0.008 - 0.4 * drive_m)})
+
+    found = retuned_rig(evidence, Problem(evidence.rig, [bent(run) for run in runs]), untold)
+    slope, bow = (found.fitter.nuisances.names.index(name) for name in ("drive_slope", "drive_bow_per_m"))
+    change = found.fit.deviations - straight.fit.deviations
+    at_m = float(np.mean([run.signals["drive_position_m"].mean() for run in runs]))
+    assert change[slope] * 0.006 + 2.0 * change[bow] * 0.2 * at_m == pytest.approx(0.008 - 0.8 * at_m, abs=0.002)
+    assert found.fit.chi2 < straight.fit.chi2 + 30.0
+
+
+def test_evidence_without_a_gap_leaves_about_what_is_expected(evidence_and_runs):
+    evidence, runs = evidence_and_runs
+    _, fit, _, expected_chi2 = retuned_rig(evidence, Problem(evidence.rig, runs), untold)
+    assert 0.5 * expected_chi2 < fit.chi2 < 2.0 * expected_chi2
