@@ -51,6 +51,7 @@ class Scores(NamedTuple):
     false_alarms: Score | None
     false_alarms_wide: Score | None  # of rigs whose numbers were drawn as far off as they may be
     outside_caught: Score | None  # unexplained
+    outside_caught_visible: Score | None  # of 2 detection limits or more
     outside_named: Score | None
     sure_of_wrong_name: Score | None  # an effect that is not there has more than 0.8
     sure_of_wrong_answer: Score | None  # anything but the right candidate has, none and unexplained included
@@ -103,6 +104,9 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
         false_alarms=rate([case.verdict != "no-gap" for case in no_gap]),
         false_alarms_wide=rate([case.verdict != "no-gap" for case in no_gap if case.answer["tolerances"] > 1.0]),
         outside_caught=rate([case.verdict == "unexplained" for case in outside]),
+        outside_caught_visible=rate(
+            [case.verdict == "unexplained" for case in outside if case.detectability >= _VISIBLE]
+        ),
         outside_named=rate([bool(case.named) for case in outside]),
         sure_of_wrong_name=rate([_sure_of(case, effects_only=True) for case in one_right]),
         sure_of_wrong_answer=rate([_sure_of(case, effects_only=False) for case in one_right]),

@@ -44,6 +44,7 @@ def rows(methods: dict[str, Scores]) -> list[Row]:
         row("false alarms", "<= 0.05", [one.false_alarms for one in every]),
         row("  numbers as far off as may be", "", [one.false_alarms_wide for one in every]),
         row("outside caught", ">= 0.80", [one.outside_caught for one in every]),
+        row("  of 2 limits or more", "", [one.outside_caught_visible for one in every]),
         row("  outside, but an effect named", "", [one.outside_named for one in every]),
         row("sure of a wrong name", "<= 0.05", [one.sure_of_wrong_name for one in every]),
         row("sure of any wrong answer", "", [one.sure_of_wrong_answer for one in every]),

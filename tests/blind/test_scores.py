@@ -66,7 +66,7 @@ def test_scores_by_hand():
         case("no-gap", [], {"none": 0.9, "drive-damping": 0.1}),
         case("no-gap", [], {"drive-damping": 0.9, "none": 0.1}),
         case("outside", ["loose-screw"], {"unexplained": 0.7, "none": 0.3}),
-        case("outside", ["loose-screw"], {"none": 0.95, "unexplained": 0.05}),
+        case("outside", ["loose-screw"], {"none": 0.95, "unexplained": 0.05}, detectability=1.0),
         case("two-effects", ["drive-damping", "coulomb-level"], {"drive-damping": 0.5, "none": 0.5}),
         case("indistinguishable", ["drive-damping"], {"drive-damping": 0.5, "none": 0.5}),
         opened("broken", case("one-effect", ["drive-damping"], {"none": 1.0}).answer, {"fault": "X", "line": "y"}),
@@ -83,6 +83,7 @@ def test_scores_by_hand():
     assert scores.by_backbone["lugre"].top_1.n == 4
     assert scores.false_alarms.value == 0.5
     assert scores.outside_caught.value == 0.5
+    assert (scores.outside_caught_visible.value, scores.outside_caught_visible.n) == (1.0, 1)
     assert scores.outside_named.value == 0.0
     # the delay of the second case and the damping of the second rig without a gap, of nine with one right answer
     assert (scores.sure_of_wrong_name.value, scores.sure_of_wrong_name.n) == (2 / 9, 9)
