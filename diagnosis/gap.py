@@ -16,6 +16,7 @@ a few floors and a logarithm beyond: a drive that ripples by 500 floors of a las
 ripples by 50, and must not hide everything else.
 """
 
+from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,7 +34,8 @@ DEFINITION = (
 )
 KNEE = 6.0
 _LEAST_POWER = 1e-30
-_MISSING = 8.0  # floors, where the rig shows something that the model does not: lacking a slip must not pay
+# floors of a cell together, where the rig shows something that the model does not: lacking a slip must not pay
+_MISSING = 8.0
 _SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))
 _FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
 CellKey = tuple[str, str, tuple[float, float], str]
@@ -132,14 +134,21 @@ def _slips_under_vibration(problem: Problem) -> npt.NDArray[np.bool_]:
 
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     """Measured less predicted in floors, [compared], not compressed."""
-    return between(floor, predicted, problem.measured)
+    z = between(floor, predicted, problem.measured)
+    lacking = np.logical_not(np.isfinite(z))
+    if lacking.any():
+        # a stick that the model lacks takes the rates and the period of its cell with it: it is one thing that is missing
+        together = Counter(cell for cell, lacks in zip(floor.cells, lacking, strict=True) if lacks)
+        z[lacking] = [
+            _MISSING / together[cell] ** 0.5 for cell, lacks in zip(floor.cells, lacking, strict=True) if lacks
+        ]
+    return z
 
 
 def between(floor: Floor, predicted: Floats, seen: Floats) -> Floats:
-    """Features as seen [..., features] less predicted ones [features] in floors, [..., compared], not compressed."""
+    """Features as seen [..., features] less predicted ones [features] in floors, [..., compared], NaN where one is missing."""
     apart = _logarithms(seen, floor.powers) - floor.expected(predicted)
-    z = apart[..., floor.compared] / floor.scatter[floor.compared]
-    return np.where(np.isfinite(z), z, _MISSING)
+    return apart[..., floor.compared] / floor.scatter[floor.compared]
 
 
 def gap(floor: Floor, z: Floats) -> float:
@@ -189,7 +198,9 @@ def _least(label: Feature, problem: Problem) -> float:
     if problem.rig.drive == "force":
         return _least_of_axis(label, force_N, problem.force_peak_N)
     drop_m = 0.3 * force_N / stiffness  # of a slip, for friction that falls by a sixth
-    if label.name in {"scatter", "ripple", "rest"}:
+    if label.name == "rest":
+        return 1.5  # of a displacement sensor between 5 and 24 Hz, where no piece of its noise can be had
+    if label.name in {"scatter", "ripple"}:
         return 0.6  # small powers, which hum, slow noise and the roughness of one track reach
     if label.name in {"ring", "spring rest"}:
         return 0.25

@@ -1,7 +1,8 @@
 """The noise of a run, taken from the run: what is faster than 20 ms where the slide sticks, in pieces as they were measured.
 
 So hum, colour and quantisation come along as they are; no spectrum has to be assumed. Slower noise cannot be told from motion
-and is drawn as a small drift of the force.
+and is drawn as a small drift of the force. An acceleration has no motion to be told from where the slide sticks: all of it is
+noise, slow or fast.
 """
 
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ from diagnosis.features import Scales, Signals
 
 Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 21  # blocks
+_FEWEST = 500  # blocks of a piece
 _SLOW_SHARE = 3e-4  # of the static friction: 5 mN on the paper's rig, the drift of a strain gauge within 10 s
 _SLOW_WAVES = 6
 _POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks
@@ -38,6 +40,8 @@ class Noise(NamedTuple):
             weights = random.normal(size=_SLOW_WAVES) * self.slow_force_N / np.sqrt(_SLOW_WAVES)
             slow = np.cos(np.outer(time, np.arange(1, _SLOW_WAVES + 1))) @ weights
             result = result + slow
+        elif name.endswith("accel_mps2"):  # what is slower than the piece is known in size, not in sign
+            result = result * (1.0 if random.random() < 0.5 else -1.0)
         return result
 
 
@@ -52,7 +56,7 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
     busy = speed > 6.0 * np.median(speed)
     reach = max(int(3.0 * scales.slip_s * 1e3), _WINDOW)
     quiet = np.logical_not(np.asarray(maximum_filter1d(busy, 2 * reach + 1)))
-    if quiet.sum() < 500:
+    if quiet.sum() < _FEWEST:
         quiet = speed <= np.quantile(speed, 0.3)
     pieces: dict[str, Floats] = {}
     shake: dict[str, float] = {}
@@ -64,6 +68,8 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
             shake[name] = float(np.median(calm))
             spread = values - uniform_filter1d(values, _WINDOW)
             pieces[name] = spread[quiet]
+        elif name.endswith("accel_mps2") and still.sum() >= _FEWEST:
+            pieces[name] = values[still]
         else:
             rest = values - uniform_filter1d(values, _WINDOW)
             pieces[name] = rest[quiet] * (_WINDOW / (_WINDOW - 1.0)) ** 0.5
@@ -85,6 +91,6 @@ def _axis_noise(signals: Signals, scales: Scales) -> Noise:
         size = uniform_filter1d(np.abs(rest), _POSITION_WINDOW)
         calm = size <= 2.0 * np.median(size)
         calm[:_POSITION_WINDOW] = calm[-_POSITION_WINDOW:] = False
-        pieces[name] = rest[calm] if calm.sum() >= 500 else rest
+        pieces[name] = rest[calm] if calm.sum() >= _FEWEST else rest
     shake = {name: float(np.median(values)) for name, values in signals.items() if name.endswith("shake_mps2")}
     return Noise(pieces, shake, _SLOW_SHARE * scales.force_N)

@@ -112,6 +112,11 @@ class Fit(NamedTuple):
         return result
 
 
+def _prior(form: Form, deviations: Floats) -> Floats:
+    """Inverse standard deviations of nuisances and axes."""
+    return np.concatenate([np.ones(len(deviations)), [1.0 / axis.prior for axis in form.axes]])
+
+
 class Fitter:
     """Fits forms to one problem under one floor."""
 
@@ -163,9 +168,13 @@ class Fitter:
     def judged(self, fit: Fit) -> Fit:
         """A fit of any stage with the chi2 and the residual of the gap's own compression."""
         residual, _ = self.whitened(self.predicted(fit.deviations, fit.effects))
-        prior = np.concatenate([np.ones(len(fit.deviations)), [1.0 / axis.prior for axis in fit.form.axes]])
-        chi2 = self._chi2(prior, residual, np.concatenate([fit.deviations, fit.w]))
+        chi2 = self._chi2(_prior(fit.form, fit.deviations), residual, np.concatenate([fit.deviations, fit.w]))
         return fit._replace(chi2=chi2, residual=residual)
+
+    def far_chi2(self, form: Form, deviations: Floats, w: Floats) -> float:
+        """chi2 of a point under the wide compression of a far start."""
+        residual, _ = self.whitened(self.predicted(deviations, form.tables(w)), FAR_KNEE)
+        return self._chi2(_prior(form, deviations), residual, np.concatenate([deviations, w]))
 
     def refit(self, form: Form, deviations: Floats, w: Floats) -> Fit:
         """Fit a form to the end, from a starting point that may be far off."""
@@ -178,7 +187,7 @@ class Fitter:
     def fit(self, form: Form, deviations: Floats, w: Floats, stage: Stage) -> Fit:
         """Fit a form from a starting point, in the way of one stage."""
         own = len(deviations)
-        prior = np.concatenate([np.ones(own), [1.0 / axis.prior for axis in form.axes]])
+        prior = _prior(form, deviations)
         now = np.concatenate([deviations, w])
         here = self.predicted(now[:own], form.tables(now[own:]))
         residual, slope = self.whitened(here, stage.knee)

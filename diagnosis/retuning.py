@@ -75,7 +75,7 @@ def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness) -> float:
     surface = roughness._replace(ratio=roughness.ratio / _MARGIN)
     drawn = replicates(fitter.problem, point, surface, _NEW_REPLICATES, 3)
     z = between(fitter.floor, fitter.predicted(fit.deviations, {}), drawn)
-    z = np.where(np.isfinite(drawn[:, fitter.floor.compared]), z, 0.0)  # what a rig does not show is not compared
+    z = np.where(np.isfinite(z), z, 0.0)  # what a rig does not show is not compared
     directions = Directions(fit)
     left = [directions.freed(fitter.floor.whitening @ compress(row)) for row in z]
     # the median, as a few replicates of a rig at the edge of slipping end elsewhere
