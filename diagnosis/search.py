@@ -25,6 +25,7 @@ R = TypeVar("R")
 _QUICK = 8  # trials of a screening that get two steps of a refit,
 _QUICK_AT_LEAST = 4  # these whatever they promise,
 _PROMISING = 5.0  # the others if they would take this much of chi2
+_PROMISING_MUCH = 40.0
 _FULL = 3  # single effects that are refitted to the end,
 _FULL_PAIRS = 2  # and pairs of effects,
 _WORTH_FULL = 0.2  # of the best one's gain, or they are too far behind to matter
@@ -122,10 +123,12 @@ def refitted(fitter: Fitter, origins: list[tuple[Fit, float]], trials: list[Tria
 
     """
     starts: list[Screened] = []
+    promising: list[Screened] = []
     for base, knee in origins:
         found = _screened(fitter, base, knee, trials, jobs)[:_QUICK]
+        promising += _promising_waves(found, base.chi2)
         starts += [one for i, one in enumerate(found) if i < _QUICK_AT_LEAST or one.chi2 < base.chi2 - _PROMISING]
-    return _refitted(fitter, origins[0][0].chi2, starts, jobs, _FULL)
+    return _refitted(fitter, origins[0][0].chi2, starts, promising, jobs, _FULL)
 
 
 def pairs_of_effects(
@@ -151,7 +154,7 @@ def pairs_of_effects(
         others = [trial for trial in trials if not set(trial.form.effects) & set(first.form.effects)]
         starts += _screened(fitter, first, KNEE, others, jobs)[:_QUICK]
     worth = sorted((one for one in starts if one.chi2 < best - _LEAST_OF_SECOND), key=lambda one: one.chi2)
-    return _refitted(fitter, best, worth[:_QUICK], jobs, _FULL_PAIRS)
+    return _refitted(fitter, best, worth[:_QUICK], _promising_waves(worth, best), jobs, _FULL_PAIRS)
 
 
 def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit) -> tuple[Fit, Fit]:
@@ -169,8 +172,22 @@ def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit) -> tu
     return middle(NOTHING, np.zeros(0)), middle(named.form, named.w)
 
 
-def _refitted(fitter: Fitter, chi2: float, starts: list[Screened], jobs: int, most: int) -> list[Fit]:
-    """The starts refitted a little, and the best `most` effects or pairs that are worth it to the end."""
+def _promising_waves(found: list[Screened], chi2: float) -> list[Screened]:
+    """The first start of each of the two effects, or pairs, with a wave that promise most, if they promise much."""
+    much = [start for start in found if start.chi2 < chi2 - _PROMISING_MUCH]
+    waves = [start for start in much if any(axis.name == "phase_rad" for axis in start.form.axes)]
+    first = {start.form.effects: start for start in reversed(waves)}
+    return sorted(first.values(), key=lambda start: start.chi2)[:2]
+
+
+def _refitted(
+    fitter: Fitter, chi2: float, starts: list[Screened], promising: list[Screened], jobs: int, most: int
+) -> list[Fit]:
+    """The starts refitted a little, and the best `most` effects or pairs that are worth it to the end.
+
+    The `promising` are refitted to the end in any case: a wave begins where the data have it, and two steps can lead it astray.
+    One of the friction that screening saw at 241 went to 981 in two steps and to 198 in a whole refit, others to 602.
+    """
     quickly = sorted(_each(jobs, _quick, fitter, starts), key=lambda fit: fit.chi2)
     best = _best_of_each(quickly)
     gain = chi2 - best[0].chi2 if best else 0.0
@@ -179,7 +196,7 @@ def _refitted(fitter: Fitter, chi2: float, starts: list[Screened], jobs: int, mo
     forms: list[Fit] = []
     for effects in names:
         forms += _best_of_each([fit for fit in quickly if set(fit.form.effects) == effects], by_form=True)[:2]
-    finished = _each(jobs, _full, fitter, forms)
+    finished = _each(jobs, _full, fitter, forms) + _each(jobs, _at_once, fitter, promising)
     finished += [fit for fit in best if set(fit.form.effects) not in names]
     return _best_of_each(sorted(finished, key=lambda fit: fit.chi2))
 
@@ -213,6 +230,10 @@ def _quick(fitter: Fitter, one: Screened) -> Fit:
 
 def _full(fitter: Fitter, fit: Fit) -> Fit:
     return fitter.refit(fit.form, fit.deviations, fit.w)
+
+
+def _at_once(fitter: Fitter, one: Screened) -> Fit:
+    return fitter.refit(one.form, one.deviations, one.w)
 
 
 def _best_of_each(fits: list[Fit], by_form: bool = False) -> list[Fit]:
