@@ -23,6 +23,7 @@ _PLACES: Final = {
     "coulomb_force_N": ("contact", "coulomb_force_N"),
     "static_force_N": ("contact", "static_force_N"),
     "stribeck_velocity_mps": ("contact", "stribeck_velocity_mps"),
+    "stribeck_tail": ("contact", "stribeck_tail"),
 }
 _DIGITS = 7
 
@@ -64,7 +65,8 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
     values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
     table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed"}
     for name, (part, key) in _PLACES.items():
-        table.setdefault(part, {})[key] = values[name]
+        if name in values:
+            table.setdefault(part, {})[key] = values[name]
     effects: dict[str, dict[str, float | str]] = {}
     for name in diagnosis.effects:
         candidate = next(one for one in diagnosis.candidates if one.effect == name)

@@ -25,7 +25,7 @@ from diagnosis.next_experiment import next_experiment
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
-from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Parameter, Shrinkage
+from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Shrinkage
 from diagnosis.retuning import retuned_rig
 from diagnosis.search import middle_fits, pairs_of_effects, refitted
 from diagnosis.summary import summary
@@ -149,12 +149,7 @@ def _assembled(
         where=tuple(where),
         gap=judged,
         next_experiment=next_experiment(fitter.problem, nuisances, leaders),
-        rig=tuple(
-            Parameter(
-                name, nuisances.value(name, 0.0), nuisances.value(name, float(deviation)), evidence.rig.tolerance[name]
-            )
-            for name, deviation in zip(nuisances.rig_names, best.deviations, strict=False)
-        ),
+        rig=nuisances.parameters(best.deviations),
         findings=evidence.findings,
         pictures=pictures(
             Problem(evidence.rig, runs),

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from diagnosis.manifest import RigTable
 from diagnosis.problem import Point
+from diagnosis.result import Parameter
 from diagnosis.sensing import Chain
 from diagnosis.twin import Effects
 
@@ -50,6 +51,15 @@ class Nuisances:
         """A number of the rig table at a deviation from its described value; never below a tenth of that."""
         described = self._described[name]
         return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
+
+    def parameters(self, deviations: Floats) -> tuple[Parameter, ...]:
+        """The rig's numbers at these deviations, the shape of its Stribeck curve included."""
+        own = len(self.rig_names)
+        numbers = [
+            Parameter(name, self._described[name], self.value(name, float(deviations[i])), self._tolerance[name])
+            for i, name in enumerate(self.rig_names)
+        ]
+        return (*numbers, Parameter("stribeck_tail", 0.0, _TAIL * float(deviations[own]), _TAIL))
 
     def point(self, deviations: Floats, effects: Effects) -> Point:
         """The model at these deviations, with these effects."""

@@ -157,12 +157,18 @@ def _place(regime: str) -> tuple[int, str]:
 def rig_row(parameter: Parameter) -> RigRow:
     """A number of the rig as the table shows it."""
     name, unit = wording.name_and_unit(parameter.name)
-    scale = parameter.described * parameter.tolerance
+    scale = (parameter.described or 1.0) * parameter.tolerance
     shift: Any = (parameter.retuned - parameter.described) / scale if scale else None
     return RigRow(
         name,
         wording.quantity(parameter.described, unit),
         wording.quantity(parameter.retuned, unit),
-        f"± {100.0 * parameter.tolerance:g} %" if parameter.tolerance else "known exactly",
+        _tolerance(parameter),
         shift if shift is not None and math.isfinite(shift) else None,
     )
+
+
+def _tolerance(parameter: Parameter) -> str:
+    if not parameter.tolerance:
+        return "known exactly"
+    return f"± {100.0 * parameter.tolerance:g} %" if parameter.described else f"± {parameter.tolerance:g}"

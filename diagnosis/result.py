@@ -67,7 +67,7 @@ class Parameter(NamedTuple):
     name: str
     described: float
     retuned: float
-    tolerance: float  # one standard deviation, relative; 0: known exactly
+    tolerance: float  # one standard deviation, relative, or absolute where 0 is described; 0: known exactly
 
 
 class Experiment(NamedTuple):

@@ -130,9 +130,9 @@ def diagnosis() -> Diagnosis:
             Parameter("mass_kg", 1.5, 1.4968, 0.005),
             Parameter("drive_stiffness_N_per_m", 11700.0, 11012.0, 0.02),
             Parameter("contact_stiffness_N_per_m", 77.52e6, 77.52e6, 0.0),
-            Parameter("drive_damping_Ns_per_m", 0.0, 0.0, 0.1),
             Parameter("static_force_N", 17.38, 17.61, 0.03),
             Parameter("stribeck_velocity_mps", 0.0005, 0.00052, 0.1),
+            Parameter("stribeck_tail", 0.0, -0.12, 0.4),
         ),
         findings=(
             Finding("missing", "run-01.parquet: base_accel_mps2", "not there: what the piezo delivers cannot be seen"),

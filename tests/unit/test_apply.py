@@ -29,6 +29,7 @@ def test_the_file_holds_the_refitted_rig_and_the_effect(evidence, tmp_path):
     rig = load_rig(path)
     assert rig.drive.stiffness_N_per_m == 11012.0
     assert rig.contact.static_force_N == 17.61
+    assert rig.contact.stribeck_tail == -0.12
     assert rig.contact.coulomb_force_N == 14.49  # known exactly: as described
     assert rig.effects == {"drive-backlash": {"form": "", "gap_m": 8.1e-5}}
     header = path.read_text().split("\nname")[0]

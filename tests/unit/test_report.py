@@ -204,3 +204,6 @@ def test_what_is_nearly_sure_is_not_certain():
 def test_a_number_known_exactly_has_not_moved():
     assert rig_row(Parameter("mass_kg", 1.5, 1.5, 0.0)).shift_sd is None
     assert rig_row(Parameter("mass_kg", 1.5, 1.53, 0.01)).shift_sd == pytest.approx(2.0)
+    tail = rig_row(Parameter("stribeck_tail", 0.0, -0.12, 0.4))
+    assert tail.tolerance == "± 0.4"
+    assert tail.shift_sd == pytest.approx(-0.3)
