@@ -34,6 +34,7 @@ from diagnosis.verdict import COST_OF_EFFECT, Verdict, judge, much_left
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
+_Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 10.0
 _CONTENDERS, _CLOSE = 3, 40.0  # of chi2 behind the best single effect
@@ -60,9 +61,9 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE and singles[0].chi2 > expected_chi2:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
         pairs = pairs_of_effects(fitter, retuned, singles, tried, expected_chi2, jobs)
-        singles = _again(fitter, singles, pairs)
+        singles = _again(fitter, singles, _alone(pairs))
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
-        singles = _crossed(fitter, singles)
+        singles = _again(fitter, singles, _crossed(singles))
     # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
     if singles:
         best = singles[0]
@@ -79,29 +80,32 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began)
 
 
-def _again(fitter: Fitter, singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
-    """Single effects once more, from where the best pair left them."""
-    best = min(pairs, key=lambda fit: fit.chi2, default=None)
-    if best is None:
-        return singles
-    found = {fit.form.effects: fit for fit in singles}
+def _alone(pairs: list[Fit]) -> list[_Start]:
+    """Each effect of the best pair alone, from where the pair left it."""
+    if not pairs:
+        return []
+    best = min(pairs, key=lambda fit: fit.chi2)
+    starts: list[_Start] = []
     for name, form in best.form.forms.items():
         own = [i for i, axis in enumerate(best.form.axes) if axis.effect == name]
-        alone = Form({name: form}, tuple(best.form.axes[i] for i in own))
-        fit = fitter.refit(alone, best.deviations, best.w[own])
-        before = found.get((name,))
-        if before is None or fit.chi2 < before.chi2:
-            found[name,] = fit
-    return sorted(found.values(), key=lambda fit: fit.chi2)
+        starts.append((Form({name: form}, tuple(best.form.axes[i] for i in own)), best.deviations, best.w[own]))
+    return starts
 
 
-def _crossed(fitter: Fitter, singles: list[Fit]) -> list[Fit]:
-    """Close contenders once more from each other's nuisances, as one effect from three starts ended at 260, 273 and 288."""
+def _crossed(singles: list[Fit]) -> list[_Start]:
+    """Close contenders from each other's nuisances, as one effect from three starts ended at 260, 273 and 288."""
     close = [fit for fit in singles[:_CONTENDERS] if fit.chi2 < singles[0].chi2 + _CLOSE]
+    return [(fit.form, other.deviations, fit.w) for fit in close for other in close if other is not fit]
+
+
+def _again(fitter: Fitter, singles: list[Fit], starts: list[_Start]) -> list[Fit]:
+    """Single effects, best first, after refits from other starts."""
     found = {fit.form.effects: fit for fit in singles}
-    for fit in close:
-        again = [fitter.refit(fit.form, other.deviations, fit.w) for other in close if other is not fit]
-        found[fit.form.effects] = min([fit, *again], key=lambda one: one.chi2)
+    for start in starts:
+        fit = fitter.refit(*start)
+        before = found.get(fit.form.effects)
+        if before is None or fit.chi2 < before.chi2:
+            found[fit.form.effects] = fit
     return sorted(found.values(), key=lambda fit: fit.chi2)
 
 
