@@ -25,7 +25,7 @@ def lines(found: Diagnosis) -> list[str]:
     said += [
         f"moved       {one.name} {one.described:.4g} -> {one.retuned:.4g}"
         for one in found.rig
-        if abs(one.retuned / one.described - 1.0) > 2.0 * one.tolerance
+        if abs(one.retuned - one.described) > 2.0 * one.tolerance * (one.described or 1.0)
     ]
     return [*said, f"next        {found.next_experiment.what}", f"took        {found.elapsed_s:.0f} s"]
 
