@@ -24,10 +24,12 @@ from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
+from diagnosis.random_load import EFFECT as LOAD
+from diagnosis.random_load import RandomLoad, has_random_load
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Shrinkage
 from diagnosis.retuning import retuned_rig
-from diagnosis.search import middle_fits, pairs_of_effects, refitted
+from diagnosis.search import Origin, best_of_each, middle_fits, pairs_of_effects, refitted, refitted_rest, screened
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
 from diagnosis.verdict import COST_OF_EFFECT, Verdict, judge, much_left
@@ -38,6 +40,8 @@ _Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 10.0
 _CONTENDERS, _CLOSE = 3, 40.0  # of chi2 behind the best single effect
+# of a perfect model's chi2: what the retuned rig leaves, and the best fit, where a random load is looked at
+_SHOWS, _LEFT = 1.3, 1.2
 _WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
 
 
@@ -53,10 +57,11 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     fitter, retuned, roughness, expected_chi2 = retuned_rig(evidence, problem, progress)
     described = np.zeros(len(fitter.nuisances))
     tried = trials(problem)
-    origins = [(retuned, KNEE)]
+    origins = [Origin(retuned, KNEE)]
     if much_left(retuned, expected_chi2):  # a large effect may have pulled the refit into a valley of its own
-        origins.append((fitter.described(described), FAR_KNEE))
-    singles = refitted(fitter, origins, tried, jobs)
+        origins.append(Origin(fitter.described(described), FAR_KNEE))
+    found = screened(fitter, origins, tried, jobs)
+    singles = refitted(fitter, origins, found, jobs)
     pairs: list[Fit] = []
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE and singles[0].chi2 > expected_chi2:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
@@ -69,15 +74,30 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         best = singles[0]
         retuned = min(retuned, fitter.refit(NOTHING, best.deviations, np.zeros(0)), key=lambda fit: fit.chi2)
         singles[0] = min(best, fitter.refit(best.form, retuned.deviations, best.w), key=lambda fit: fit.chi2)
-    verdict = judge(retuned, singles, pairs, expected_chi2)
-    if verdict.named is not None and len(verdict.named.form.effects) == 1 and verdict.ranked[0].evidence < _SURE:
-        without, again = middle_fits(fitter, retuned, singles, verdict.named)
+    load = None
+    if retuned.chi2 > _SHOWS * expected_chi2 and min(fit.chi2 for fit in (retuned, *singles)) > _LEFT * expected_chi2:
+        progress("could what is left be the scatter of a random load?", 0.7)
+        unloaded = [retuned, *(fit for fit in singles if LOAD not in fit.form.effects)]
+        load = RandomLoad(fitter, min(unloaded, key=lambda fit: fit.chi2))
+    verdict = judge(retuned, singles, pairs, expected_chi2, load)
+    if verdict.kind == "unexplained":
+        progress("nothing explains it yet: every effect gets a refit", 0.75)
+        singles = _with(singles, refitted_rest(fitter, origins, found, jobs))
+        verdict = judge(retuned, singles, pairs, expected_chi2, load)
+    if _refittable(verdict) and verdict.ranked[0].evidence < _SURE:
+        without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit)
         checked = judge(without, [again], [], expected_chi2)
         if checked.named is None:
             retuned, singles, verdict = without, [again], checked
     best = verdict.named or retuned
     progress(f"verdict: {verdict.kind}", 0.8)
     return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began)
+
+
+def _refittable(verdict: Verdict) -> bool:
+    """Whether a single effect was named that a prediction can follow."""
+    named = verdict.named
+    return named is not None and len(named.form.effects) == 1 and not has_random_load(named.form)
 
 
 def _alone(pairs: list[Fit]) -> list[_Start]:
@@ -100,13 +120,11 @@ def _crossed(singles: list[Fit]) -> list[_Start]:
 
 def _again(fitter: Fitter, singles: list[Fit], starts: list[_Start]) -> list[Fit]:
     """Single effects, best first, after refits from other starts."""
-    found = {fit.form.effects: fit for fit in singles}
-    for start in starts:
-        fit = fitter.refit(*start)
-        before = found.get(fit.form.effects)
-        if before is None or fit.chi2 < before.chi2:
-            found[fit.form.effects] = fit
-    return sorted(found.values(), key=lambda fit: fit.chi2)
+    return _with(singles, [fitter.refit(*start) for start in starts])
+
+
+def _with(singles: list[Fit], more: list[Fit]) -> list[Fit]:
+    return best_of_each(sorted((*singles, *more), key=lambda fit: fit.chi2))
 
 
 def _assembled(
@@ -141,8 +159,8 @@ def _assembled(
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
     effects = best.form.effects if verdict.named else ()
-    single = len(effects) == 1
-    alike = imitators(fitter, list(verdict.ranked), verdict.scale) if single else ()
+    followed = [one for one in verdict.ranked if not has_random_load(one.fit.form)]
+    alike = imitators(fitter, followed, verdict.scale) if _refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
     done = Diagnosis(
         verdict=verdict.kind,

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from diagnosis.gap import Floor, cell_squares, differences, floor_of, replicates
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
+from diagnosis.random_load import has_random_load
 from diagnosis.refit import NOTHING, Fit, Form
-from diagnosis.twin import Roughness
+from diagnosis.twin import Effects, Roughness
 
 Floats = npt.NDArray[np.floating[Any]]
 _REPLICATES = 24
@@ -36,12 +37,21 @@ class HeldOut:
     def __init__(self, problem: Problem, nuisances: Nuisances, best: Fit, retuned: Fit, roughness: Roughness) -> None:
         self.problem = problem
         self._nuisances = nuisances
-        point = nuisances.point(best.deviations, best.effects)
-        self.floor: Floor = floor_of(problem, point, replicates(problem, point, roughness, _REPLICATES, _SEED))
+        plain = {name: table for name, table in best.effects.items() if table["form"] != "random"}
+        self.floor: Floor = self._floor_at(best, plain, roughness, None)
+        self._wider = self.floor
+        if len(plain) < len(best.effects):
+            # what a random load does is scatter: it is in the floor of the models that have it
+            wider = self._floor_at(best, best.effects, roughness, self.floor)
+            self._wider = self.floor._replace(bias=wider.bias, scatter=wider.scatter, level=wider.level)
         described = np.zeros(len(nuisances))
         self.nominal = self._gap(cell_squares(self.floor, self.differences(described, NOTHING, np.zeros(0))))
         self._retuned = cell_squares(self.floor, self.differences(retuned.deviations, retuned.form, retuned.w))
         self.retuned = self._gap(self._retuned)
+
+    def _floor_at(self, best: Fit, effects: Effects, roughness: Roughness, before: Floor | None) -> Floor:
+        point = self._nuisances.point(best.deviations, effects)
+        return floor_of(self.problem, point, replicates(self.problem, point, roughness, _REPLICATES, _SEED), before)
 
     def closed_by(self, fit: Fit) -> Closed:
         """The gap under a fit, with an interval from the spread over cells and the fit's own uncertainty."""
@@ -82,7 +92,10 @@ class HeldOut:
 
     def differences(self, deviations: Floats, form: Form, w: Floats) -> Floats:
         """Measured less predicted in floors [compared]."""
-        return self.differences_of(self.problem.predicted(self._nuisances.point(deviations, form.tables(w))))
+        floor = self._wider if has_random_load(form) else self.floor
+        return differences(
+            floor, self.problem, self.problem.predicted(self._nuisances.point(deviations, form.tables(w)))
+        )
 
     def differences_of(self, predicted: Floats) -> Floats:
         """The same for a prediction [features] from elsewhere."""

@@ -48,7 +48,7 @@ def trials(problem: Problem) -> list[Trial]:
         if rig.drive not in effect.drives or (effect.acts_on == "piezo" and highest_Hz == 0.0):
             continue
         for form in effect.forms:
-            if form != "random":  # no prediction follows a random load; only the sine is tried
+            if form != "random":  # no prediction follows a random load: `diagnosis.random_load`
                 found += _starts(name, form, problem, highest_Hz)
     return found
 
@@ -78,6 +78,8 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         starts = [{"frequency_Hz": f} for f in rings_Hz or (50.0, 120.0, 300.0)]
     elif name == "frictional-lag" and form == "distance":
         starts = [{"distance_m": times * scale["distance_m"].scale} for times in (0.4, 1.0, 3.0)]
+    elif name == "frictional-lag" and form == "dead-time":
+        starts = [{"delay_s": times * scale["delay_s"].scale} for times in (0.4, 2.5)]
     elif name == "piezo-resonance":
         starts = [{"resonance_Hz": share * highest_Hz} for share in (0.5, 0.75, 0.9, 1.2, 2.0)]
     return [_trial(name, form, scale, start) for start in starts]
@@ -133,6 +135,10 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
         ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)},
         ("static-friction-ageing", "power"): {"ratio": _Scale(0.04, True, 1.5), "exponent": _Scale(0.3, True, 0.5)},
         ("frictional-lag", "time"): {"lag_s": _Scale(0.06 * slip_s, True, 1.5)},
+        ("frictional-lag", "dead-time"): {
+            "delay_s": _Scale(0.03 * slip_s, True, 1.5),
+            "share": _Scale(0.7, True, 0.5),
+        },
         ("frictional-lag", "distance"): {
             "distance_m": _Scale(0.005 * reach_m, True, 1.5),
             "share": _Scale(0.5, True, 0.7),

@@ -95,6 +95,13 @@ class Problem:
             moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
         if "before_s" in moving.get("friction-drift", {}):
             moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
+        load = moving.get("normal-load-fluctuation", {})
+        if load.get("form") == "random":
+            # each run has a path of its own; with the seed 0 any, which a draw decides, and on average there is none
+            seed = float(load["seed"]) or (float(draw.random.integers(1, 1_000_000)) if draw else 0.0)
+            del moving["normal-load-fluctuation"]
+            if seed > 0.0:
+                moving["normal-load-fluctuation"] = load | {"seed": seed + run.before_s}
         start, chain = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects)), point.chain
         roughness = None
         if draw is not None:

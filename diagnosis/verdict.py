@@ -13,6 +13,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.random_load import EFFECT as LOAD
+from diagnosis.random_load import RandomLoad, Scattered
 from diagnosis.refit import Fit
 from plant.effects import EFFECTS
 
@@ -32,6 +34,7 @@ JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
 _SECOND_ADDS = 0.06  # and this share of what both close: less is what the first one's formula does not fit,
+_UNDER_LOAD = 2  # single effects that a random load is tried on top of
 _COMPLETE = 1.3  # unless one alone leaves much and both less than this
 _TEMPERATURE = 3.0  # of the probabilities: a guess
 
@@ -83,17 +86,39 @@ def occam(fit: Fit) -> float:
     return sum(math.log(axis.prior) for axis in fit.form.axes) - 0.5 * float(volume)
 
 
-def judge(base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> Verdict:
-    """The verdict over single effects and pairs of them, each list best first; `expected_chi2` is a perfect model's."""
-    scale = max(min(fit.chi2 for fit in (base, *singles, *pairs)) / expected_chi2, 1.0)
+def judge(
+    base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, load: RandomLoad | None = None
+) -> Verdict:
+    """The verdict over single effects and pairs of them.
+
+    Args:
+        base: the rig without effects.
+        singles, pairs: the best fit of each, best first.
+        expected_chi2: of a perfect model.
+        load: to judge a random load by, alone and on top of the best single effects; None: it is not looked at.
+
+    """
+    under_load = [base, *(fit for fit in singles if LOAD not in fit.form.effects)][: 1 + _UNDER_LOAD] if load else []
+
+    def scattered(noise: float) -> list[Scattered]:
+        return [load.on(fit, noise) for fit in under_load] if load else []
+
+    fits = [base, *singles, *pairs, *(one.fit for one in scattered(JITTER))]
+    scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> Model:
         closer = _square(base.residual) - _square(fit.residual)
         likelier = (base.chi2 - fit.chi2) - closer
         return Model(fit, 0.5 * closer / (scale * JITTER) + 0.5 * likelier - occam(fit))
 
-    ranked = sorted((model(fit) for fit in singles), key=lambda one: -one.evidence)
-    double = max((model(fit) for fit in pairs), key=lambda one: one.evidence, default=None)
+    alone = [model(fit) for fit in singles]
+    doubles = [model(fit) for fit in pairs]
+    if loaded := scattered(scale * JITTER):
+        alone.append(Model(*loaded[0]))
+        below = zip(under_load[1:], loaded[1:], strict=True)
+        doubles += [Model(one.fit, model(fit).evidence + one.gained) for fit, one in below]
+    ranked = sorted(alone, key=lambda one: -one.evidence)
+    double = max(doubles, key=lambda one: one.evidence, default=None)
     if double is not None and ranked:
         gained = double.evidence - ranked[0].evidence
         left = max(ranked[0].fit.chi2 - expected_chi2, 1.0)
@@ -113,7 +138,7 @@ def judge(base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float)
         scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
     else:
         scores["unexplained"] = min(unknown, scores["none"] - _NO_ALARM)
-    for one in ranked:
+    for one in reversed(ranked):  # the better one of two forms last
         scores[one.fit.form.effects[0]] = one.evidence
     if double is not None:
         for name in double.fit.form.effects:

@@ -42,6 +42,11 @@ class Series(NamedTuple):
 
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
     """The strongest waves of the friction over `position` [m] or `time` [s], two in each of `most` ranges of periods."""
+    return _strongest(friction_series(runs, scales, over), most)
+
+
+def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Series]:
+    """Breakaways, or levels where nothing slips, over `position` [m] or `time` [s]; one series a segment."""
     series: list[Series] = []
     for run in runs:
         force = run.signals.get("drive_force_N")
@@ -69,7 +74,7 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -
                 if np.ptp(level) < 0.2 * scales.force_N and level.mean() > 0.5 * scales.force_N:
                     there = coordinate[own][len(cut) // 3 + 10 :: 20][: len(level)]
                     series.append(Series(there, level / level.mean() - 1.0))
-    return _strongest(series, most)
+    return series
 
 
 def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:

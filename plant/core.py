@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from plant.contact import step as contact_step
-from plant.disturb import ageing_N, elasto_plastic_share, level, spring_N, wave
+from plant.disturb import ageing_N, elasto_plastic_share, late_mps, level, spring_N, wave
 from plant.piezo import accepted, delivered_share
 from plant.records import DELAY_LINE
 
@@ -192,6 +192,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     elif p.lag_s > 0.0:
                         v_lag += lag_share * (v_r - v_lag)
                         v_g = v_lag
+                    elif p.lag_dead_s > 0.0:
+                        v_lag = late_mps(p, s, t_s, math.fabs(v_r))
                     age_s = (age_s + dt) / (1.0 + math.fabs(v_r) / p.age_length_m * dt)
                     F_c_now = F_c * friction * (1.0 + (p.kinetic_backward_ratio if v_r < 0.0 else 0.0))
                     F_s_now = F_s * friction
@@ -201,7 +203,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 else:
                     damping = h_v
                 fall = _stribeck_share(v_g * per_v_s, tail)
-                if disturbed and p.lag_distance_m > 0.0:
+                if disturbed and p.late_share > 0.0:
                     fall += p.late_share * (_stribeck_share(v_lag * per_v_s, tail) - fall)
                 g = F_c_now + (F_s_now - F_c_now) * fall
                 if disturbed:

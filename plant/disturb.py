@@ -5,6 +5,7 @@ import math
 from bridge.kernel import Record, kernel
 
 TWO_PI = 2.0 * math.pi
+LAG_CELL_S = 2e-5  # of the line that remembers the speed: 11 of them in a period at 4.5 kHz
 
 
 @kernel
@@ -52,6 +53,20 @@ def level(p: Record, t_s: float, x: float, v_r: float) -> float:
         result *= 1.0 + p.roughness_ratio * smooth_noise(x / p.roughness_length_m, p.roughness_seed)
     # noise has no bound: a slide that lifts off is not this model's
     return max(result * (1.0 + (p.forward_ratio if v_r >= 0.0 else p.backward_ratio)), 0.01)
+
+
+@kernel
+def late_mps(p: Record, s: Record, t_s: float, speed_mps: float) -> float:
+    """The speed as it was `lag_dead_s` ago, from a line of cells that is filled up to now; before the run it was 0."""
+    length = len(s.lag_line)
+    now = t_s / LAG_CELL_S
+    while s.lag_at < now:
+        s.lag_at += 1
+        s.lag_line[s.lag_at % length] = speed_mps
+    back = now - p.lag_dead_s / LAG_CELL_S
+    whole = math.floor(back)
+    older, newer = s.lag_line[int(whole) % length], s.lag_line[(int(whole) + 1) % length]
+    return older + (back - whole) * (newer - older)
 
 
 @kernel

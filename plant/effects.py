@@ -4,7 +4,7 @@ A name means a mechanism; a form is one formula for it. `[effects.NAME]` in a ri
 out) and the form's parameters. Off is bit-identical to the nominal rig: effects that only change a number of the rig are
 folded into it by `plant.records.build`, the others run in a kernel of their own (`plant.core.advance_disturbed`).
 
-Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; lag over time:
+Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; lag over time and as a dead time:
 Hess & Soom 1990; over a distance: Rabinowicz 1958, of a share: Ruina 1983, two state variables; log and power ageing,
 hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; a mode that takes part by a share: Ewins, Modal
 Testing, 2000.
@@ -39,6 +39,7 @@ class Effect(NamedTuple):
 
 
 LONGEST_DELAY = 254  # samples; 12.7 ms at 20 kHz
+LONGEST_LAG_S = 0.025  # of friction behind the velocity, as a dead time
 
 _TAU = 2.0 * math.pi
 _SPRING = ("spring",)
@@ -77,6 +78,10 @@ EFFECTS: Final[dict[str, Effect]] = {
         {
             "time": Form(
                 "the Stribeck curve sees v_r through a first-order lag", (Parameter("lag_s", 0.0, 1.0, 2e-3),)
+            ),
+            "dead-time": Form(
+                "a share of it sees |v_r| as it was delay_s ago",
+                (Parameter("delay_s", 0.0, LONGEST_LAG_S, 2e-3), Parameter("share", 0.0, 1.0, 1.0)),
             ),
             "distance": Form(
                 "a share of it sees |v_r| through a lag over the path slid, and rests while the contact does",
@@ -119,7 +124,7 @@ EFFECTS: Final[dict[str, Effect]] = {
             ),
             "random": Form(
                 "friction times 1 + ratio n(t), n smooth noise of unit rms, a new value every 1 / (2 frequency_Hz)",
-                (_ratio(0.03, 0.0, 0.9), Parameter("frequency_Hz", 1e-3, 1e3, 3.0), Parameter("seed", 0, 1e6, 1)),
+                (_ratio(0.03, 0.0, 0.9), Parameter("frequency_Hz", 1e-3, 1e3, 3.0), Parameter("seed", 0, 1e6, 0)),
             ),
         },
     ),

@@ -8,7 +8,8 @@ import numpy.typing as npt
 
 from bridge.kernel import record
 from plant.config import RigConfig
-from plant.effects import LONGEST_DELAY
+from plant.disturb import LAG_CELL_S
+from plant.effects import LONGEST_DELAY, LONGEST_LAG_S
 
 # Rows of the array that a block fills, one column a sample. The first five are the sensors of the rig, in the order of
 # the wire; the others are what no sensor sees.
@@ -34,7 +35,8 @@ PARAMS = np.dtype(
             *("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"),
             *("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"),
             # the effects of `plant.effects`, all 0 in the nominal rig
-            *("age_growth_N", "age_scale_s", "age_exponent", "age_length_m", "lag_s", "lag_distance_m", "late_share"),
+            *("age_growth_N", "age_scale_s", "age_exponent", "age_length_m"),
+            *("lag_s", "lag_dead_s", "lag_distance_m", "late_share"),
             "quadratic_Ns2_per_m2",
             *("position_ratio", "position_wavelength_m", "position_phase_rad", "position_sin_2", "position_cos_2"),
             *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
@@ -62,7 +64,7 @@ PARAMS = np.dtype(
 
 # an effect that runs in the kernel is off while its switch is 0
 _SWITCHES = (
-    *("age_growth_N", "lag_s", "lag_distance_m", "quadratic_Ns2_per_m2", "position_ratio"),
+    *("age_growth_N", "lag_s", "lag_dead_s", "lag_distance_m", "quadratic_Ns2_per_m2", "position_ratio"),
     *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
     *("load_ratio", "drift_per_s", "drift_ratio", "roughness_ratio", "hardening_per_m2", "knee_ratio", "gap_m"),
     *("relaxing_Ns_per_m", "ripple_ratio"),
@@ -72,6 +74,7 @@ _SWITCHES = (
 
 _WAVE_SHAPE = ("phase_rad", "second_sin", "second_cos")
 DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the one before it, the one of now
+LAG_LINE = round(LONGEST_LAG_S / LAG_CELL_S) + 2  # likewise
 
 # x and z are kept half a step before v: the leapfrog of `contact`. `_f` marks what a sensor's filter remembers.
 STATE = np.dtype(
@@ -88,7 +91,7 @@ STATE = np.dtype(
             *("arm_N", "force_lag_1", "force_lag_2"),
         )
     ]
-    + [("delay_line", "f8", (DELAY_LINE,)), ("delay_at", "i8")],
+    + [("delay_line", "f8", (DELAY_LINE,)), ("delay_at", "i8"), ("lag_line", "f8", (LAG_LINE,)), ("lag_at", "i8")],
     align=True,
 )
 
@@ -169,8 +172,9 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.age_growth_N = value["ratio"] * p.F_s
         p.age_scale_s, p.age_exponent = value.get("age_scale_s", 1.0), value.get("exponent", 0.0)
     elif name == "frictional-lag":
-        p.lag_s = value.get("lag_s", 0.0)
-        p.lag_distance_m, p.late_share = value.get("distance_m", 0.0), value.get("share", 0.0)
+        p.lag_s, p.lag_dead_s = value.get("lag_s", 0.0), value.get("delay_s", 0.0)
+        p.lag_distance_m = value.get("distance_m", 0.0)
+        p.late_share = value.get("share", 0.0) * (p.lag_dead_s > 0.0 or p.lag_distance_m > 0.0)
     elif name == "viscous-friction":
         p.h_v += value.get("damping_Ns_per_m", 0.0)
         p.quadratic_Ns2_per_m2 = value.get("damping_Ns2_per_m2", 0.0)

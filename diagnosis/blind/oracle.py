@@ -22,7 +22,7 @@ from diagnosis.library import trials
 from diagnosis.problem import Problem, prepare
 from diagnosis.refit import FAR_KNEE, Fit
 from diagnosis.retuning import retuned_rig
-from diagnosis.search import refitted
+from diagnosis.search import Origin, refitted, screened
 from diagnosis.strict_json import write_json
 
 Progress = Callable[[str, float], None]
@@ -65,10 +65,10 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     best: Fit = retuned
     for effect in effects:  # one after the other, each on top of those before it
         own = [trial for trial in tried if trial.form.effects == (effect,)]
-        origins = [(best, KNEE)]
+        origins = [Origin(best, KNEE)]
         if best is retuned:
-            origins.append((fitter.described(np.zeros(len(fitter.nuisances))), FAR_KNEE))
-        found = refitted(fitter, origins, own)
+            origins.append(Origin(fitter.described(np.zeros(len(fitter.nuisances))), FAR_KNEE))
+        found = refitted(fitter, origins, screened(fitter, origins, own))
         if not found:
             return None
         best = found[0]

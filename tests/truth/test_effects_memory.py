@@ -70,18 +70,18 @@ def test_breakaway_grows_with_the_rest_as_the_formula(ageing):
         assert orders == pytest.approx(ageing["exponent"], rel=0.05)
 
 
-def swinging(lag_s, frequency_Hz=10.0):
+def swinging(lag, frequency_Hz=10.0):
     """A heavy slide whose velocity swings between 0.1 and 0.9 mm/s, driven by force; v(t) exact at the blocks."""
     blocks = np.arange(round(3 / frequency_Hz / BLOCK_S) + 1) * BLOCK_S
     v_mps = 5e-4 + 4e-4 * np.sin(TAU * frequency_Hz * blocks)
-    config = rig({"frictional-lag": {"lag_s": lag_s}}, slide={"mass_kg": HEAVY_KG})
+    config = rig({"frictional-lag": lag}, slide={"mass_kg": HEAVY_KG})
     start = {"v": v_mps[0], "v_r": v_mps[0], "v_lag": v_mps[0], "z": stribeck_N(CONTACT, v_mps[0]) / K_T}
     return run(config, HEAVY_KG * np.diff(v_mps) / BLOCK_S, start, force_driven=True), blocks, v_mps
 
 
 def test_lag_is_first_order_in_front_of_the_stribeck_curve():
     lag_s = 5e-3
-    result, blocks_s, block_mps = swinging(lag_s)
+    result, blocks_s, block_mps = swinging({"lag_s": lag_s})
 
     def velocity(t_s):
         return np.interp(t_s, blocks_s, block_mps)
@@ -102,11 +102,30 @@ def test_lag_is_first_order_in_front_of_the_stribeck_curve():
     assert np.ptp(expected_N) > 1.5
 
 
+def test_a_dead_time_shows_the_stribeck_curve_an_earlier_speed():
+    delay_s = 5e-3
+    result, blocks_s, block_mps = swinging({"form": "dead-time", "delay_s": delay_s})
+
+    def seen_N(t_s):
+        return stribeck_N(CONTACT, np.interp(t_s - delay_s, blocks_s, block_mps))
+
+    def slope(t_s, z):
+        return np.interp(t_s, blocks_s, block_mps) * (1 - K_T * z / seen_N(t_s))
+
+    t_s = result.t_s
+    start = [stribeck_N(CONTACT, block_mps[0]) / K_T]
+    z = solve_ivp(slope, (0, t_s[-1]), start, "LSODA", t_eval=t_s, rtol=1e-8, atol=1e-14, max_step=BLOCK_S).y[0]
+    expected_N = K_T * z + H_T * np.interp(t_s, blocks_s, block_mps) * (1 - K_T * z / seen_N(t_s))
+    later = t_s > 0.04  # the bristle has forgotten how it began
+    assert result.true_friction_force_N[later] == pytest.approx(expected_N[later], abs=0.01)
+    assert np.ptp(expected_N) > 1.5
+
+
 def test_a_lag_opens_a_loop_of_friction_over_velocity():
     """Hess & Soom: more friction while it accelerates than while it decelerates through the same velocity."""
 
     def loop_N(lag_s):
-        result, _, _ = swinging(lag_s)
+        result, _, _ = swinging({"lag_s": lag_s})
         v, late = result.true_velocity_mps, result.t_s > 0.1
         rising = np.gradient(v) > 0
         at = late & (np.abs(v - 5e-4) < 2e-5)

@@ -11,7 +11,7 @@ from diagnosis.library import trials
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
 from diagnosis.refit import FAR_KNEE, Fitter
-from diagnosis.search import refitted
+from diagnosis.search import Origin, refitted, screened
 from diagnosis.twin import Roughness
 from tests.real.evidences import AXIS, MISSING, axis
 
@@ -32,7 +32,8 @@ def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> Non
     retuned = fitter.retuned(np.zeros(len(nuisances)))
     described = fitter.described(np.zeros(len(nuisances)))
     offsets = [trial for trial in trials(fitted) if "force-sensor-bias" in trial.form.forms]
-    with_bias = refitted(fitter, [(retuned, KNEE), (described, FAR_KNEE)], offsets)[0]
+    origins = [Origin(retuned, KNEE), Origin(described, FAR_KNEE)]
+    with_bias = refitted(fitter, origins, screened(fitter, origins, offsets))[0]
     gaps = [
         gap(judge, differences(judge, held_out, held_out.predicted(nuisances.point(fit.deviations, fit.effects))))
         for fit in (retuned, with_bias)

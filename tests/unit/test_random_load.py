@@ -1,0 +1,53 @@
+"""A random load is told by what it scatters, whatever path it takes."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from diagnosis.gap import replicates
+from diagnosis.heldout import HeldOut
+from diagnosis.problem import Problem
+from diagnosis.random_load import RandomLoad
+from diagnosis.refit import NOTHING
+from diagnosis.retuning import retuned_rig
+from diagnosis.verdict import JITTER
+from tests.prepared import prepared
+
+RATIO = 0.03
+LOAD = {"normal-load-fluctuation": {"form": "random", "ratio": RATIO, "frequency_Hz": 2.0, "seed": 5}}
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """A rig under a random load: its runs, and the refitted model without a load."""
+    evidence, runs = prepared(tmp_path_factory.mktemp("loaded") / "evidence", "ladder", LOAD)
+    problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
+    unseen = Problem(evidence.rig, [run for run in runs if run.holdout])
+    return retuned_rig(evidence, problem, lambda _said, _share: None), unseen
+
+
+def test_a_random_load_pays_and_its_size_is_found(rig):
+    (fitter, fit, roughness, expected_chi2), unseen = rig
+    found = RandomLoad(fitter, fit).on(fit, JITTER)
+    assert found.gained > 30.0
+    assert found.fit.chi2 < 1.5 * expected_chi2 < 0.7 * fit.chi2
+    table = found.fit.effects["normal-load-fluctuation"]
+    assert table["form"] == "random"
+    assert RATIO / 2 < table["ratio"] < RATIO * 2
+    # on other runs the load takes another path: their gap is what such loads scatter
+    held_out = HeldOut(unseen, fitter.nuisances, found.fit, fit, roughness)
+    closed = held_out.closed_by(found.fit)
+    assert closed.shrinkage is not None
+    assert closed.shrinkage > 0.5
+    assert held_out.closed_by(fit).shrinkage == pytest.approx(0.0)
+
+
+def test_without_one_it_costs_more_than_it_brings(rig):
+    (fitter, fit, roughness, _), _ = rig
+    unloaded = copy.copy(fitter.problem)
+    point = fitter.nuisances.point(fit.deviations, {})
+    unloaded.measured = replicates(fitter.problem, point, roughness, 1, 9)[0]
+    fitter = fitter.for_problem(unloaded)
+    fit = fitter.refit(NOTHING, fit.deviations, np.zeros(0))
+    assert RandomLoad(fitter, fit).on(fit, JITTER).gained < 0.0
