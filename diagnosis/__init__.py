@@ -23,7 +23,7 @@ Fit
     waves, axis_waves           periods at which a wave may be looked for
     retuning                    the rig without effects, refitted: what all evidence is measured against
     refit                       Gauss-Newton over nuisances and the parameters of an effect
-    random_load                 a load without a path: judged by what it scatters
+    random_friction             friction without a path that could be followed: judged by what it scatters
     search                      from all trials to the few that are refitted in full
 Verdict
     diagnose                    the whole way, in order

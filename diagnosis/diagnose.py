@@ -24,15 +24,14 @@ from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
-from diagnosis.random_load import EFFECT as LOAD
-from diagnosis.random_load import RandomLoad, has_random_load
+from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction, is_random
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Shrinkage
 from diagnosis.retuning import retuned_rig
 from diagnosis.search import Origin, best_of_each, middle_fits, pairs_of_effects, refitted, refitted_rest, screened
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
-from diagnosis.verdict import COST_OF_EFFECT, Verdict, judge, much_left
+from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, judge, much_left
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
@@ -40,8 +39,6 @@ _Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 10.0
 _CONTENDERS, _CLOSE = 3, 40.0  # of chi2 behind the best single effect
-# of a perfect model's chi2: what the retuned rig leaves, and the best fit, where a random load is looked at
-_SHOWS, _LEFT = 1.3, 1.2
 _WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
 
 
@@ -74,16 +71,18 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         best = singles[0]
         retuned = min(retuned, fitter.refit(NOTHING, best.deviations, np.zeros(0)), key=lambda fit: fit.chi2)
         singles[0] = min(best, fitter.refit(best.form, retuned.deviations, best.w), key=lambda fit: fit.chi2)
-    load = None
-    if retuned.chi2 > _SHOWS * expected_chi2 and min(fit.chi2 for fit in (retuned, *singles)) > _LEFT * expected_chi2:
-        progress("could what is left be the scatter of a random load?", 0.7)
-        unloaded = [retuned, *(fit for fit in singles if LOAD not in fit.form.effects)]
-        load = RandomLoad(fitter, min(unloaded, key=lambda fit: fit.chi2))
-    verdict = judge(retuned, singles, pairs, expected_chi2, load)
+    verdict = judge(retuned, singles, pairs, expected_chi2)
     if verdict.kind == "unexplained":
-        progress("nothing explains it yet: every effect gets a refit", 0.75)
+        progress("nothing explains it yet: every effect gets a refit", 0.7)
         singles = _with(singles, refitted_rest(fitter, origins, found, jobs))
-        verdict = judge(retuned, singles, pairs, expected_chi2, load)
+        verdict = judge(retuned, singles, pairs, expected_chi2)
+    # rigs without a gap leave scatter too, by as much as this
+    gap_is_sure = retuned.chi2 > NEVER_WITHOUT_GAP * expected_chi2
+    left = min(fit.chi2 for fit in (retuned, *singles, *pairs))
+    if gap_is_sure and (verdict.kind == "unexplained" or left > NEVER_WITHOUT_GAP * expected_chi2):
+        progress("could what is left be friction that varies at random?", 0.75)
+        random = [_random(effect, fitter, retuned, singles) for effect in RANDOM_EFFECTS]
+        verdict = judge(retuned, singles, pairs, expected_chi2, random)
     if _refittable(verdict) and verdict.ranked[0].evidence < _SURE:
         without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit)
         checked = judge(without, [again], [], expected_chi2)
@@ -97,7 +96,13 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
 def _refittable(verdict: Verdict) -> bool:
     """Whether a single effect was named that a prediction can follow."""
     named = verdict.named
-    return named is not None and len(named.form.effects) == 1 and not has_random_load(named.form)
+    return named is not None and len(named.form.effects) == 1 and not is_random(named.form)
+
+
+def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> RandomFriction:
+    """The random form of an effect on the rig that comes nearest without that effect."""
+    others = [retuned, *(fit for fit in singles if effect not in fit.form.effects)]
+    return RandomFriction(effect, fitter, min(others, key=lambda fit: fit.chi2))
 
 
 def _alone(pairs: list[Fit]) -> list[_Start]:
@@ -159,7 +164,7 @@ def _assembled(
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
     effects = best.form.effects if verdict.named else ()
-    followed = [one for one in verdict.ranked if not has_random_load(one.fit.form)]
+    followed = [one for one in verdict.ranked if not is_random(one.fit.form)]
     alike = imitators(fitter, followed, verdict.scale) if _refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
     done = Diagnosis(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from diagnosis.gap import Floor, cell_squares, differences, floor_of, replicates
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
-from diagnosis.random_load import has_random_load
+from diagnosis.random_friction import RANDOM, is_random
 from diagnosis.refit import NOTHING, Fit, Form
 from diagnosis.twin import Effects, Roughness
 
@@ -37,11 +37,11 @@ class HeldOut:
     def __init__(self, problem: Problem, nuisances: Nuisances, best: Fit, retuned: Fit, roughness: Roughness) -> None:
         self.problem = problem
         self._nuisances = nuisances
-        plain = {name: table for name, table in best.effects.items() if table["form"] != "random"}
+        plain = {name: table for name, table in best.effects.items() if table["form"] != RANDOM}
         self.floor: Floor = self._floor_at(best, plain, roughness, None)
         self._wider = self.floor
         if len(plain) < len(best.effects):
-            # what a random load does is scatter: it is in the floor of the models that have it
+            # what friction does that varies at random is scatter: it is in the floor of the models that have it
             wider = self._floor_at(best, best.effects, roughness, self.floor)
             self._wider = self.floor._replace(bias=wider.bias, scatter=wider.scatter, level=wider.level)
         described = np.zeros(len(nuisances))
@@ -92,7 +92,7 @@ class HeldOut:
 
     def differences(self, deviations: Floats, form: Form, w: Floats) -> Floats:
         """Measured less predicted in floors [compared]."""
-        floor = self._wider if has_random_load(form) else self.floor
+        floor = self._wider if is_random(form) else self.floor
         return differences(
             floor, self.problem, self.problem.predicted(self._nuisances.point(deviations, form.tables(w)))
         )

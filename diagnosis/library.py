@@ -48,7 +48,7 @@ def trials(problem: Problem) -> list[Trial]:
         if rig.drive not in effect.drives or (effect.acts_on == "piezo" and highest_Hz == 0.0):
             continue
         for form in effect.forms:
-            if form != "random":  # no prediction follows a random load: `diagnosis.random_load`
+            if form != "random":  # no prediction follows its path: `diagnosis.random_friction`
                 found += _starts(name, form, problem, highest_Hz)
     return found
 
@@ -145,7 +145,7 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
         },
         ("viscous-friction", "linear"): {"damping_Ns_per_m": _Scale(0.02 * critical, True, 1.5)},
         ("viscous-friction", "quadratic"): {"damping_Ns2_per_m2": _Scale(0.02 * critical / slip_mps, True, 1.5)},
-        ("position-dependent-friction", ""): wave | {"wavelength_m": _Scale(1.0, True, 0.2)},
+        ("position-dependent-friction", "wave"): wave | {"wavelength_m": _Scale(1.0, True, 0.2)},
         ("normal-load-fluctuation", "sine"): wave | {"frequency_Hz": _Scale(1.0, True, 0.2)},
         ("drive-speed-ripple", "screw"): wave | {"wavelength_m": _Scale(1.0, True, 0.2)},
         ("drive-speed-ripple", "time"): wave | {"frequency_Hz": _Scale(1.0, True, 0.2)},

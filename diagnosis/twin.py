@@ -19,7 +19,8 @@ from plant.core import advance, advance_disturbed
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
-Effects = dict[str, dict[str, float | str]]
+EffectTable = dict[str, float | str]  # of a rig file
+Effects = dict[str, EffectTable]
 _COARSEST_STEP_S = 7e-5
 _STEPS_PER_PERIOD = 20
 _CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiffness

@@ -8,20 +8,20 @@ the gap: it wins where the library closes less.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.random_load import EFFECT as LOAD
-from diagnosis.random_load import RandomLoad, Scattered
+from diagnosis.random_friction import RandomFriction, Scattered, is_random
 from diagnosis.refit import Fit
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 # What follows is in chi2 of a perfect model on this evidence, of which 10 of 11 rigs without a gap left 1.0 to 1.7, one 2.6.
 # What is beyond this counts against `none` in full: however wrong every model is, that there is a gap stays certain.
-_NEVER_WITHOUT_GAP = 2.5
+NEVER_WITHOUT_GAP = 2.5
 _NO_ALARM = 1.0  # log evidence that `unexplained` stays behind `none` up to there
 _MUCH = 1.6  # more than a model that is right leaves
 _CLOSED_BY_UNKNOWN = 0.6  # of the reducible chi2 that an unwritten model is credited with
@@ -34,7 +34,7 @@ JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
 _SECOND_ADDS = 0.06  # and this share of what both close: less is what the first one's formula does not fit,
-_UNDER_LOAD = 2  # single effects that a random load is tried on top of
+_UNDER_RANDOM = 2  # single effects that a random one is tried on top of
 _COMPLETE = 1.3  # unless one alone leaves much and both less than this
 _TEMPERATURE = 3.0  # of the probabilities: a guess
 
@@ -87,7 +87,7 @@ def occam(fit: Fit) -> float:
 
 
 def judge(
-    base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, load: RandomLoad | None = None
+    base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, random: Sequence[RandomFriction] = ()
 ) -> Verdict:
     """The verdict over single effects and pairs of them.
 
@@ -95,15 +95,19 @@ def judge(
         base: the rig without effects.
         singles, pairs: the best fit of each, best first.
         expected_chi2: of a perfect model.
-        load: to judge a random load by, alone and on top of the best single effects; None: it is not looked at.
+        random: effects that vary at random, to be judged alone and on top of the best single effects.
 
     """
-    under_load = [base, *(fit for fit in singles if LOAD not in fit.form.effects)][: 1 + _UNDER_LOAD] if load else []
 
-    def scattered(noise: float) -> list[Scattered]:
-        return [load.on(fit, noise) for fit in under_load] if load else []
+    def scattered(noise: float) -> list[tuple[Fit, Scattered]]:
+        """What lies under a random effect, and both."""
+        return [
+            (fit, effect.on(fit, noise))
+            for effect in random
+            for fit in (base, *[one for one in singles if effect.effect not in one.form.effects][:_UNDER_RANDOM])
+        ]
 
-    fits = [base, *singles, *pairs, *(one.fit for one in scattered(JITTER))]
+    fits = [base, *singles, *pairs, *(one.fit for _, one in scattered(JITTER))]
     scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> Model:
@@ -113,10 +117,11 @@ def judge(
 
     alone = [model(fit) for fit in singles]
     doubles = [model(fit) for fit in pairs]
-    if loaded := scattered(scale * JITTER):
-        alone.append(Model(*loaded[0]))
-        below = zip(under_load[1:], loaded[1:], strict=True)
-        doubles += [Model(one.fit, model(fit).evidence + one.gained) for fit, one in below]
+    for under, both in scattered(scale * JITTER):
+        if under is base:
+            alone.append(Model(both.fit, both.gained))
+        else:
+            doubles.append(Model(both.fit, model(under).evidence + both.gained))
     ranked = sorted(alone, key=lambda one: -one.evidence)
     double = max(doubles, key=lambda one: one.evidence, default=None)
     if double is not None and ranked:
@@ -129,11 +134,14 @@ def judge(
             double = None
     best = double or (ranked[0] if ranked else None)
     beyond = max(base.chi2 - expected_chi2, 0.0)
-    certain = max(base.chi2 - _NEVER_WITHOUT_GAP * expected_chi2, 0.0)
+    certain = max(base.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
     against_none = 0.5 * certain / JITTER
     scores: dict[str, float] = {"none": COST_OF_EFFECT - against_none}
     # what an effect must pay it owes to `unexplained` where `none` is out: every model wrong, the least wrong one is no cause
     unknown = 0.5 * _CLOSED_BY_UNKNOWN * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
+    if best is not None and is_random(best.fit.form) and not much_left(best.fit, expected_chi2):
+        # a path as free as this one would cost the unwritten model as much
+        unknown -= 0.5 * (base.chi2 - best.fit.chi2) / (scale * JITTER) - best.evidence
     if against_none > 0.0:
         scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
     else:

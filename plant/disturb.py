@@ -41,8 +41,11 @@ def level(p: Record, t_s: float, x: float, v_r: float) -> float:
     if p.drift_settling_s > 0.0:
         result += p.drift_ratio * (1.0 - math.exp(-(p.drift_before_s + t_s) / p.drift_settling_s))
     if p.position_ratio != 0.0:
-        angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
-        result *= 1.0 + p.position_ratio * wave(angle_rad, p.position_sin_2, p.position_cos_2)
+        if p.position_seed < 0.0:
+            angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
+            result *= 1.0 + p.position_ratio * wave(angle_rad, p.position_sin_2, p.position_cos_2)
+        else:
+            result *= 1.0 + p.position_ratio * smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)
     if p.load_ratio != 0.0:
         turns = p.load_frequency_Hz * t_s
         if p.load_seed < 0.0:

@@ -98,12 +98,16 @@ EFFECTS: Final[dict[str, Effect]] = {
     ),
     "position-dependent-friction": Effect(
         "friction",
-        _one(
-            "friction times 1 + ratio w(2 pi x / wavelength_m + phase)",
-            _ratio(0.03, 0.0, 0.9),
-            Parameter("wavelength_m", 1e-5, 1.0, 4e-3),
-            *_SHAPE,
-        ),
+        {
+            "wave": Form(
+                "friction times 1 + ratio w(2 pi x / wavelength_m + phase)",
+                (_ratio(0.03, 0.0, 0.9), Parameter("wavelength_m", 1e-5, 1.0, 4e-3), *_SHAPE),
+            ),
+            "random": Form(
+                "friction times 1 + ratio n(x), n smooth noise of unit rms, a new value every wavelength_m / 2",
+                (_ratio(0.03, 0.0, 0.9), Parameter("wavelength_m", 1e-5, 1.0, 4e-3), Parameter("seed", 0, 1e6, 0)),
+            ),
+        },
     ),
     "direction-dependent-friction": Effect(
         "friction",

@@ -39,6 +39,7 @@ PARAMS = np.dtype(
             *("lag_s", "lag_dead_s", "lag_distance_m", "late_share"),
             "quadratic_Ns2_per_m2",
             *("position_ratio", "position_wavelength_m", "position_phase_rad", "position_sin_2", "position_cos_2"),
+            "position_seed",
             *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
             *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_sin_2", "load_cos_2", "load_seed"),
             *("drift_per_s", "drift_ratio", "drift_settling_s", "drift_before_s"),
@@ -155,7 +156,7 @@ def _add_effects(p: Any, config: RigConfig) -> None:
     p.elasto_plastic = contact.backbone == "elasto-plastic"
     for name in ("stribeck_tail", "elastic_ratio", "roughness_ratio", "roughness_length_m", "roughness_seed"):
         p[name] = getattr(contact, name)
-    p.load_seed = -1.0
+    p.position_seed = p.load_seed = -1.0
     p.age_scale_s = 1.0
     # ten reaches of the bristle: creep before breakaway leaves the contact its age, a slip of any size takes it
     p.age_length_m = 10.0 * contact.static_force_N / contact.stiffness_N_per_m
@@ -180,7 +181,8 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.quadratic_Ns2_per_m2 = value.get("damping_Ns2_per_m2", 0.0)
     elif name == "position-dependent-friction":
         p.position_ratio, p.position_wavelength_m = value["ratio"], value["wavelength_m"]
-        p.position_phase_rad, p.position_sin_2, p.position_cos_2 = (value[key] for key in _WAVE_SHAPE)
+        p.position_phase_rad, p.position_sin_2, p.position_cos_2 = (value.get(key, 0.0) for key in _WAVE_SHAPE)
+        p.position_seed = value.get("seed", -1.0)
     elif name == "direction-dependent-friction":
         if form == "kinetic":
             p.kinetic_backward_ratio = value["ratio"]

@@ -47,6 +47,13 @@ def test_a_random_load_is_the_noise_at_twice_its_frequency():
     assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 + 0.1 * noise), rel=2e-3)
 
 
+def test_a_random_track_is_the_noise_at_half_its_wavelength():
+    values = {"form": "random", "ratio": 0.1, "wavelength_m": 4e-4, "seed": 5}
+    result = towed({"position-dependent-friction": values}, 0.005, 1.0)
+    noise = np.array([smooth_noise(x / 2e-4, 5.0) for x in result.true_position_m])
+    assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 + 0.1 * noise), rel=2e-3)
+
+
 def test_a_rough_surface_is_the_noise_along_the_track():
     surface = {"roughness_ratio": 0.05, "roughness_length_m": 2e-4, "roughness_seed": 3}
     result = towed({}, 0.005, 1.0, surface)

@@ -16,7 +16,7 @@ from diagnosis.sensing import Chain, sensed
 from diagnosis.twin import Effects, Roughness
 
 ROUGH = Roughness(0.003, 2e-4, 0)
-WAVE: Effects = {"position-dependent-friction": {"form": "", "ratio": 0.05, "wavelength_m": 0.02, "phase_rad": 1.0}}
+WAVE: Effects = {"position-dependent-friction": {"form": "wave", "ratio": 0.05, "wavelength_m": 0.02, "phase_rad": 1.0}}
 GAIN: Effects = {"force-sensor-gain": {"form": "", "ratio": 0.05}}
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagnosis.random_friction import Scattered
 from diagnosis.refit import NOTHING, Axis, Fit, Form
 from diagnosis.verdict import judge
 
@@ -77,3 +78,32 @@ def test_no_gap_stays_the_likeliest_where_it_is_the_verdict():
     assert verdict.kind == "no-gap"
     assert list(verdict.probabilities)[:2] == ["none", "coulomb-level"]
     assert verdict.probabilities["coulomb-level"] > 0.1
+
+
+class Scatter:
+    """Stands in for a random effect: what it leaves on top of a fit, and what log evidence that is worth."""
+
+    effect = "normal-load-fluctuation"
+
+    def __init__(self, left, gained):
+        self.left, self.gained = left, gained
+
+    def on(self, under, _noise):
+        form = Form(under.form.forms | {self.effect: "random"}, under.form.axes)
+        return Scattered(under._replace(form=form, chi2=self.left), self.gained)
+
+
+@pytest.mark.parametrize(
+    ("single", "left", "gained", "kind", "effects"),
+    [
+        (900.0, 50.0, 100.0, "effect", ["normal-load-fluctuation"]),
+        (900.0, 50.0, 5.0, "unexplained", []),  # its freedom costs what it brings
+        (900.0, 500.0, 10.0, "unexplained", []),  # much is left that is no such scatter
+        (400.0, 50.0, 90.0, "effect", ["coulomb-level", "normal-load-fluctuation"]),  # both
+        (45.0, 40.0, 90.0, "effect", ["coulomb-level"]),  # nothing was left for it
+    ],
+)
+def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind, effects):
+    verdict = judge(fit(1000.0), [fit(single, "coulomb-level")], [], EXPECTED, [Scatter(left, gained)])
+    assert verdict.kind == kind
+    assert sorted(verdict.named.form.effects if verdict.named else []) == effects

@@ -8,7 +8,7 @@ import pytest
 from diagnosis.gap import replicates
 from diagnosis.heldout import HeldOut
 from diagnosis.problem import Problem
-from diagnosis.random_load import RandomLoad
+from diagnosis.random_friction import RandomFriction
 from diagnosis.refit import NOTHING
 from diagnosis.retuning import retuned_rig
 from diagnosis.verdict import JITTER
@@ -29,7 +29,7 @@ def rig(tmp_path_factory):
 
 def test_a_random_load_pays_and_its_size_is_found(rig):
     (fitter, fit, roughness, expected_chi2), unseen = rig
-    found = RandomLoad(fitter, fit).on(fit, JITTER)
+    found = RandomFriction("normal-load-fluctuation", fitter, fit).on(fit, JITTER)
     assert found.gained > 30.0
     assert found.fit.chi2 < 1.5 * expected_chi2 < 0.7 * fit.chi2
     table = found.fit.effects["normal-load-fluctuation"]
@@ -50,4 +50,4 @@ def test_without_one_it_costs_more_than_it_brings(rig):
     unloaded.measured = replicates(fitter.problem, point, roughness, 1, 9)[0]
     fitter = fitter.for_problem(unloaded)
     fit = fitter.refit(NOTHING, fit.deviations, np.zeros(0))
-    assert RandomLoad(fitter, fit).on(fit, JITTER).gained < 0.0
+    assert RandomFriction("normal-load-fluctuation", fitter, fit).on(fit, JITTER).gained < 0.0

@@ -1,0 +1,143 @@
+"""Friction that varies at random, over time or along the track, whose path no prediction follows: judged by what it scatters.
+
+Replicates of a fitted model, each under a path of its own and nothing else, give the mean and the covariance of what such paths
+do to the whitened differences. With that covariance beside the noise and the priors of the nuisances, the differences have a
+likelihood; its mean over a grid of sizes and lengths, against the likelihood without, is the log evidence. What the freedom of
+the path costs is in the determinant: a random effect (Rasmussen & Williams, Gaussian Processes, 2006, ch. 5).
+"""
+
+import copy
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve
+
+from diagnosis.gap import compress, differences
+from diagnosis.reduced import BLOCK_S
+from diagnosis.refit import Axis, Fit, Fitter, Form
+from diagnosis.waves import friction_series
+
+Floats = npt.NDArray[np.floating[Any]]
+RANDOM: Final = "random"  # form
+_OVER: Final = {"normal-load-fluctuation": "time", "position-dependent-friction": "position"}
+RANDOM_EFFECTS: Final = tuple(_OVER)
+# turns in the longest run of 10 s or so: 1, 2.5, 6 Hz; in the longest way, which is of some mm: every 5, 2, 0.8 mm
+_TURNS: Final = {"time": (10.0, 25.0, 60.0), "position": (1.0, 2.5, 6.0)}
+_SIZES = (0.3, 0.5, 0.7, 1.0, 1.4, 2.0)  # of the scatter that breakaways and levels show
+_LEAST_RATIO = 0.005
+_DRAWS = 16
+_INDEPENDENT = 0.3  # share of the covariance that is taken as independent, as so few draws know few correlations
+_SPREAD: Final = {"ratio": 0.35, "length": 0.45}  # of the estimates, relative: the grid's
+
+
+class Scattered(NamedTuple):
+    """A model with friction that varies at random on top."""
+
+    fit: Fit
+    gained: float  # log evidence against the model without
+
+
+class _Paths(NamedTuple):
+    """What random paths of one length do to the whitened differences."""
+
+    table: dict[str, float]  # parameters of the effect but for its seed
+    mean: Floats  # [compared]
+    covariance: Floats  # [compared, compared]
+
+
+class _Tried(NamedTuple):
+    """A size of the paths, and what it is worth."""
+
+    likelihood: float
+    left: float  # square of what neither paths nor nuisances explain, over the noise's variance squared
+    size: float
+    paths: int
+
+
+class RandomFriction:
+    """A random effect on the rig of a fit, by which any fit of the same problem can be judged.
+
+    Args:
+        effect: that has a random form.
+        fitter: of the fitted runs.
+        base: the fit whose rig the paths are drawn on, best the one that comes nearest to the runs without them.
+
+    """
+
+    def __init__(self, effect: str, fitter: Fitter, base: Fit) -> None:
+        self.effect = effect
+        problem, over = fitter.problem, _OVER[effect]
+        series = friction_series(problem.runs, problem.scales, over)
+        ratio = max(float(np.std(np.concatenate([one.value for one in series]))) if series else 0.0, _LEAST_RATIO)
+        if over == "time":
+            longest_s = max(len(run.commands.drive) for run in problem.runs) * BLOCK_S
+            lengths = [{"frequency_Hz": turns / longest_s} for turns in _TURNS[over]]
+        else:
+            longest_m = max(float(np.ptp(np.cumsum(run.commands.drive))) for run in problem.runs) * BLOCK_S
+            lengths = [{"wavelength_m": longest_m / turns} for turns in _TURNS[over]]
+        self._paths = [self._drawn(fitter, base, {"ratio": ratio} | length) for length in lengths]
+
+    def _drawn(self, fitter: Fitter, base: Fit, table: dict[str, float]) -> _Paths:
+        here = fitter.predicted(base.deviations, base.effects)
+        shown: list[Floats] = []
+        for seed in range(1, _DRAWS + 1):
+            effects = base.effects | {self.effect: {"form": RANDOM, "seed": seed, **table}}
+            varied = copy.copy(fitter.problem)
+            varied.measured = fitter.predicted(base.deviations, effects) + fitter.floor.bias
+            shown.append(fitter.floor.whitening @ compress(differences(fitter.floor, varied, here)))
+        drawn = np.array(shown)
+        covariance = np.cov(drawn, rowvar=False)
+        independent = np.diag(_INDEPENDENT * np.diag(covariance))
+        return _Paths(table, drawn.mean(axis=0), (1.0 - _INDEPENDENT) * covariance + independent)
+
+    def on(self, fit: Fit, noise: float) -> Scattered:
+        """A fit with this effect on top.
+
+        Args:
+            fit: of the problem that the paths were drawn for, without this effect.
+            noise: variance of whitened differences under a model that is right.
+
+        """
+        own = len(fit.deviations)
+        spread = np.concatenate([np.ones(own), [axis.prior for axis in fit.form.axes]])
+        # the nuisances are free about their described values, the effects about where they were fitted
+        residual = fit.residual + fit.columns[:, :own] @ fit.deviations
+        scaled = fit.columns * spread
+        without = scaled @ scaled.T + noise * np.eye(len(residual))
+        tried: list[_Tried] = []
+        for i, paths in enumerate(self._paths):
+            for size in _SIZES:
+                shift = size * min(size, 1.0) * paths.mean  # what adds to powers, which count as logarithms
+                tried.append(_Tried(*_likelihood(without + size**2 * paths.covariance, residual - shift), size, i))
+        best = max(tried)
+        mean = float(np.logaddexp.reduce([one.likelihood for one in tried])) - math.log(len(tried))
+        table = dict(self._paths[best.paths].table)
+        table["ratio"] *= best.size
+        axes = tuple(
+            Axis(self.effect, name, scale, True, _SPREAD.get(name, _SPREAD["length"]), 0.0, math.inf)
+            for name, scale in table.items()
+        )
+        return Scattered(
+            fit._replace(
+                form=Form(fit.form.forms | {self.effect: RANDOM}, (*fit.form.axes, *axes)),
+                w=np.concatenate([fit.w, np.zeros(len(axes))]),
+                chi2=noise**2 * best.left,
+                columns=np.column_stack([fit.columns, np.zeros((len(residual), len(axes)))]),
+            ),
+            mean - _likelihood(without, residual)[0],
+        )
+
+
+def is_random(form: Form) -> bool:
+    """Whether a form has an effect whose path no prediction knows."""
+    return RANDOM in form.forms.values()
+
+
+def _likelihood(covariance: Floats, residual: Floats) -> tuple[float, float]:
+    """Log likelihood but for a constant, and the square of the residual after its covariance was divided out."""
+    factor = cho_factor(covariance, lower=True)
+    explained: Floats = cho_solve(factor, residual)
+    likelihood = -0.5 * float(residual @ explained) - float(np.log(np.diag(factor[0])).sum())
+    return likelihood, float(explained @ explained)
