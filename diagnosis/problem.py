@@ -16,7 +16,7 @@ from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.reduced import BLOCK_S, reduce_run
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
-from diagnosis.twin import Effects, EffectTable, Roughness, Start, predict, rig_config
+from diagnosis.twin import Effects, Roughness, Start, predict, rig_config
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -95,7 +95,7 @@ class Problem:
             moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
         if "before_s" in moving.get("friction-drift", {}):
             moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
-        moving = {name: _one_of_many(table, run, draw) for name, table in moving.items() if not _mean(table, draw)}
+        moving = _with_paths(moving, run, draw)
         start, chain = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects)), point.chain
         roughness = None
         if draw is not None:
@@ -176,17 +176,18 @@ class Problem:
         return spring_features(signals, run.commands, self.scales)
 
 
-def _mean(table: EffectTable, draw: Draw | None) -> bool:
-    """Whether an effect is random and none of its paths is asked for: on average there is none."""
-    return table["form"] == "random" and not table["seed"] and draw is None
+def _with_paths(effects: Effects, run: Prepared, draw: Draw | None) -> Effects:
+    """Random effects on a path: that of their seed, with seed 0 that of the draw; without a draw on none, which is their mean.
 
-
-def _one_of_many(table: EffectTable, run: Prepared, draw: Draw | None) -> EffectTable:
-    """A random effect with the seed of a draw where it has none of its own; what goes over time is another in every run."""
-    if table["form"] != "random":
-        return table
-    seed = float(table["seed"]) or (1.0 + draw.roughness.seed if draw else 0.0)
-    return table | {"seed": seed + (run.before_s if "frequency_Hz" in table else 0.0)}
+    What goes over time takes another path in every run, what goes over place the same.
+    """
+    result: Effects = {}
+    for name, table in effects.items():
+        if table["form"] != "random":
+            result[name] = table
+        elif seed := float(table["seed"]) or (1.0 + draw.roughness.seed if draw else 0.0):
+            result[name] = table | {"seed": seed + (run.before_s if "frequency_Hz" in table else 0.0)}
+    return result
 
 
 def scales_of(rig: RigTable) -> Scales:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
+from diagnosis.commands import Commands
 from diagnosis.gap import compress, differences
 from diagnosis.reduced import BLOCK_S
 from diagnosis.refit import Axis, Fit, Fitter, Form
@@ -75,7 +76,7 @@ class RandomFriction:
             longest_s = max(len(run.commands.drive) for run in problem.runs) * BLOCK_S
             lengths = [{"frequency_Hz": turns / longest_s} for turns in _TURNS[over]]
         else:
-            longest_m = max(float(np.ptp(np.cumsum(run.commands.drive))) for run in problem.runs) * BLOCK_S
+            longest_m = max(_way_m(run.commands) for run in problem.runs)
             lengths = [{"wavelength_m": longest_m / turns} for turns in _TURNS[over]]
         self._paths = [self._drawn(fitter, base, {"ratio": ratio} | length) for length in lengths]
 
@@ -133,6 +134,12 @@ class RandomFriction:
 def is_random(form: Form) -> bool:
     """Whether a form has an effect whose path no prediction knows."""
     return RANDOM in form.forms.values()
+
+
+def _way_m(commands: Commands) -> float:
+    """How much of the track a run covers."""
+    at_m = np.cumsum(commands.drive) * BLOCK_S if commands.motion is None else commands.motion.position_m
+    return float(np.ptp(at_m))
 
 
 def _likelihood(covariance: Floats, residual: Floats) -> tuple[float, float]:

@@ -19,8 +19,7 @@ from plant.core import advance, advance_disturbed
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
-EffectTable = dict[str, float | str]  # of a rig file
-Effects = dict[str, EffectTable]
+Effects = dict[str, dict[str, float | str]]
 _COARSEST_STEP_S = 7e-5
 _STEPS_PER_PERIOD = 20
 _CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiffness

@@ -60,7 +60,7 @@ def level(p: Record, t_s: float, x: float, v_r: float) -> float:
 
 @kernel
 def late_mps(p: Record, s: Record, t_s: float, speed_mps: float) -> float:
-    """The speed as it was `lag_dead_s` ago, from a line of cells that is filled up to now; before the run it was 0."""
+    """The speed as it was `lag_dead_s` ago, from a line of cells that is filled up to now; 0 before t = 0."""
     length = len(s.lag_line)
     now = t_s / LAG_CELL_S
     while s.lag_at < now:

@@ -8,7 +8,7 @@ import pytest
 from diagnosis.gap import replicates
 from diagnosis.heldout import HeldOut
 from diagnosis.problem import Problem
-from diagnosis.random_friction import RandomFriction
+from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction
 from diagnosis.refit import NOTHING
 from diagnosis.retuning import retuned_rig
 from diagnosis.verdict import JITTER
@@ -43,11 +43,21 @@ def test_a_random_load_pays_and_its_size_is_found(rig):
     assert held_out.closed_by(fit).shrinkage == pytest.approx(0.0)
 
 
-def test_without_one_it_costs_more_than_it_brings(rig):
+def gained_on(rig, effects):
+    """What each random effect is worth on a rough and noisy run of the model with these effects."""
     (fitter, fit, roughness, _), _ = rig
-    unloaded = copy.copy(fitter.problem)
-    point = fitter.nuisances.point(fit.deviations, {})
-    unloaded.measured = replicates(fitter.problem, point, roughness, 1, 9)[0]
-    fitter = fitter.for_problem(unloaded)
+    other = copy.copy(fitter.problem)
+    other.measured = replicates(other, fitter.nuisances.point(fit.deviations, effects), roughness, 1, 9)[0]
+    fitter = fitter.for_problem(other)
     fit = fitter.refit(NOTHING, fit.deviations, np.zeros(0))
-    assert RandomFriction("normal-load-fluctuation", fitter, fit).on(fit, JITTER).gained < 0.0
+    return {name: RandomFriction(name, fitter, fit).on(fit, JITTER).gained for name in RANDOM_EFFECTS}
+
+
+def test_without_one_each_costs_more_than_it_brings(rig):
+    assert max(gained_on(rig, {}).values()) < 0.0
+
+
+def test_a_random_track_is_not_taken_for_a_random_load(rig):
+    track = {"form": "random", "ratio": RATIO, "wavelength_m": 1.5e-3, "seed": 7}
+    gained = gained_on(rig, {"position-dependent-friction": track})
+    assert gained["position-dependent-friction"] > max(gained["normal-load-fluctuation"], 0.0) + 10.0
