@@ -98,7 +98,7 @@ class Scatter:
     [
         (900.0, 50.0, 100.0, "effect", ["normal-load-fluctuation"]),
         (900.0, 50.0, 5.0, "unexplained", []),  # its freedom costs what it brings
-        (900.0, 500.0, 10.0, "unexplained", []),  # much is left that is no such scatter
+        (900.0, 500.0, 100.0, "unexplained", []),  # much is left that is no such scatter
         (400.0, 50.0, 90.0, "effect", ["coulomb-level", "normal-load-fluctuation"]),  # both
         (45.0, 40.0, 90.0, "effect", ["coulomb-level"]),  # nothing was left for it
     ],
