@@ -76,10 +76,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         progress("nothing explains it yet: every effect gets a refit", 0.7)
         singles = _with(singles, refitted_rest(fitter, origins, found, jobs))
         verdict = judge(retuned, singles, pairs, expected_chi2)
-    # rigs without a gap leave scatter too, by as much as this
-    gap_is_sure = retuned.chi2 > NEVER_WITHOUT_GAP * expected_chi2
-    left = min(fit.chi2 for fit in (retuned, *singles, *pairs))
-    if gap_is_sure and (verdict.kind == "unexplained" or left > NEVER_WITHOUT_GAP * expected_chi2):
+    if _may_scatter(verdict, retuned, [*singles, *pairs], expected_chi2):
         progress("could what is left be friction that varies at random?", 0.75)
         random = [_random(effect, fitter, retuned, singles) for effect in RANDOM_EFFECTS]
         verdict = judge(retuned, singles, pairs, expected_chi2, random)
@@ -91,6 +88,16 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     best = verdict.named or retuned
     progress(f"verdict: {verdict.kind}", 0.8)
     return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began)
+
+
+def _may_scatter(verdict: Verdict, retuned: Fit, others: list[Fit], expected_chi2: float) -> bool:
+    """Whether what is left may be friction that varies at random: rigs without a gap leave scatter too."""
+    if retuned.chi2 <= NEVER_WITHOUT_GAP * expected_chi2:
+        return False
+    if expected_chi2 > len(retuned.residual):  # 0.2 to 0.4 a feature are usual; 3.4 where noise hides the slips
+        return False
+    left = min(fit.chi2 for fit in (retuned, *others))
+    return verdict.kind == "unexplained" or left > NEVER_WITHOUT_GAP * expected_chi2
 
 
 def _refittable(verdict: Verdict) -> bool:

@@ -39,6 +39,7 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
     ),
     "frictional-lag": (
         Sizes("time", "lag_s", 1e-3, 1e-1),
+        Sizes("dead-time", "share", 0.05, 1.0, log={"delay_s": (3e-4, 1e-2)}),
         Sizes("distance", "share", 0.03, 0.6, log={"distance_m": (1e-6, 1e-5)}),
     ),
     # a slip reaches 22 mm/s; sqrt(k m) = 132 N s/m
@@ -47,7 +48,8 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
         Sizes("quadratic", "damping_Ns2_per_m2", 100.0, 3000.0),
     ),
     "position-dependent-friction": (
-        Sizes("", "ratio", 0.004, 0.08, log={"wavelength_m": (5e-4, 5e-3)}, even={"phase_rad": TURN}),
+        Sizes("wave", "ratio", 0.004, 0.08, log={"wavelength_m": (5e-4, 5e-3)}, even={"phase_rad": TURN}),
+        Sizes("random", "ratio", 0.004, 0.08, log={"wavelength_m": (5e-4, 5e-3)}, even={"seed": (1.0, 1e5)}),
     ),
     "direction-dependent-friction": (
         Sizes("backward", "ratio", 0.01, 0.2, BOTH_SIGNS),

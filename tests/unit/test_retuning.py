@@ -18,9 +18,14 @@ def evidence_and_runs(tmp_path_factory):
     return evidence, [run for run in runs if not run.holdout]
 
 
-def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs):
+@pytest.fixture(scope="module")
+def straight(evidence_and_runs):
     evidence, runs = evidence_and_runs
-    straight = retuned_rig(evidence, Problem(evidence.rig, runs), untold)
+    return retuned_rig(evidence, Problem(evidence.rig, runs), untold)
+
+
+def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs, straight):
+    evidence, runs = evidence_and_runs
 
     def bent(run):
         drive_m = run.signals["drive_position_m"]
@@ -34,7 +39,6 @@ def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs):
     assert found.fit.chi2 < straight.fit.chi2 + 30.0
 
 
-def test_evidence_without_a_gap_leaves_about_what_is_expected(evidence_and_runs):
-    evidence, runs = evidence_and_runs
-    _, fit, _, expected_chi2 = retuned_rig(evidence, Problem(evidence.rig, runs), untold)
+def test_evidence_without_a_gap_leaves_about_what_is_expected(straight):
+    _, fit, _, expected_chi2 = straight
     assert 0.5 * expected_chi2 < fit.chi2 < 2.0 * expected_chi2
