@@ -47,6 +47,10 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             + f": {EFFECT_WORDS[name]}"
             + (f"; {numbers}." if numbers else ".")
         )
+        if candidate.form == "random":
+            sentences.append(
+                "It varies at random and is known by what it scatters, not by its path: bursts would look the same."
+            )
     sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
     if gap.runs and math.isfinite(gap.retuned):
         kept = ", ".join(gap.runs)
