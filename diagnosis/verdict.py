@@ -161,12 +161,12 @@ def judge(
     top = max(scores, key=lambda name: scores[name])
     if best is None or top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
-    others = [
-        one.fit for one in ranked if one.fit is not best.fit and one.fit.form.effects[0] not in best.fit.form.effects
-    ]
-    runner_up = others[0] if others else None
+    followed = [one.fit for one in ranked if not is_random(one.fit.form)]  # no run separates a path from a path
     if top == "unexplained":
-        return Verdict("unexplained", None, probabilities, best.fit, tuple(ranked), scale)
+        nearest = followed[0] if followed and is_random(best.fit.form) else best.fit
+        return Verdict("unexplained", None, probabilities, nearest, tuple(ranked), scale)
+    others = [fit for fit in followed if fit is not best.fit and fit.form.effects[0] not in best.fit.form.effects]
+    runner_up = others[0] if others else None
     return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
 
 
