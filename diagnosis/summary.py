@@ -22,8 +22,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         else:
             sentences.append("No gap beyond the stated tolerances: the rig as described explains these runs.")
         sentences.append(
-            "An effect too small to show here is not excluded, and the probabilities leave room for it: in a sealed test half of "
-            "the rigs without a visible gap had one."
+            "An effect too small to show here is not excluded, and the probabilities leave room for it: in a sealed test a third "
+            "of the rigs without a visible gap had one."
         )
     elif diagnosis.verdict == "unexplained":
         sentences.append("There is a gap, and nothing in the library explains it.")
