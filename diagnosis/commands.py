@@ -32,6 +32,7 @@ class Segment(NamedTuple):
     frequency_Hz: float
     amplitude_m: float
     slips: int = 0  # as measured: what is compared there must not depend on what a model does
+    sticks: bool = False  # whole ones between two slips, as measured
     still: bool = False  # even sliding as measured
 
     @property

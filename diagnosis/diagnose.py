@@ -28,7 +28,16 @@ from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction, is_random
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Shrinkage
 from diagnosis.retuning import retuned_rig
-from diagnosis.search import Origin, best_of_each, middle_fits, pairs_of_effects, refitted, refitted_rest, screened
+from diagnosis.search import (
+    Origin,
+    best_of_each,
+    each,
+    middle_fits,
+    pairs_of_effects,
+    refitted,
+    refitted_rest,
+    screened,
+)
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
 from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, judge, much_left
@@ -51,7 +60,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     runs = prepare(evidence)
     fitted = [run for run in runs if not run.holdout]
     problem = Problem(evidence.rig, fitted)
-    fitter, retuned, roughness, expected_chi2 = retuned_rig(evidence, problem, progress)
+    fitter, retuned, roughness, expected_chi2 = retuned_rig(evidence, problem, progress, jobs)
     described = np.zeros(len(fitter.nuisances))
     tried = trials(problem)
     origins = [Origin(retuned, KNEE)]
@@ -63,9 +72,9 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE and singles[0].chi2 > expected_chi2:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
         pairs = pairs_of_effects(fitter, retuned, singles, tried, expected_chi2, jobs)
-        singles = _again(fitter, singles, _alone(pairs))
+        singles = _again(fitter, singles, _alone(pairs), jobs)
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
-        singles = _again(fitter, singles, _crossed(singles))
+        singles = _again(fitter, singles, _crossed(singles), jobs)
     # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
     if singles:
         best = singles[0]
@@ -130,9 +139,13 @@ def _crossed(singles: list[Fit]) -> list[_Start]:
     return [(fit.form, other.deviations, fit.w) for fit in close for other in close if other is not fit]
 
 
-def _again(fitter: Fitter, singles: list[Fit], starts: list[_Start]) -> list[Fit]:
+def _again(fitter: Fitter, singles: list[Fit], starts: list[_Start], jobs: int) -> list[Fit]:
     """Single effects, best first, after refits from other starts."""
-    return _with(singles, [fitter.refit(*start) for start in starts])
+    return _with(singles, each(jobs, _refit, fitter, starts))
+
+
+def _refit(fitter: Fitter, start: _Start) -> Fit:
+    return fitter.refit(*start)
 
 
 def _with(singles: list[Fit], more: list[Fit]) -> list[Fit]:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from diagnosis.commands import Segment
+from diagnosis.entries import entries_of
 from diagnosis.features import Scales, settled
 from diagnosis.manifest import RigTable
 from diagnosis.problem import Point, Prepared, Problem
@@ -134,10 +135,11 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
         segments=segments,
     )
     start = template.start._replace(position_m=template.start.position_m + plan.shift_m)
-    run = template._replace(file=plan.what, holdout=False, commands=commands, start=start, clipped={})
+    run = template._replace(file=plan.what, holdout=False, commands=commands, start=start, entries=(), clipped={})
     signals = problem.signals(run, point)
     settled_ones = tuple(settled(signals, segment, problem.scales) for segment in segments)
-    return run._replace(signals=signals, commands=commands._replace(segments=settled_ones))
+    commands = commands._replace(segments=settled_ones)
+    return run._replace(signals=signals, commands=commands, entries=entries_of(signals, commands, problem.scales))
 
 
 def _cycle_m(rig: RigTable, scales: Scales) -> float:

@@ -31,6 +31,7 @@ POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
 _LEVELS = 8  # bins of a segment without slips
 _BREAKAWAY_WAVES = 5
+_ROUND_ENTRY = 10  # blocks: longer than the delays of a measuring chain
 _ENOUGH_SLIPS = 0.5  # sum of their weights
 _LEVEL = 0.15  # of the static friction: sliding under a friction wave changes by less
 _TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
@@ -91,6 +92,11 @@ class Slips(NamedTuple):
         return float(self.weights.sum()) > 0.1
 
 
+def _pairs(slips: Slips) -> Floats:
+    """How much each stick between two slips counts."""
+    return np.minimum(slips.weights[:-1], slips.weights[1:])
+
+
 NO_SLIPS = Slips(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
 
 
@@ -109,13 +115,13 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
         if "drive_force_N" in cut:
             travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
             expected = travel_m * scales.stiffness_N_per_m / scales.fall_N
-            _cycles(found, number, cut["drive_force_N"], slips, expected)
+            _cycles(found, number, cut["drive_force_N"], slips, segment, expected)
             _level(found, number, cut["drive_force_N"], slips, segment)
-        _period(found, number, slips)
+        _period(found, number, slips, segment)
         _shapes(found, number, cut, slips, scales, segment.frequency_Hz)
         if segment.frequency_Hz > 0.0:
             _vibration(found, number, cut)
-    _parity(found, signals, scales)
+    _parity(found, signals, commands, scales)
     if "drive_position_m" in signals:
         _drive(found, signals["drive_position_m"], commands)
     return found
@@ -133,10 +139,12 @@ def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
         segment = segment._replace(slips=len(slips.tops))
     if len(slips.tops) == 0:
         return segment._replace(still="drive_force_N" not in cut or not _climbs(cut["drive_force_N"], scales))
-    if len(slips.bottoms) < 3:
-        return segment
-    stick = int(slips.tops[1] - slips.bottoms[0])
-    return segment._replace(first=segment.first + int(slips.bottoms[0]) + int(0.4 * stick))
+    if len(slips.bottoms) >= 3:
+        stick = int(slips.tops[1] - slips.bottoms[0])
+        start = int(slips.bottoms[0]) + int(0.4 * stick)
+        segment = segment._replace(first=segment.first + start)
+        slips = find_slips({name: values[start:] for name, values in cut.items()}, scales)
+    return segment._replace(sticks=float(_pairs(slips).sum()) > _ENOUGH_SLIPS)
 
 
 def _climbs(force_N: Floats, scales: Scales) -> bool:
@@ -173,7 +181,7 @@ def find_slips(cut: Signals, scales: Scales) -> Slips:
     return Slips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))
 
 
-def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, expected: float) -> None:
+def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment, expected: float) -> None:
     name = "drive_force_N"
     for regime, at, waves in (("breakaway", slips.tops, _BREAKAWAY_WAVES), ("restick", slips.bottoms, 3)):
         carried = min(waves, max(int(expected / 2.0) - 1, 0)) if expected >= 5.0 else 0
@@ -184,8 +192,8 @@ def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, expecte
         found.add("scatter", name, regime, LOW, number, scatter)
     # the climb between a re-stick and the next breakaway, in three parts
     rates = np.full(3, np.nan)
-    weights = np.minimum(slips.weights[:-1], slips.weights[1:])
-    if weights.sum() > 0.1:
+    weights = _pairs(slips)
+    if segment.sticks and weights.sum() > 0.1:
         start, end = slips.bottoms[:-1], slips.tops[1:]
         blocks = np.arange(len(force_N))
         level = [np.interp(start + share * (end - start), blocks, force_N) for share in (0.1, 0.4, 0.7, 0.95)]
@@ -216,10 +224,10 @@ def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple
     return moments, float(weights @ (left * left)) / free if free > 1.0 else math.nan
 
 
-def _period(found: Features, number: int, slips: Slips) -> None:
-    weights = np.minimum(slips.weights[:-1], slips.weights[1:])
+def _period(found: Features, number: int, slips: Slips, segment: Segment) -> None:
+    weights = _pairs(slips)
     periods_s = np.diff(slips.middles) * BLOCK_S
-    known = weights.sum() > 0.1
+    known = segment.sticks and weights.sum() > 0.1
     value = math.log(float(weights @ periods_s) / float(weights.sum())) if known else math.nan
     found.add("period", "drive_force_N", "stick", LOW, number, value)
 
@@ -297,22 +305,25 @@ def _vibration(found: Features, number: int, cut: Signals) -> None:
                 found.add("vibration over force", source, "steady", HIGH, number, slope)
 
 
-def _parity(found: Features, signals: Signals, scales: Scales) -> None:
+def _parity(found: Features, signals: Signals, commands: Commands, scales: Scales) -> None:
     """Force against extension, its rate, its cube, the direction and time: a massless linear spring has the first only."""
     if not {"drive_force_N", "mass_position_m", "drive_position_m"} <= signals.keys():
         return
-    force_N = signals["drive_force_N"]
     extension_m = signals["drive_position_m"] - signals["mass_position_m"]
+    rate_mps = np.gradient(uniform_filter1d(extension_m, 5), BLOCK_S)
+    even = np.ones(len(extension_m), np.bool_)
+    for segment in commands.segments:
+        if segment.still or segment.slips > 0:  # the model jumps to the force that was measured there
+            even[max(segment.first - _ROUND_ENTRY, 0) : segment.first + _ROUND_ENTRY] = False
+    force_N, extension_m, rate_mps = signals["drive_force_N"][even], extension_m[even], rate_mps[even]
     extension_m = extension_m - extension_m.mean() + force_N.mean() / scales.stiffness_N_per_m
-    smooth = uniform_filter1d(extension_m, 5)
-    rate_mps = np.gradient(smooth, BLOCK_S)
     reach_m = scales.force_N / scales.stiffness_N_per_m
     both = force_N.min() < -0.3 * scales.force_N and force_N.max() > 0.3 * scales.force_N
     columns = {
         "stiffness": extension_m / reach_m,
         "rate": rate_mps * 1e3,
         "cube": (extension_m / reach_m) ** 3,
-        "time": np.linspace(-1.0, 1.0, len(force_N)),
+        "time": np.linspace(-1.0, 1.0, len(even))[even],
     }
     if both:
         columns["direction"] = np.sign(force_N)

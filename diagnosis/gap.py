@@ -92,9 +92,9 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
     mean = np.where(finite, drawn, 0.0).sum(axis=0) / count
     bias = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
     about = np.where(finite, _logarithms(drawn, powers) - _logarithms(mean, powers), 0.0)
-    spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
     # under vibration the phase at which a slip begins decides how it goes: the prediction is one draw, as the rig is
-    spread *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
+    about *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
+    spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
     least = np.array([_least(label, problem) for _, label in labels])
     scatter = np.hypot(spread, least)
     lost = np.zeros_like(compared)

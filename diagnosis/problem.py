@@ -10,13 +10,14 @@ from bridge.faults import Fault
 from diagnosis.axis_drive import relative, true_commands
 from diagnosis.axis_features import axis_features
 from diagnosis.commands import Commands, commands_of
+from diagnosis.entries import entries_of, misread
 from diagnosis.evidence import Evidence, Run
 from diagnosis.features import Feature, Features, Scales, Signals, settled, spring_features
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.reduced import BLOCK_S, reduce_run
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
-from diagnosis.twin import Effects, Roughness, Start, predict, rig_config
+from diagnosis.twin import Effects, Entry, Roughness, Start, predict, rig_config
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -35,6 +36,7 @@ class Prepared(NamedTuple):
     signals: Signals
     commands: Commands
     start: Start
+    entries: tuple[Entry, ...]  # as the force sensor read it
     before_s: float  # how long the rig had run in the runs before, in the manifest's order
     noise: Noise
     clipped: dict[str, tuple[float, float]]  # by signal: limits that the sensor could not pass
@@ -96,16 +98,23 @@ class Problem:
         if "before_s" in moving.get("friction-drift", {}):
             moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
         moving = _with_paths(moving, run, draw)
-        start, chain = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects)), point.chain
+        t_s = run.start.t_s
+        start = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects, t_s))
+        entries = tuple(
+            entry._replace(force_N=true_force_N(entry.force_N, point.effects, t_s + entry.block * BLOCK_S))
+            for entry in run.entries
+        )
+        chain = point.chain
         roughness = None
         if draw is not None:
             start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
             chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
             roughness = draw.roughness
+            entries = tuple(misread(entry, run.noise, draw.random) for entry in entries)
         if self.rig.drive == "force":
             return self._led(run, point, moving, start, draw)
-        raw = self._raw(run, run.commands, point.values, moving, start, roughness, None)
-        result = sensed(raw, run.commands.frequency_Hz, point.effects, chain, run.start.t_s)
+        raw = self._raw(run, run.commands, point.values, moving, start, roughness, entries, None)
+        result = sensed(raw, run.commands.frequency_Hz, point.effects, chain, t_s)
         result = {name: result[name] for name in run.signals}
         for name in result:
             if name.endswith("shake_mps2"):
@@ -135,7 +144,7 @@ class Problem:
             chain,
             tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(sensors.items())),
         )
-        raw = self._raw(run, commands, point.values, moving, start, draw.roughness if draw else None, inputs)
+        raw = self._raw(run, commands, point.values, moving, start, draw.roughness if draw else None, (), inputs)
         result = sensed(raw, commands.frequency_Hz, point.effects, chain, run.start.t_s)
         result = {name: result[name] for name in run.signals}
         for name, values in noise.items():
@@ -150,14 +159,16 @@ class Problem:
         effects: Effects,
         start: Start,
         roughness: Roughness | None,
+        entries: tuple[Entry, ...],
         inputs: object,
     ) -> Signals:
         force_driven = self.rig.drive == "force"
         if roughness is not None:
-            return predict(rig_config(self.rig, values, effects, roughness), force_driven, commands, start)
+            return predict(rig_config(self.rig, values, effects, roughness), force_driven, commands, start, entries)
         key = (
             run.file,
             start.force_N,
+            entries,
             inputs,
             tuple(sorted(values.items())),
             tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(effects.items())),
@@ -166,7 +177,7 @@ class Problem:
         if found is None:
             if len(self._simulated) > _KEPT:
                 self._simulated.pop(next(iter(self._simulated)))
-            found = predict(rig_config(self.rig, values, effects, None), force_driven, commands, start)
+            found = predict(rig_config(self.rig, values, effects, None), force_driven, commands, start, entries)
         self._simulated[key] = found  # the last one again: where all trials start from is asked for again and again
         return found
 
@@ -229,7 +240,8 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
         for name in run.clipped
         if name in signals
     }
-    return Prepared(run.file, run.holdout, signals, commands, start, before_s, noise, clipped)
+    entries = entries_of(signals, commands, scales_of(rig))
+    return Prepared(run.file, run.holdout, signals, commands, start, entries, before_s, noise, clipped)
 
 
 def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) -> Start:

@@ -13,7 +13,7 @@ from diagnosis.gap import between, compress, differences, floor_of, gap, replica
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
 from diagnosis.refit import Fit, Fitter
-from diagnosis.search import Directions
+from diagnosis.search import Directions, each
 from diagnosis.twin import Roughness
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -35,7 +35,7 @@ class Retuned(NamedTuple):
     expected_chi2: float  # that a perfect model would leave
 
 
-def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None]) -> Retuned:
+def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None], jobs: int = 1) -> Retuned:
     """Refit the rig of an evidence to its fitted runs. Raises Fault BAD_EVIDENCE when nothing can be compared."""
     nuisances = Nuisances(evidence.rig)
     described = np.zeros(len(nuisances))
@@ -55,15 +55,18 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     point = nuisances.point(fit.deviations, {})
     floor = floor_of(problem, point, replicates(problem, point, roughness, REPLICATES, 2), floor)
     # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
-    tried = [
-        (fitter, fitter.retuned(share * fit.deviations))
-        for share in (1.0, 0.5)
-        for fitter in [Fitter(problem, floor, nuisances)]
-    ]
+    starts = [share * fit.deviations for share in (1.0, 0.5)]
+    tried = each(jobs, _retuned, Fitter(problem, floor, nuisances), starts)
     fitter, fit = min(tried, key=lambda one: one[1].chi2)
+    fitter = fitter.for_problem(problem)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
     return Retuned(fitter, fit, roughness, _expected_chi2(fitter, fit, roughness))
+
+
+def _retuned(fitter: Fitter, start: Floats) -> tuple[Fitter, Fit]:
+    own = fitter.for_problem(fitter.problem)
+    return own, own.retuned(start)
 
 
 def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness) -> float:

@@ -210,7 +210,7 @@ def _refitted(
     The `promising` are refitted to the end in any case: a wave begins where the data have it, and two steps can lead it astray.
     One of the friction that screening saw at 241 went to 981 in two steps and to 198 in a whole refit, others to 602.
     """
-    quickly = sorted(_each(jobs, _quick, fitter, starts), key=lambda fit: fit.chi2)
+    quickly = sorted(each(jobs, _quick, fitter, starts), key=lambda fit: fit.chi2)
     best = best_of_each(quickly)
     gain = chi2 - best[0].chi2 if best else 0.0
     worth = [fit for fit in best[:most] if chi2 - fit.chi2 > _WORTH_FULL * gain]
@@ -218,12 +218,13 @@ def _refitted(
     forms: list[Fit] = []
     for effects in names:
         forms += best_of_each([fit for fit in quickly if set(fit.form.effects) == effects], by_form=True)[:2]
-    finished = _each(jobs, _full, fitter, forms) + _each(jobs, _at_once, fitter, promising)
+    finished = each(jobs, _full, fitter, forms) + each(jobs, _at_once, fitter, promising)
     finished += [fit for fit in best if set(fit.form.effects) not in names]
     return best_of_each(sorted(finished, key=lambda fit: fit.chi2))
 
 
-def _each(jobs: int, function: Callable[[Fitter, T], R], fitter: Fitter, items: list[T]) -> list[R]:
+def each(jobs: int, function: Callable[[Fitter, T], R], fitter: Fitter, items: list[T]) -> list[R]:
+    """What a function makes of a fitter and every item, in `jobs` processes."""
     if jobs == 1:
         return [function(fitter, item) for item in items]
     results: list[R] = Parallel(n_jobs=jobs)(delayed(function)(fitter, item) for item in items)  # pyright: ignore[reportAssignmentType]
@@ -232,7 +233,7 @@ def _each(jobs: int, function: Callable[[Fitter, T], R], fitter: Fitter, items: 
 
 def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs: int) -> list[Screened]:
     """All trials that change anything, the most promising first."""
-    shares = _each(jobs, _screened_share, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
+    shares = each(jobs, _screened_share, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
     return sorted(chain.from_iterable(shares), key=lambda one: one.chi2)
 
 

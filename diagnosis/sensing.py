@@ -52,17 +52,7 @@ def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chai
                 for signal in (f"{which}_accel_mps2", f"{which}_shake_mps2"):
                     result[signal] = result[signal] * (1.0 + value["ratio"])
     force_N = delayed(force_N, delay_s)
-    if "force-sensor-gain" in effects:
-        force_N = force_N * (1.0 + float(effects["force-sensor-gain"]["ratio"]))
-    if "force-sensor-bias" in effects:
-        force_N = force_N + float(effects["force-sensor-bias"]["bias_N"])
-    if "force-sensor-drift" in effects:
-        table = effects["force-sensor-drift"]
-        if table["form"] == "linear":
-            force_N = force_N + float(table["rate_N_per_s"]) * t_s
-        else:
-            force_N = force_N + float(table["drift_N"]) * (1.0 - np.exp(-t_s / float(table["settling_s"])))
-    result["drive_force_N"] = force_N
+    result["drive_force_N"] = force_N * _force_gain(effects) + _force_offset_N(effects, t_s)
     if chain.accel_lowest_Hz > 0.0:
         memory_s = 0.5 / (np.pi * chain.accel_lowest_Hz)
         for name in ("mass_accel_mps2", "base_accel_mps2"):
@@ -77,11 +67,25 @@ def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chai
     return result
 
 
-def true_force_N(reading_N: float, effects: Effects) -> float:
-    """What a constant force was when the sensor read this, before it had time to drift."""
-    bias_N = float(effects.get("force-sensor-bias", {}).get("bias_N", 0.0))
-    gain = 1.0 + float(effects.get("force-sensor-gain", {}).get("ratio", 0.0))
-    return (reading_N - bias_N) / gain
+def true_force_N(reading_N: float, effects: Effects, t_s: float) -> float:
+    """What the force was when the sensor read this at a time `t_s`; as if it had been constant before."""
+    return (reading_N - float(_force_offset_N(effects, np.array(t_s)))) / _force_gain(effects)
+
+
+def _force_gain(effects: Effects) -> float:
+    return 1.0 + float(effects.get("force-sensor-gain", {}).get("ratio", 0.0))
+
+
+def _force_offset_N(effects: Effects, t_s: Floats) -> Floats:
+    """What the force sensor adds at the times `t_s`, of its shape."""
+    offset_N = np.full_like(t_s, float(effects.get("force-sensor-bias", {}).get("bias_N", 0.0)))
+    if "force-sensor-drift" in effects:
+        table = effects["force-sensor-drift"]
+        if table["form"] == "linear":
+            offset_N = offset_N + float(table["rate_N_per_s"]) * t_s
+        else:
+            offset_N = offset_N + float(table["drift_N"]) * (1.0 - np.exp(-t_s / float(table["settling_s"])))
+    return offset_N
 
 
 def delayed(values: Floats, delay_s: float) -> Floats:

@@ -2,9 +2,13 @@
 
 The kernel is the plant's own. Its sensors' bandwidths are opened wide, since a manifest states none. Without vibration 70 us a
 step are enough: no feature differs by a third of a floor from 10 us (tests/truth/test_gap.py). With it, 20 steps a period.
+
+Every segment begins with the force that was measured there. In what phase of its cycle the slide is when the vibration changes is
+chance; it decides for seconds how the force settles where nothing slips any more, and how many slips a segment has.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +20,7 @@ from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S, SIGNALS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
+from plant.disturb import spring_N
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -27,6 +32,7 @@ _CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiff
 # follows the noise of the encoder, slower smears a reversal: errors of the friction show up to 10 Hz.
 _HOLDING_RAD_PER_S = 2.0 * math.pi * 10.0
 _RATE_FILTER_S = 3e-3  # of the damper: keeps 0.1 um of encoder noise to 0.2 N, turns the phase at 10 Hz by 11 degrees
+_FURTHEST, _HALVINGS = 4.0, 40  # to find the extension for a force: times that of the linear spring, to 1e-12 of that
 _LED_STEP_S = 1e-4  # its features are equal to 1e-3 N to those at 10 us
 
 
@@ -39,6 +45,14 @@ class Start(NamedTuple):
     velocity_mps: float = 0.0
     age_s: float = 10.0
     drive_m: float | None = None  # as the drive's own sensor has it, whose zero is not that of the slide's
+
+
+class Entry(NamedTuple):
+    """How a segment begins."""
+
+    block: int
+    force_N: float  # in the drive's spring
+    age_s: float | None  # of the contact, where the slide sticks; None: it slides on
 
 
 class Roughness(NamedTuple):
@@ -78,8 +92,10 @@ def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughn
     return RigConfig.model_validate(table)
 
 
-def predict(config: RigConfig, force_driven: bool, commands: Commands, start: Start) -> dict[str, Floats]:
-    """Signals by name, [blocks] each, free of noise."""
+def predict(
+    config: RigConfig, force_driven: bool, commands: Commands, start: Start, entries: Sequence[Entry] = ()
+) -> dict[str, Floats]:
+    """Signals by name, [blocks] each, free of noise. With a force drive the motion says where the slide is, and no entry."""
     params, state = build(config)
     p: Any = params[0]
     p.force_keep = p.accel_keep = p.position_keep = 0.0
@@ -109,9 +125,12 @@ def predict(config: RigConfig, force_driven: bool, commands: Commands, start: St
             analogue, truth, out, commands.motion.position_m, stiffness, damping,
         )  # fmt: skip
     else:
-        _predict(
-            params, state, commands.drive, commands.frequency_Hz, commands.amplitude_m, steps, analogue, truth, out
-        )
+        _enter(
+            params, state, commands.drive, commands.frequency_Hz, commands.amplitude_m, steps, analogue, truth, out,
+            np.array([entry.block for entry in entries], np.int64),
+            np.array([entry.force_N for entry in entries], np.float64),
+            np.array([math.nan if entry.age_s is None else entry.age_s for entry in entries], np.float64),
+        )  # fmt: skip
     return dict(zip(SIGNALS, out, strict=True))
 
 
@@ -168,6 +187,47 @@ def _predict(
                 about = analogue[row, i] - out[row, block]
                 total += about * about
             out[4 + row, block] = math.sqrt(total / samples)
+
+
+@kernel
+def _enter(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    drive: Floats,
+    frequency_Hz: Floats,
+    amplitude_m: Floats,
+    steps: npt.NDArray[np.int64],
+    analogue: Floats,
+    truth: Floats,
+    out: Floats,
+    entry_blocks: npt.NDArray[np.int64],
+    force_N: Floats,
+    age_s: Floats,
+) -> None:
+    """As `_predict`; at `entry_blocks` the slide is put where the spring has the force, stuck where the age is a number."""
+    p: Record = params[0]
+    s: Record = state[0]
+    first = 0
+    for entry in range(len(entry_blocks) + 1):
+        last = entry_blocks[entry] if entry < len(entry_blocks) else len(drive)
+        _predict(params, state, drive[first:last], frequency_Hz[first:last], amplitude_m[first:last],
+                 steps[first:last], analogue, truth, out[:, first:last])  # fmt: skip
+        first = last
+        if entry < len(entry_blocks):
+            held_N = force_N[entry] - s.arm_N
+            extension_m = 0.0
+            step_m = _FURTHEST * held_N / p.k_d + math.copysign(0.5 * p.gap_m, held_N)
+            for _ in range(_HALVINGS):
+                step_m *= 0.5
+                if math.fabs(spring_N(p, extension_m + step_m)) < math.fabs(held_N):
+                    extension_m += step_m
+            s.frame_m, s.frame_mps = force_N[entry] * p.frame_m_per_N, 0.0
+            s.base_m, s.base_mps = force_N[entry] * p.base_m_per_N, 0.0
+            s.x = s.s_d - s.frame_m - extension_m
+            if not math.isnan(age_s[entry]):
+                s.z = min(max(force_N[entry], -p.F_s), p.F_s) / p.k_t
+                s.v = s.v_r = 0.0
+                s.age_s = age_s[entry]
 
 
 @kernel
