@@ -224,8 +224,10 @@ def _enter(
             s.frame_m, s.frame_mps = force_N[entry] * p.frame_m_per_N, 0.0
             s.base_m, s.base_mps = force_N[entry] * p.base_m_per_N, 0.0
             s.x = s.s_d - s.frame_m - extension_m
-            if not math.isnan(age_s[entry]):
-                s.z = min(max(force_N[entry], -p.F_s), p.F_s) / p.k_t
+            s.z = min(max(force_N[entry], -p.F_s), p.F_s) / p.k_t
+            if math.isnan(age_s[entry]):
+                s.v = s.v_r = drive[first]
+            else:
                 s.v = s.v_r = 0.0
                 s.age_s = age_s[entry]
 

@@ -6,7 +6,7 @@ import os
 import secrets
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from diagnosis.blind.sealing import Answer, Secret, refuse_key_inside, tool_vers
 from diagnosis.strict_json import write_json
 from tests.blind.generators import Effect, Generator, Plan, generator
 from tests.blind.real_logs import real_cases
+from tests.blind.sizes import Sizes, known_sizes, write_sizes
 from tests.blind.sizing import Bench
 from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
 
@@ -30,25 +31,18 @@ _INVISIBLE = 0.02  # detection limits: less is not told from nothing
 _ONE_TIME_S = 946_684_800  # of every file: 2000-01-01, so that no time tells what was made after what
 
 
-class Seen(NamedTuple):
-    """What an effect does to the evidence."""
-
-    detectability: float  # detection limits
-    cells: list[list[Any]]  # signal, regime, run, and floors rms
-
-
 class Sized(NamedTuple):
-    """An effect at the strength that was found, and what it does alone."""
+    """An effect at the strength that was found, and what it is worth alone."""
 
     effect: Effect
     strength: float
-    seen: Seen
+    detectability: float  # detection limits
 
 
 def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, progress: Progress) -> None:
     """Make a set and its key, both or neither; what was made before an interruption is not made again.
 
-    Raises Fault CONFIG and OSError.
+    Beside the key the sizes are left, for `tests/blind/sizes`. Raises Fault CONFIG and OSError.
     """
     if cases < FEWEST:
         raise Fault("CONFIG", f"--cases {cases}: must be {FEWEST} at least, one of each kind; 200 tell something")
@@ -61,7 +55,7 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     answers = _taken_up(part, f"--generator {name} --cases {cases} --seed {seed} with version {tool_version()}")
     try:
         todo = {number: case for number, case in enumerate(draw(source, cases, seed)) if number not in answers}
-        for number, answer in made(source, todo, part, jobs):
+        for number, answer in made(source, todo, part, jobs, known_sizes(name, seed)):
             write_json(part / _ANSWERS / f"{number}.json", answer)
             answers[number] = answer
             progress(f"{len(answers)} of {cases} cases made", len(answers) / cases)
@@ -75,6 +69,7 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     shutil.rmtree(part / _ANSWERS)
     write_set(part, sealed)
     write_key(key, sealed)
+    write_sizes(key.with_suffix(".sizes.toml"), answers.values())
     _make_alike(part)
     try:
         part.rename(out)
@@ -101,14 +96,19 @@ def _taken_up(part: Path, asked: str) -> dict[int, Answer]:
     return answers
 
 
-def made(source: Generator, drawn: dict[int, Drawn], folder: Path, jobs: int) -> Iterator[tuple[int, Answer]]:
+def made(
+    source: Generator, drawn: dict[int, Drawn], folder: Path, jobs: int, known: Mapping[int, Sizes]
+) -> Iterator[tuple[int, Answer]]:
     """Make every case in a folder named by its number; number and answer of each as they come."""
-    tasks = (joblib.delayed(_one)(source, case, folder / str(number)) for number, case in drawn.items())
+    tasks = (
+        joblib.delayed(_one)(source, case, folder / str(number), known.get(case.seed, {}))
+        for number, case in drawn.items()
+    )
     found: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
     yield from found
 
 
-def _one(source: Generator, case: Drawn, folder: Path) -> tuple[int, Answer]:
+def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[int, Answer]:
     if case.stratum == REAL:
         return int(folder.name), _real(case, folder)
     plan = Plan((), case.tolerances, case.leave_out, backbone=case.backbone)
@@ -116,23 +116,25 @@ def _one(source: Generator, case: Drawn, folder: Path) -> tuple[int, Answer]:
     cells: list[list[Any]] = []
     if case.effects:
         with tempfile.TemporaryDirectory(prefix=f"{folder.name}-", dir=folder.parent) as scratch:
-            sizes, cells = sized(source, case, plan, Path(scratch))
+            sizes, cells = sized(source, case, plan, Path(scratch), known)
         plan = plan._replace(effects=tuple(one.effect for one in sizes))
     source.make(folder, plan, case.seed)
     effects = [
         {
             "name": one.effect.name,
             "formula": source.formula(one.effect),
-            "strength": round(one.strength, 4),
+            "strength": one.strength,
             "target": target,
-            "detectability": round(one.seen.detectability, 3),
+            "detectability": round(one.detectability, 3),
         }
         for one, target in zip(sizes, case.targets, strict=True)
     ]
     return int(folder.name), _answer(case, effects, cells)
 
 
-def sized(source: Generator, case: Drawn, plan: Plan, scratch: Path) -> tuple[list[Sized], list[list[Any]]]:
+def sized(
+    source: Generator, case: Drawn, plan: Plan, scratch: Path, known: Sizes
+) -> tuple[list[Sized], list[list[Any]]]:
     """Every effect of a case at the strength of its target, and where all of them together show."""
     smooth, trial, rough = plan._replace(smooth=True), scratch / "trial", scratch / "rough"
 
@@ -143,16 +145,13 @@ def sized(source: Generator, case: Drawn, plan: Plan, scratch: Path) -> tuple[li
 
     source.make(rough, plan, case.seed)
     bench = Bench(rough, made(()))
-
-    def seen(effect: Effect) -> Seen:
-        at = made((effect,))
-        return Seen(bench.detectability(at), bench.cells(at))
-
-    sizes = [
-        size(seen, effect, target, source.strongest) for effect, target in zip(case.effects, case.targets, strict=True)
-    ]
-    if len(sizes) == 1:
-        return sizes, sizes[0].seen.cells
+    sizes: list[Sized] = []
+    for effect, target in zip(case.effects, case.targets, strict=True):
+        if effect.name in known:
+            strength, limits = known[effect.name]
+            sizes.append(Sized(effect.scaled(strength), strength, limits))
+        else:
+            sizes.append(size(lambda one: bench.detectability(made((one,))), effect, target, source.strongest))
     return sizes, bench.cells(made(tuple(one.effect for one in sizes)))
 
 
@@ -164,18 +163,18 @@ def _real(case: Drawn, folder: Path) -> Answer:
     return _answer(case._replace(group=one.effects), effects, [])
 
 
-def size(seen: Callable[[Effect], Seen], effect: Effect, target: float, strongest: float) -> Sized:
+def size(worth: Callable[[Effect], float], effect: Effect, target: float, strongest: float) -> Sized:
     """The strength at which an effect is worth about `target` detection limits, or the strongest where it never is.
 
     Detectability grows nearly in proportion to the strength, so each try scales the last; where that leaves the bracket,
-    its geometric mean is next.
+    its geometric mean is next. A strength is a number of four digits, or what is written of it would not make it again.
     """
-    strength, low, high = min(target / max(TARGETS), strongest), _WEAKEST, strongest
+    strength, low, high = _four_digits(min(target / max(TARGETS), strongest)), _WEAKEST, strongest
     tried: list[tuple[float, Sized]] = []
     for _ in range(_TRIES):
         scaled = effect.scaled(strength)
-        one = Sized(scaled, strength, seen(scaled))
-        reached = max(one.seen.detectability, _INVISIBLE) / target
+        one = Sized(scaled, strength, worth(scaled))
+        reached = max(one.detectability, _INVISIBLE) / target
         tried.append((abs(math.log(reached)), one))
         if 1.0 / _NEAR_ENOUGH < reached < _NEAR_ENOUGH:
             break
@@ -183,8 +182,12 @@ def size(seen: Callable[[Effect], Seen], effect: Effect, target: float, stronges
         if low >= high:
             break
         ahead = min(max(strength / reached, _WEAKEST), strongest)
-        strength = ahead if low < ahead <= high else math.sqrt(low * high)
+        strength = _four_digits(ahead if low < ahead <= high else math.sqrt(low * high))
     return min(tried, key=lambda item: item[0])[1]
+
+
+def _four_digits(value: float) -> float:
+    return float(f"{value:.4g}")
 
 
 def _answer(case: Drawn, effects: list[dict[str, Any]], cells: list[list[Any]]) -> Answer:

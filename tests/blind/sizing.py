@@ -17,9 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.evidence import load_evidence
+from diagnosis.features import POWERS
 from diagnosis.gap import Floor, cell_names, cell_squares, floor_of, replicates
 from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Prepared, Problem, prepare
+from diagnosis.problem import Point, Prepared, Problem, prepare
 from diagnosis.refit import NOTHING, Fit, Fitter
 from diagnosis.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
 from diagnosis.verdict import JITTER
@@ -53,7 +54,6 @@ class Bench:
         self._roughness = roughness_of(
             scattered, replicates(scattered, self._described, ROUGHNESS, FIRST_REPLICATES, 1)
         )
-        self._drawn: dict[tuple[Any, ...], Floats] = {}
         self._parts = [
             (problem, self._floor(problem))
             for some in ([run for run in runs if not run.holdout], [run for run in runs if run.holdout])
@@ -61,31 +61,31 @@ class Bench:
             for problem in [Problem(evidence.rig, some)]
         ]
         self._fitter = Fitter(*self._parts[0], self._nuisances)
-        self._without = _refitted(self._fitter, np.zeros(len(self._nuisances)))
+        self._without: Fit | None = None
 
     def detectability(self, folder: Path) -> float:
         """How many detection limits the effect of this evidence is worth, in the runs that are fitted."""
+        without = self._without or _refitted(self._fitter, np.zeros(len(self._nuisances)))
         problem = Problem(self._rig, [run for run in _runs(folder) if not run.holdout])
         fitter = Fitter(problem, self._floor(problem), self._nuisances)
-        fit = _refitted(fitter, self._without.deviations)
+        fit = _refitted(fitter, without.deviations)
         # a valley that only one of the two refits finds is not the effect
         again = self._fitter.refit(NOTHING, fit.deviations, np.zeros(0))
-        self._without = min(self._without, again, key=lambda one: one.chi2)
+        self._without = min(without, again, key=lambda one: one.chi2)
         as_before = self._without.chi2 / len(self._without.residual) * len(fit.residual)
         return math.sqrt(max(fit.chi2 - as_before, 0.0)) / LIMIT
 
     def _floor(self, problem: Problem) -> Floor:
-        features = tuple(problem.labels)
-        if features not in self._drawn:
-            self._drawn[features] = replicates(problem, self._described, self._roughness, REPLICATES, 1)
-        return floor_of(problem, self._described, self._drawn[features])
+        """Anew for every evidence: what its replicates show depends on the forces that its segments begin with."""
+        return floor_of(problem, self._described, replicates(problem, self._described, self._roughness, REPLICATES, 1))
 
     def cells(self, folder: Path) -> list[list[Any]]:
         """Where this evidence differs: signal, regime, run, and the root mean square in floors, compressed."""
         runs = _runs(folder)
         squares: dict[tuple[str, str, str], list[float]] = {}
         for problem, floor in self._parts:
-            found = cell_squares(floor, _differences(floor, problem, _measured(problem, runs)))
+            there = _measured(problem, runs, self._described)
+            found = cell_squares(floor, _differences(floor, problem, there))
             for (signal, regime, _, run), square in zip(cell_names(floor), found.tolist(), strict=True):
                 squares.setdefault((signal, regime, run), []).append(square)
         return [[*cell, round(float(np.sqrt(np.mean(found))), 3)] for cell, found in squares.items()]
@@ -107,12 +107,22 @@ def _runs(folder: Path) -> list[Prepared]:
     return prepare(load_evidence(folder))
 
 
-def _measured(without: Problem, runs: list[Prepared]) -> Floats:
-    """The features of `without` as the runs of the same files have them, [features]; NaN where they lack one."""
+def _measured(without: Problem, runs: list[Prepared], described: Point) -> Floats:
+    """The features of `without` as the runs of the same files have them, [features]; NaN where they lack one.
+
+    As if each segment had begun in the same phase of its cycle: less what the described rig shows of the difference.
+    """
     files = {run.file for run in without.runs}
     other = Problem(without.rig, [run for run in runs if run.file in files])
-    by_label = dict(zip(other.labels, other.measured.tolist(), strict=True))
-    return np.array([by_label.get(label, np.nan) for label in without.labels])
+    there, expected = (
+        dict(zip(other.labels, values.tolist(), strict=True)) for values in (other.measured, other.predicted(described))
+    )
+    found: list[float] = []
+    for (file, label), here in zip(without.labels, without.predicted(described).tolist(), strict=True):
+        value = there.get((file, label), math.nan)
+        begun = expected.get((file, label), math.nan) - here
+        found.append(value - begun if math.isfinite(begun) and label.name not in POWERS else value)
+    return np.array(found)
 
 
 def _differences(floor: Floor, without: Problem, there: Floats) -> Floats:

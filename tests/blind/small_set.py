@@ -5,16 +5,19 @@
 
 import sys
 import tempfile
-import tomllib
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import joblib
+
+from diagnosis.blind.sealing import Answer
 from tests.blind import strata
 from tests.blind.generator.runs import Plan as RunPlan
 from tests.blind.generators import Generator, Plan
 from tests.blind.independent_cases import Independent
-from tests.blind.making import Seen, Sized, sized
+from tests.blind.making import Sized, made
+from tests.blind.sizes import Sizes, read_sizes, write_sizes
 from tests.blind.strata import Drawn, draw
 
 CASES, SEED = 18, 7003
@@ -26,34 +29,25 @@ RUNS = (
 SIZES = Path(__file__).with_suffix(".toml")
 
 
-def known(_source: Generator, case: Drawn, _plan: Plan, _scratch: Path) -> tuple[list[Sized], list[list[Any]]]:
+def known(
+    _source: Generator, case: Drawn, _plan: Plan, _scratch: Path, _known: Sizes
+) -> tuple[list[Sized], list[list[Any]]]:
     """In place of `making.sized`: the sizes of `small_set.toml`, without cells."""
-    table = tomllib.loads(SIZES.read_text(encoding="utf-8"))[str(case.seed)]
-    return [
-        Sized(effect.scaled(strength), strength, Seen(limits, []))
-        for effect in case.effects
-        for strength, limits in [table[effect.name]]
-    ], []
+    sizes = read_sizes(SIZES)[case.seed]
+    return [Sized(effect.scaled(sizes[effect.name][0]), *sizes[effect.name]) for effect in case.effects], []
 
 
 def _write_sizes() -> None:
-    source = Independent(RUNS)
-    lines = [
-        "# seed of a case, and of each of its effects the strength and the detection limits that it is worth there"
-    ]
     with patch.object(strata, "_real_faults", lambda: 0):
-        cases = draw(source, CASES, SEED)
-    for case in cases:
-        if not case.effects:
-            continue
-        with tempfile.TemporaryDirectory() as scratch:
-            sizes, _ = sized(
-                source, case, Plan((), case.tolerances, case.leave_out, backbone=case.backbone), Path(scratch)
+        cases = {number: case for number, case in enumerate(draw(Independent(RUNS), CASES, SEED)) if case.effects}
+    answers: list[Answer] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for _, answer in made(Independent(RUNS), cases, Path(folder), joblib.cpu_count(), {}):
+            answers.append(answer)
+            print(
+                f"{len(answers)} of {len(cases)}", [one["detectability"] for one in answer["effects"]], file=sys.stderr
             )
-        lines += ["", f"[{case.seed}]"]
-        lines += [f"{one.effect.name} = [{one.strength:.4f}, {one.seen.detectability:.2f}]" for one in sizes]
-        print("\n".join(lines[-len(sizes) - 1 :]), file=sys.stderr, flush=True)
-    SIZES.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_sizes(SIZES, answers)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from diagnosis.making import paper_rig
 from plant.config import RigConfig
 from plant.effects import EFFECTS
 from tests.blind.generators import Plan
-from tests.blind.making import Seen, size
+from tests.blind.making import size
 from tests.blind.plant_cases import Plant, drawn
 from tests.blind.plant_sizes import EFFECT_SIZES, possible
 from tests.blind.stand_ins import Bump, StandIn
@@ -189,16 +189,16 @@ def test_intervals():
 def test_an_effect_is_made_as_strong_as_it_should_be_seen():
     def seen(effect):
         tried.append(effect.strength)
-        return Seen(10.0 * effect.strength**2, [])
+        return 10.0 * effect.strength**2
 
     for target in (2.0, 4.0, 8.0):
         tried: list[float] = []
         found = size(seen, Bump("a"), target, 1.5)
-        assert found.seen.detectability == pytest.approx(target, rel=0.25)
+        assert found.detectability == pytest.approx(target, rel=0.25)
         assert len(tried) <= 4
     # what cannot be seen is as strong as it may be
-    assert size(lambda _effect: Seen(0.0, []), Bump("a"), 2.0, 1.5).strength <= 1.5
-    assert size(lambda effect: Seen(effect.strength, []), Bump("a"), 8.0, 1.5).strength == 1.5
+    assert size(lambda _effect: 0.0, Bump("a"), 2.0, 1.5).strength <= 1.5
+    assert size(lambda effect: effect.strength, Bump("a"), 8.0, 1.5).strength == 1.5
 
 
 def test_a_set_has_every_kind_and_every_effect():

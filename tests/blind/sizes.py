@@ -1,0 +1,40 @@
+"""Sizes that were found before. With them a set is made again in minutes, and the same one by every version of the ruler.
+
+`sizes/<generator>-<seed>.toml`: a table for the seed of a case, and of each of its effects the strength and the detection limits
+that it was worth.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+Sizes = Mapping[str, tuple[float, float]]  # of one case, by effect
+
+
+def known_sizes(generator: str, seed: int) -> dict[int, Sizes]:
+    """By the seed of a case; empty where a set was never sized."""
+    path = Path(__file__).parent / "sizes" / f"{generator}-{seed}.toml"
+    return read_sizes(path) if path.is_file() else {}
+
+
+def read_sizes(path: Path) -> dict[int, Sizes]:
+    """What `write_sizes` wrote."""
+    table: dict[str, dict[str, list[float]]] = tomllib.loads(path.read_text(encoding="utf-8"))
+    return {
+        int(seed): {name: (strength, limits) for name, (strength, limits) in effects.items()}
+        for seed, effects in table.items()
+    }
+
+
+def write_sizes(path: Path, answers: Iterable[Mapping[str, Any]]) -> None:
+    """The sizes of all effects that have one."""
+    lines = [
+        "# seed of a case, and of each of its effects the strength and the detection limits that it is worth there"
+    ]
+    for answer in sorted(answers, key=lambda one: one["counterfactual_seed"]):
+        sized = [one for one in answer["effects"] if one["detectability"] is not None]
+        if sized:
+            lines += ["", f"[{answer['counterfactual_seed']}]"]
+            lines += [f"{one['name']} = [{one['strength']}, {one['detectability']}]" for one in sized]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
