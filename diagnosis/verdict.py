@@ -19,14 +19,14 @@ from diagnosis.refit import Fit
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
-# What follows is in chi2 of a perfect model on this evidence. Of 30 rigs without a gap 27 left 0.7 to 1.6, the others 1.8, 2.0, 2.7.
+# What follows is in chi2 of a perfect model on this evidence. Of 30 rigs without a gap 27 left 0.7 to 1.6, the others 1.8 to 2.7.
 # What is beyond this counts against `none` in full: however wrong every model is, that there is a gap stays certain.
 NEVER_WITHOUT_GAP = 2.5
 _NO_ALARM = 1.0  # log evidence that `unexplained` stays behind `none` up to there
 _MUCH = 1.6  # more than a model that is right leaves
-# Of the reducible chi2 that an unwritten model is credited with. Beyond what a rig without a gap leaves, effects that were rightly
-# named closed 0.93 of it or more, though the generator has other formulas; a tilted track as a drift closed 0.7, friction that
-# depends on acceleration as a gain with another stiffness 0.74.
+# Of the reducible chi2 that an unwritten model is credited with. Effects that were rightly named closed 0.93 of it or more where
+# there was more than a rig without a gap leaves, though the generator has other formulas; a tilted track as a drift closed 0.7,
+# friction that depends on acceleration as a gain with another stiffness 0.74.
 _CLOSED_BY_UNKNOWN = 0.75
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise. Of 30 evidences without a
