@@ -69,13 +69,13 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     shutil.rmtree(part / _ANSWERS)
     write_set(part, sealed)
     write_key(key, sealed)
-    write_sizes(key.with_suffix(".sizes.toml"), answers.values())
     _make_alike(part)
     try:
         part.rename(out)
     except OSError:
         key.unlink(missing_ok=True)
         raise
+    write_sizes(key.with_suffix(".sizes.toml"), answers.values())
 
 
 def _taken_up(part: Path, asked: str) -> dict[int, Answer]:

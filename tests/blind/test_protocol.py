@@ -17,6 +17,7 @@ from diagnosis import many
 from diagnosis.blind import sealing
 from tests import made_up
 from tests.blind import making, strata
+from tests.blind.sizes import read_sizes
 from tests.blind.stand_ins import StandIn, StandInBench
 
 CASES = 8
@@ -81,7 +82,7 @@ def test_nothing_in_the_set_tells(made):
     hashes = json.loads((made / "set" / "set.json").read_text())["cases"]
     assert list(hashes) == sorted(hashes)
     assert all(row.keys() == {"answer_sha256", "evidence_sha256"} for row in hashes.values())
-    assert {path.name for path in made.iterdir()} == {"set", "key.json"}
+    assert {path.name for path in made.iterdir()} == {"set", "key.json", "key.sizes.toml"}
 
 
 def test_the_key_holds_every_kind_of_case(made):
@@ -116,7 +117,7 @@ def test_bad_arguments_make_nothing(made, tmp_path):
         result = make(tmp_path, **other)
         assert result.exit_code == 2
         assert word in result.stderr
-    assert {path.name for path in tmp_path.iterdir()} == {"set", "key.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {"set", "key.json", "key.sizes.toml"}
     assert make(tmp_path, out=tmp_path / "other", key=tmp_path / "k", generator="nobody").exit_code == 2
     result = blind("run", tmp_path)
     assert result.exit_code == 2
@@ -140,11 +141,11 @@ def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
     part = tmp_path / ".again-in-the-making"
     whole = making._one
 
-    def made_three(source, case, folder):
+    def made_three(source, case, folder, known):
         if folder.name == "3":
             (folder / "half").mkdir(parents=True)
             raise KeyboardInterrupt
-        return whole(source, case, folder)
+        return whole(source, case, folder, known)
 
     monkeypatch.setattr(making, "_one", made_three)
     assert make(tmp_path, **options).exit_code == FAULTS["INTERRUPTED"].exit_status
@@ -162,6 +163,21 @@ def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
         one.evidence_sha256 for one in second.values()
     )
     assert sealing.opened_answers(tmp_path / "again", tmp_path / "again.json")
+
+
+def test_known_sizes_make_the_same_set_without_sizing(made, tmp_path, monkeypatch):
+    def sized_again(*_arguments):
+        raise AssertionError("was sized again")
+
+    monkeypatch.setattr(making, "known_sizes", lambda _name, _seed: read_sizes(made / "key.sizes.toml"))
+    monkeypatch.setattr(making, "size", sized_again)
+    result = make(tmp_path, out=tmp_path / "same", key=tmp_path / "same.json")
+    assert result.exit_code == 0, result.output
+    first, second = (sealing.read_set(folder) for folder in (made / "set", tmp_path / "same"))
+    assert sorted(one.evidence_sha256 for one in first.values()) == sorted(
+        one.evidence_sha256 for one in second.values()
+    )
+    assert (tmp_path / "same.sizes.toml").read_bytes() == (made / "key.sizes.toml").read_bytes()
 
 
 def test_without_the_source_tree_one_line_says_so(tmp_path, monkeypatch):
