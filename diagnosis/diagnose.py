@@ -49,7 +49,7 @@ _Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's
 _SURE = COST_OF_EFFECT + 10.0
 _CONTENDERS, _CLOSE = 3, 40.0  # of chi2 behind the best single effect
 # Of what is above the expected: a path that varies at random has a strongest wave. Two that were drawn had one of 38 and 64 %; a
-# clock that ran 0.1 % fast, a coupling that slipped and a loose plug, which a path that free would take for scatter, 1 to 3 %.
+# clock that ran fast, a coupling that slipped and a loose plug, which a path that free would take for scatter, 1 to 3 %.
 _STRONGEST_WAVE = 0.08
 _WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
 

@@ -1,4 +1,4 @@
-"""Sizes that were found before. With them a set is made again in minutes, and the same one by every version of the ruler.
+"""Sizes that were found before. With them a set is made again without sizing, and the same one by every version of the ruler.
 
 `sizes/<generator>-<seed>.toml`: a table for the seed of a case, and of each of its effects the strength and the detection limits
 that it was worth.
