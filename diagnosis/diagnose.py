@@ -47,6 +47,8 @@ Progress = Callable[[str, float], None]
 _Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 10.0
+# A lag in distance went on to 230, 212 and 85 where a second effect had taken its 298 to 104.
+_LEADING, _MORE_REFITS, _GAINED = 2, 5, 0.97
 _CONTENDERS, _CLOSE = 3, 40.0  # of chi2 behind the best single effect
 # Of what is above the expected: a path that varies at random has a strongest wave. Two that were drawn had one of 38 and 64 %; a
 # clock that ran fast, a coupling that slipped and a loose plug, which a path that free would take for scatter, 1 to 3 %.
@@ -70,11 +72,12 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     if much_left(retuned, expected_chi2):  # a large effect may have pulled the refit into a valley of its own
         origins.append(Origin(fitter.described(described), FAR_KNEE))
     found = screened(fitter, origins, tried, jobs)
-    singles = refitted(fitter, origins, found, jobs)
+    singles = _finished(fitter, refitted(fitter, origins, found, jobs), expected_chi2, jobs)
     pairs: list[Fit] = []
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE and singles[0].chi2 > expected_chi2:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
         pairs = pairs_of_effects(fitter, retuned, singles, tried, expected_chi2, jobs)
+        pairs = _finished(fitter, pairs, expected_chi2, jobs)
         singles = _again(fitter, singles, _alone(pairs), jobs)
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
         singles = _again(fitter, singles, _crossed(singles), jobs)
@@ -125,6 +128,20 @@ def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> Ra
     """The random form of an effect on the rig that comes nearest without that effect."""
     others = [retuned, *(fit for fit in singles if effect not in fit.form.effects)]
     return RandomFriction(effect, fitter, min(others, key=lambda fit: fit.chi2))
+
+
+def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int) -> list[Fit]:
+    """The fits, best first, the leading ones refitted as long as that gains where they leave much."""
+    leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2)]
+    return _with(fits, each(jobs, _refit_further, fitter, leading))
+
+
+def _refit_further(fitter: Fitter, fit: Fit) -> Fit:
+    for _ in range(_MORE_REFITS):
+        before, fit = fit, fitter.refit(fit.form, fit.deviations, fit.w)
+        if fit.chi2 > _GAINED * before.chi2:
+            break
+    return fit
 
 
 def _alone(pairs: list[Fit]) -> list[_Start]:

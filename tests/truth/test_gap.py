@@ -8,7 +8,7 @@ import pytest
 
 import diagnosis.twin
 from diagnosis.evidence import load_evidence
-from diagnosis.gap import Floor, differences, floor_of, gap, replicates
+from diagnosis.gap import Floor, between, compress, differences, floor_of, gap, replicates
 from diagnosis.making import Case, make_evidence
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
@@ -55,6 +55,23 @@ def test_two_rough_surfaces_are_one_floor_apart(bench):
     bench.problem.measured = measured
     assert np.median(gaps) == pytest.approx(1.0, abs=0.15)
     assert max(gaps) < 1.6
+
+
+def test_what_a_slip_does_to_all_features_of_its_segment_counts_once(bench):
+    """Among runs that the floor was not made from, along the direction in which a segment scatters most."""
+    z = between(bench.floor, bench.problem.predicted(bench.point({})), bench.runs(16, 2))
+    z = compress(np.where(np.isfinite(z), z, 0.0))
+    z -= z.mean(axis=0)
+    compared = [label for label, use in zip(bench.problem.labels, bench.floor.compared, strict=True) if use]
+    segments = [(file, label.segment) for file, label in compared]
+    lengths = []
+    for segment in dict.fromkeys(segments):
+        own = np.array([one == segment for one in segments])
+        main = np.linalg.svd(z[:, own], full_matrices=False)[2][0]
+        one_deviation = np.std(z[:, own] @ main) * main
+        lengths.append(np.linalg.norm(bench.floor.whitening[:, own] @ one_deviation))
+    assert 0.7 < np.median(lengths) < 2.0  # 3.4 where correlations between segments were taken for real
+    assert max(lengths) < 3.0  # 5.6
 
 
 def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
