@@ -34,7 +34,7 @@ DEFINITION = (
 )
 KNEE = 6.0
 _LEAST_POWER = 1e-30
-# floors of a cell together, where the rig shows something that the model does not: lacking a slip must not pay
+# floors of a signal in a segment together, where the rig shows something that the model does not: lacking a slip must not pay
 _MISSING = 8.0
 _SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))
 _FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
@@ -138,11 +138,11 @@ def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     z = between(floor, predicted, problem.measured)
     lacking = np.logical_not(np.isfinite(z))
     if lacking.any():
-        # a stick that the model lacks takes the rates and the period of its cell with it: it is one thing that is missing
-        together = Counter(cell for cell, lacks in zip(floor.cells, lacking, strict=True) if lacks)
-        z[lacking] = [
-            _MISSING / together[cell] ** 0.5 for cell, lacks in zip(floor.cells, lacking, strict=True) if lacks
-        ]
+        labels = [one for one, use in zip(problem.labels, floor.compared, strict=True) if use]
+        # a stick that the model lacks takes all that a signal shows in its segment with it: it is one thing that is missing
+        things = [(file, label.segment, label.signal) for file, label in labels]
+        together = Counter(thing for thing, lacks in zip(things, lacking, strict=True) if lacks)
+        z[lacking] = [_MISSING / together[thing] ** 0.5 for thing, lacks in zip(things, lacking, strict=True) if lacks]
     return z
 
 

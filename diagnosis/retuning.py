@@ -12,9 +12,10 @@ from diagnosis.evidence import Evidence
 from diagnosis.gap import between, compress, differences, floor_of, gap, replicates
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
-from diagnosis.refit import Fit, Fitter
-from diagnosis.search import Directions, each
+from diagnosis.refit import NOTHING, Fit, Fitter
+from diagnosis.search import Directions
 from diagnosis.twin import Roughness
+from diagnosis.verdict import much_left
 
 Floats = npt.NDArray[np.floating[Any]]
 ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
@@ -38,7 +39,7 @@ class Retuned(NamedTuple):
     expected_chi2: float  # that a perfect model would leave
 
 
-def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None], jobs: int = 1) -> Retuned:
+def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None]) -> Retuned:
     """Refit the rig of an evidence to its fitted runs. Raises Fault BAD_EVIDENCE when nothing can be compared."""
     nuisances = Nuisances(evidence.rig)
     described = np.zeros(len(nuisances))
@@ -54,22 +55,23 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
         )
     apart = gap(floor, differences(floor, problem, problem.predicted(point)))
     progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
-    fit = Fitter(problem, floor, nuisances).retuned(described)
+    fit = Fitter(problem, floor, nuisances).refit(NOTHING, described, np.zeros(0))
     point = nuisances.point(fit.deviations, {})
     floor = floor_of(problem, point, replicates(problem, point, roughness, REPLICATES, 2), floor)
-    # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
-    starts = [share * fit.deviations for share in (1.0, 0.5)]
-    tried = each(jobs, _retuned, Fitter(problem, floor, nuisances), starts)
-    fitter, fit = min(tried, key=lambda one: one[1].chi2)
-    fitter = fitter.for_problem(problem)
+    fitter = Fitter(problem, floor, nuisances)
+    start = fit.deviations
+    fit = fitter.retuned(start)
+    expected = _expected_chi2(fitter, fit, roughness)
+    if much_left(fit, expected):
+        # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
+        other = fitter.for_problem(problem)
+        again = other.retuned(0.5 * start)
+        if again.chi2 < fit.chi2:
+            fitter, fit = other, again
+            expected = _expected_chi2(fitter, fit, roughness)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
-    return Retuned(fitter, fit, roughness, _expected_chi2(fitter, fit, roughness))
-
-
-def _retuned(fitter: Fitter, start: Floats) -> tuple[Fitter, Fit]:
-    own = fitter.for_problem(fitter.problem)
-    return own, own.retuned(start)
+    return Retuned(fitter, fit, roughness, expected)
 
 
 def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness) -> float:

@@ -21,7 +21,7 @@ from plant.effects import EFFECTS
 Floats = npt.NDArray[np.floating[Any]]
 # What follows is in chi2 of a perfect model on this evidence. Of 30 rigs without a gap 27 left 0.7 to 1.6, the others 1.8 to 2.7.
 # What is beyond this counts against `none` in full: however wrong every model is, that there is a gap stays certain.
-NEVER_WITHOUT_GAP = 2.5
+NEVER_WITHOUT_GAP = 1.8
 _NO_ALARM = 1.0  # log evidence that `unexplained` stays behind `none` up to there
 _MUCH = 1.6  # more than a model that is right leaves
 # Of the reducible chi2 that an unwritten model is credited with. Effects that were rightly named closed 0.93 of it or more where
