@@ -40,7 +40,7 @@ from diagnosis.search import (
 )
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
-from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, judge, much_left
+from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, hidden_by_noise, judge, much_left
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
@@ -109,7 +109,7 @@ def _may_scatter(verdict: Verdict, retuned: Fit, singles: list[Fit], pairs: list
     """Whether what is left may be friction that varies at random: rigs without a gap leave scatter too."""
     if retuned.chi2 <= NEVER_WITHOUT_GAP * expected_chi2:
         return False
-    if expected_chi2 > len(retuned.residual):  # 0.2 to 0.4 a feature are usual; 3.4 where noise hides the slips
+    if hidden_by_noise(retuned, expected_chi2):
         return False
     waves = [fit.chi2 for fit in singles if fit.form.effects[0] in RANDOM_EFFECTS]
     if retuned.chi2 - min(waves, default=retuned.chi2) < _STRONGEST_WAVE * (retuned.chi2 - expected_chi2):

@@ -28,6 +28,9 @@ _MUCH = 1.6  # more than a model that is right leaves
 # there was more than a rig without a gap leaves, though the generator has other formulas; a tilted track as a drift closed 0.7,
 # friction that depends on acceleration as a gain with another stiffness 0.74.
 _CLOSED_BY_UNKNOWN = 0.75
+# chi2 a feature that a perfect model leaves: 0.2 to 0.28 are usual, 0.52 on a log whose noise hides the slips. What its floor is
+# worth nobody knows: there the unwritten model is credited with all, and nothing is looked for in what scatters.
+_HIDDEN_BY_NOISE = 0.4
 _COST_OF_UNKNOWN = 12.0  # log evidence it must make up for having no formula
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise. Of 30 evidences without a
 # gap the most was 7.5 under an older floor, of six under this one 0; with an effect of 0.9 detection limits a wrong one had 3.
@@ -80,6 +83,11 @@ class Verdict(NamedTuple):
 def much_left(fit: Fit, expected_chi2: float) -> bool:
     """Whether a fit leaves more than a model that is right would; that leaves `expected_chi2` on average."""
     return fit.chi2 > _MUCH * expected_chi2
+
+
+def hidden_by_noise(fit: Fit, expected_chi2: float) -> bool:
+    """Whether a model that is right, too, leaves more than slips that stand out of the noise would have it leave."""
+    return expected_chi2 > _HIDDEN_BY_NOISE * len(fit.residual)
 
 
 def occam(fit: Fit) -> float:
@@ -145,7 +153,8 @@ def judge(
     against_none = 0.5 * certain / JITTER
     scores: dict[str, float] = {"none": COST_OF_EFFECT - against_none}
     # what an effect must pay it owes to `unexplained` where `none` is out: every model wrong, the least wrong one is no cause
-    unknown = 0.5 * _CLOSED_BY_UNKNOWN * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
+    credited = 1.0 if hidden_by_noise(base, expected_chi2) else _CLOSED_BY_UNKNOWN
+    unknown = 0.5 * credited * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
     if best is not None and is_random(best.fit.form) and not much_left(best.fit, expected_chi2):
         # a path as free as this one would cost the unwritten model as much
         unknown -= 0.5 * (base.chi2 - best.fit.chi2) / (scale * JITTER) - best.evidence

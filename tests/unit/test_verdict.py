@@ -35,6 +35,12 @@ def test_a_gap_that_nothing_takes_is_unexplained():
     assert judge(fit(4000.0), [fit(3900.0, "coulomb-level")], [], EXPECTED).kind == "unexplained"
 
 
+@pytest.mark.parametrize(("expected", "kind"), [(40.0, "effect"), (50.0, "unexplained")])
+def test_where_noise_hides_the_slips_an_effect_must_leave_nothing(expected, kind):
+    assert judge(fit(1000.0), [fit(250.0, "coulomb-level")], [], expected).kind == kind
+    assert judge(fit(1000.0), [fit(50.0, "coulomb-level")], [], expected).kind == "effect"
+
+
 @pytest.mark.parametrize(
     ("base", "single", "double", "named"),
     [
