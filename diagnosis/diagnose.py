@@ -47,8 +47,7 @@ Progress = Callable[[str, float], None]
 _Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 10.0
-# A lag in distance went on to 230, 212 and 85 where a second effect had taken its 298 to 104.
-_LEADING, _MORE_REFITS, _GAINED = 2, 5, 0.97
+_LEADING = 2  # fits that are refitted further: one that was not had a second effect named for what it left
 _CONTENDERS, _CLOSE = 3, 40.0  # of chi2 behind the best single effect
 # Of what is above the expected: a path that varies at random has a strongest wave. Two that were drawn had one of 38 and 64 %; a
 # clock that ran fast, a coupling that slipped and a loose plug, which a path that free would take for scatter, 1 to 3 %.
@@ -133,15 +132,11 @@ def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> Ra
 def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int) -> list[Fit]:
     """The fits, best first, the leading ones refitted as long as that gains where they leave much."""
     leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2)]
-    return _with(fits, each(jobs, _refit_further, fitter, leading))
+    return _with(fits, each(jobs, _further, fitter, leading))
 
 
-def _refit_further(fitter: Fitter, fit: Fit) -> Fit:
-    for _ in range(_MORE_REFITS):
-        before, fit = fit, fitter.refit(fit.form, fit.deviations, fit.w)
-        if fit.chi2 > _GAINED * before.chi2:
-            break
-    return fit
+def _further(fitter: Fitter, fit: Fit) -> Fit:
+    return fitter.further(fit)
 
 
 def _alone(pairs: list[Fit]) -> list[_Start]:

@@ -176,8 +176,8 @@ def _cell_means(squares: Floats, cells: tuple[CellKey, ...]) -> Floats:
 def _whitening(z: Floats, promised: Floats, segments: list[tuple[str, int]]) -> Floats:
     """Inverse root of the replicates' covariance, segment by segment: each begins anew on its own piece of the track.
 
-    Where so few replicates show a correlation of two segments it is by chance, and shrinking that away takes what a slip does to
-    all features of its segment along: of 18 times the variance of a single feature 11 were left.
+    Where so few replicates show a correlation of two segments it is by chance, and shrinking that away takes along what a slip
+    does to all features of its segment.
     """
     result = np.zeros((len(segments), len(segments)))
     for segment in dict.fromkeys(segments):
