@@ -52,6 +52,10 @@ class Nuisances:
         described = self._described[name]
         return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
 
+    def growth(self, name: str, deviation: float) -> float:
+        """By what share of its value a number of the rig table grows per tolerance, at a deviation."""
+        return self._tolerance[name] * self._described[name] / self.value(name, deviation)
+
     def parameters(self, deviations: Floats) -> tuple[Parameter, ...]:
         """The rig's numbers at these deviations, the shape of its Stribeck curve included."""
         own = len(self.rig_names)

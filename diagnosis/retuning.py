@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.floating[Any]]
 ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
 _MARGIN = 1.2  # on the roughness: too small a floor makes causes out of scatter
 # What surfaces lie within, a factor of two of 0.3 %, says as much as this many slips; breakaway and re-stick count twice. Pooled
-# over the segments, the estimate is off by 22 % (rms over 45 rigs); the median of the segments was by 27 %, and low by 11 %.
+# over the segments, the estimate is off by 28 % (rms over 26 rigs).
 _SLIPS_OF_OTHERS = 8.0
 FIRST_REPLICATES, REPLICATES = 12, 32
 _NEW_REPLICATES = 24  # that the floor does not know
