@@ -48,7 +48,7 @@ _Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 10.0
 _LEADING = 2  # fits that are refitted further: one that was not had a second effect named for what it left
-_CONTENDERS, _CLOSE = 3, 40.0  # of chi2 behind the best single effect
+_CONTENDERS, _CONTENDS = 3, 0.3  # single effects, if they close this share of what the best one closes
 # Of what is above the expected: a path that varies at random has a strongest wave. Two that were drawn had one of 38 and 64 %; a
 # clock that ran fast, a coupling that slipped and a loose plug, which a path that free would take for scatter, 1 to 3 %.
 _STRONGEST_WAVE = 0.08
@@ -79,7 +79,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         pairs = _finished(fitter, pairs, expected_chi2, jobs)
         singles = _again(fitter, singles, _alone(pairs), jobs)
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
-        singles = _again(fitter, singles, _crossed(singles), jobs)
+        singles = _again(fitter, singles, _starts_of_contenders(retuned, singles), jobs)
     # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
     if singles:
         best = singles[0]
@@ -151,10 +151,16 @@ def _alone(pairs: list[Fit]) -> list[_Start]:
     return starts
 
 
-def _crossed(singles: list[Fit]) -> list[_Start]:
-    """Close contenders from each other's nuisances, as one effect from three starts ended at 260, 273 and 288."""
-    close = [fit for fit in singles[:_CONTENDERS] if fit.chi2 < singles[0].chi2 + _CLOSE]
-    return [(fit.form, other.deviations, fit.w) for fit in close for other in close if other is not fit]
+def _starts_of_contenders(retuned: Fit, singles: list[Fit]) -> list[_Start]:
+    """The contenders from the rig as described and from the best one's nuisances, and that one from theirs.
+
+    A lag was named at chi2 155, as the static friction that it was had ended at 235: from either start it came to 143.
+    """
+    best, *others = singles[:_CONTENDERS]
+    least = _CONTENDS * (retuned.chi2 - best.chi2)
+    close = [fit for fit in others if retuned.chi2 - fit.chi2 > least]
+    starts = [(fit.form, np.zeros_like(fit.deviations), fit.w) for fit in (best, *close)]
+    return starts + [(one.form, other.deviations, one.w) for fit in close for one, other in ((fit, best), (best, fit))]
 
 
 def _again(fitter: Fitter, singles: list[Fit], starts: list[_Start], jobs: int) -> list[Fit]:

@@ -16,7 +16,6 @@ a few floors and a logarithm beyond: a drive that ripples by 500 floors of a las
 ripples by 50, and must not hide everything else.
 """
 
-from collections import Counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,8 +33,9 @@ DEFINITION = (
 )
 KNEE = 6.0
 _LEAST_POWER = 1e-30
-# floors of a signal in a segment together, where the rig shows something that the model does not: lacking a slip must not pay
-_MISSING = 8.0
+# What a slip that the rig shows and the model lacks counts, made independent: more than what slips differ by, or lacking it would
+# pay; no more, or there is no way from a model that slips too late. Eight floors for each signal were 690 of chi2 for one slip.
+_MISSING = 5.0
 _SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))
 _FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
 CellKey = tuple[str, str, tuple[float, float], str]
@@ -138,11 +138,14 @@ def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     z = between(floor, predicted, problem.measured)
     lacking = np.logical_not(np.isfinite(z))
     if lacking.any():
-        labels = [one for one, use in zip(problem.labels, floor.compared, strict=True) if use]
-        # a stick that the model lacks takes all that a signal shows in its segment with it: it is one thing that is missing
-        things = [(file, label.segment, label.signal) for file, label in labels]
-        together = Counter(thing for thing, lacks in zip(things, lacking, strict=True) if lacks)
-        z[lacking] = [_MISSING / together[thing] ** 0.5 for thing, lacks in zip(things, lacking, strict=True) if lacks]
+        segments = {run.file: run.commands.segments for run in problem.runs}
+        places = [
+            (file, label.segment) for (file, label), use in zip(problem.labels, floor.compared, strict=True) if use
+        ]
+        for file, segment in {place for place, lacks in zip(places, lacking, strict=True) if lacks}:
+            own = lacking & np.array([place == (file, segment) for place in places])
+            slips = segments[file][segment].slips if segment >= 0 else 1
+            z[own] = _MISSING * max(slips, 1) ** 0.5 / np.linalg.norm(floor.whitening[:, own].sum(axis=1))
     return z
 
 

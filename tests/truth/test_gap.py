@@ -74,6 +74,24 @@ def test_what_a_slip_does_to_all_features_of_its_segment_counts_once(bench):
     assert max(lengths) < 3.0  # 5.6
 
 
+def test_slips_that_the_model_lacks_count_once_each(bench):
+    """Whatever they take along: 5 floors a slip, made independent."""
+    plain = bench.problem.predicted(bench.point({}))
+    run = bench.problem.runs[0]
+    segment = max(range(len(run.commands.segments)), key=lambda i: run.commands.segments[i].slips)
+    slips = run.commands.segments[segment].slips
+    of_slips = [
+        file == run.file and label.segment == segment and label.regime in {"breakaway", "slip", "restick"}
+        for file, label in bench.problem.labels
+    ]
+    bench_z = differences(bench.floor, bench.problem, np.where(of_slips, np.nan, plain))
+    own = np.array([lacks for lacks, use in zip(of_slips, bench.floor.compared, strict=True) if use])
+    counted = bench.floor.whitening @ compress(np.where(own, bench_z, 0.0))
+    assert slips > 5
+    assert own.sum() > 40
+    assert counted @ counted == pytest.approx(25.0 * slips, rel=0.05)
+
+
 def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
     """Runs without vibration, whose steps the twin chooses freely, against those of the plant's own 10 us."""
     quiet = Problem(bench.problem.rig, [run for run in bench.problem.runs if not run.commands.frequency_Hz.any()])
