@@ -78,13 +78,12 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         pairs = pairs_of_effects(fitter, retuned, singles, tried, expected_chi2, jobs)
         pairs = _finished(fitter, pairs, expected_chi2, jobs)
         singles = _again(fitter, singles, _alone(pairs), jobs)
+    if singles:  # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
+        again = fitter.refit(NOTHING, singles[0].deviations, np.zeros(0))
+        retuned = min(retuned, again, key=lambda fit: fit.chi2)
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
         singles = _again(fitter, singles, _starts_of_contenders(retuned, singles), jobs)
-    # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
-    if singles:
-        best = singles[0]
-        retuned = min(retuned, fitter.refit(NOTHING, best.deviations, np.zeros(0)), key=lambda fit: fit.chi2)
-        singles[0] = min(best, fitter.refit(best.form, retuned.deviations, best.w), key=lambda fit: fit.chi2)
+        singles = _finished(fitter, singles, expected_chi2, jobs)
     verdict = judge(retuned, singles, pairs, expected_chi2)
     if verdict.kind == "unexplained":
         progress("nothing explains it yet: every effect gets a refit", 0.7)
@@ -152,14 +151,16 @@ def _alone(pairs: list[Fit]) -> list[_Start]:
 
 
 def _starts_of_contenders(retuned: Fit, singles: list[Fit]) -> list[_Start]:
-    """The contenders from the rig as described and from the best one's nuisances, and that one from theirs.
+    """The contenders from the described rig, from the retuned one and from the best one's nuisances, and that one from theirs.
 
-    A lag was named at chi2 155, as the static friction that it was had ended at 235: from either start it came to 143.
+    A lag was named at chi2 155, as the static friction that it was had ended at 235: from any of these it came to 143. A roll-off
+    at 481 got a second effect; from the retuned rig it came to 245, refitted further to 117.
     """
     best, *others = singles[:_CONTENDERS]
     least = _CONTENDS * (retuned.chi2 - best.chi2)
     close = [fit for fit in others if retuned.chi2 - fit.chi2 > least]
-    starts = [(fit.form, np.zeros_like(fit.deviations), fit.w) for fit in (best, *close)]
+    nuisances = (np.zeros_like(retuned.deviations), retuned.deviations)
+    starts = [(fit.form, deviations, fit.w) for fit in (best, *close) for deviations in nuisances]
     return starts + [(one.form, other.deviations, one.w) for fit in close for one, other in ((fit, best), (best, fit))]
 
 

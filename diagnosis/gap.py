@@ -33,9 +33,10 @@ DEFINITION = (
 )
 KNEE = 6.0
 _LEAST_POWER = 1e-30
-# What a slip that the rig shows and the model lacks counts, made independent: more than what slips differ by, or lacking it would
-# pay; no more, or there is no way from a model that slips too late. Eight floors for each signal were 690 of chi2 for one slip.
-_MISSING = 5.0
+_LACKING = 8.0  # floors, of a feature that the rig shows and the model does not: it is far off
+# What a slip that the model lacks counts once differences are made independent: more than what slips differ by, or lacking it
+# would pay; no more, or there is no way from a model that slips too late. Eight floors for each signal were 690 for one slip.
+_LACKING_SLIP = 5.0
 _SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))
 _FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
 CellKey = tuple[str, str, tuple[float, float], str]
@@ -136,6 +137,12 @@ def _slips_under_vibration(problem: Problem) -> npt.NDArray[np.bool_]:
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     """Measured less predicted in floors, [compared], not compressed."""
     z = between(floor, predicted, problem.measured)
+    return np.where(np.isfinite(z), z, _LACKING)
+
+
+def independent(floor: Floor, problem: Problem, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
+    """Differences compressed and made independent [compared], and the derivative of the compression."""
+    z = between(floor, predicted, problem.measured)
     lacking = np.logical_not(np.isfinite(z))
     if lacking.any():
         segments = {run.file: run.commands.segments for run in problem.runs}
@@ -145,8 +152,8 @@ def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
         for file, segment in {place for place, lacks in zip(places, lacking, strict=True) if lacks}:
             own = lacking & np.array([place == (file, segment) for place in places])
             slips = segments[file][segment].slips if segment >= 0 else 1
-            z[own] = _MISSING * max(slips, 1) ** 0.5 / np.linalg.norm(floor.whitening[:, own].sum(axis=1))
-    return z
+            z[own] = _LACKING_SLIP * max(slips, 1) ** 0.5 / np.linalg.norm(floor.whitening[:, own].sum(axis=1))
+    return floor.whitening @ compress(z, knee), slope_of_compress(z, knee)
 
 
 def between(floor: Floor, predicted: Floats, seen: Floats) -> Floats:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.gap import KNEE, Floor, compress, differences, slope_of_compress
+from diagnosis.gap import KNEE, Floor, differences, independent
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
 from diagnosis.twin import Effects
@@ -150,8 +150,7 @@ class Fitter:
 
     def whitened(self, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
         """Whitened compressed differences [compared], and the derivative of the compression there."""
-        z = differences(self.floor, self.problem, predicted)
-        return self.floor.whitening @ compress(z, knee), slope_of_compress(z, knee)
+        return independent(self.floor, self.problem, predicted, knee)
 
     def column(self, here: Floats, there: Floats, slope: Floats) -> Floats:
         """The way from one prediction [features] to another as it shows in whitened compressed differences."""

@@ -40,7 +40,7 @@ JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
 # and this share of what both close: less is what the first one's formula does not fit, unless it leaves much and both do not
-_SECOND_ADDS = 0.02
+_SECOND_ADDS = 0.025
 _UNDER_RANDOM = 2  # single effects that a random one is tried on top of
 _TEMPERATURE = 3.0  # of the probabilities: a guess
 

@@ -8,7 +8,7 @@ import pytest
 
 import diagnosis.twin
 from diagnosis.evidence import load_evidence
-from diagnosis.gap import Floor, between, compress, differences, floor_of, gap, replicates
+from diagnosis.gap import Floor, between, compress, differences, floor_of, gap, independent, replicates
 from diagnosis.making import Case, make_evidence
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
@@ -84,12 +84,13 @@ def test_slips_that_the_model_lacks_count_once_each(bench):
         file == run.file and label.segment == segment and label.regime in {"breakaway", "slip", "restick"}
         for file, label in bench.problem.labels
     ]
-    bench_z = differences(bench.floor, bench.problem, np.where(of_slips, np.nan, plain))
-    own = np.array([lacks for lacks, use in zip(of_slips, bench.floor.compared, strict=True) if use])
-    counted = bench.floor.whitening @ compress(np.where(own, bench_z, 0.0))
+    measured, bench.problem.measured = bench.problem.measured, plain + bench.floor.bias  # all else is as predicted
+    counted, _ = independent(bench.floor, bench.problem, np.where(of_slips, np.nan, plain))
+    apart = bench.gap_to(np.where(of_slips, np.nan, plain))
+    bench.problem.measured = measured
     assert slips > 5
-    assert own.sum() > 40
     assert counted @ counted == pytest.approx(25.0 * slips, rel=0.05)
+    assert apart > 1.5
 
 
 def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
