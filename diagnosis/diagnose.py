@@ -131,11 +131,7 @@ def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> Ra
 def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int) -> list[Fit]:
     """The fits, best first, the leading ones refitted as long as that gains where they leave much."""
     leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2)]
-    return _with(fits, each(jobs, _further, fitter, leading))
-
-
-def _further(fitter: Fitter, fit: Fit) -> Fit:
-    return fitter.further(fit)
+    return _with(fits, each(jobs, Fitter.further, fitter, leading))
 
 
 def _alone(pairs: list[Fit]) -> list[_Start]:
@@ -153,8 +149,8 @@ def _alone(pairs: list[Fit]) -> list[_Start]:
 def _starts_of_contenders(retuned: Fit, singles: list[Fit]) -> list[_Start]:
     """The contenders from the described rig, from the retuned one and from the best one's nuisances, and that one from theirs.
 
-    A lag was named at chi2 155, as the static friction that it was had ended at 235: from any of these it came to 143. A roll-off
-    at 481 got a second effect; from the retuned rig it came to 245, refitted further to 117.
+    A lag was named at chi2 155, as the static friction that it was had ended at 235: from the described rig and from the lag's
+    nuisances it came to 143. A roll-off at 481 got a second effect; from the retuned rig it came to 245, refitted further to 117.
     """
     best, *others = singles[:_CONTENDERS]
     least = _CONTENDS * (retuned.chi2 - best.chi2)

@@ -140,7 +140,7 @@ def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
     return np.where(np.isfinite(z), z, _LACKING)
 
 
-def independent(floor: Floor, problem: Problem, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
+def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
     """Differences compressed and made independent [compared], and the derivative of the compression."""
     z = between(floor, predicted, problem.measured)
     lacking = np.logical_not(np.isfinite(z))

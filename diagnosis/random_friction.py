@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
 from diagnosis.commands import Commands
-from diagnosis.gap import independent
+from diagnosis.gap import whitened
 from diagnosis.reduced import BLOCK_S
 from diagnosis.refit import Axis, Fit, Fitter, Form
 from diagnosis.waves import friction_series
@@ -87,11 +87,11 @@ class RandomFriction:
             effects = base.effects | {self.effect: {"form": RANDOM, "seed": seed, **table}}
             varied = copy.copy(fitter.problem)
             varied.measured = fitter.predicted(base.deviations, effects) + fitter.floor.bias
-            shown.append(independent(fitter.floor, varied, here)[0])
+            shown.append(whitened(fitter.floor, varied, here)[0])
         drawn = np.array(shown)
         covariance = np.cov(drawn, rowvar=False)
-        alone = np.diag(_INDEPENDENT * np.diag(covariance))
-        return _Paths(table, drawn.mean(axis=0), (1.0 - _INDEPENDENT) * covariance + alone)
+        independent = np.diag(_INDEPENDENT * np.diag(covariance))
+        return _Paths(table, drawn.mean(axis=0), (1.0 - _INDEPENDENT) * covariance + independent)
 
     def on(self, fit: Fit, noise: float) -> Scattered:
         """A fit with this effect on top.

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.gap import KNEE, Floor, differences, independent
+from diagnosis.gap import KNEE, Floor, differences, whitened
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
 from diagnosis.twin import Effects
@@ -23,9 +23,9 @@ _NARROW = 0.1  # prior of a coordinate that is known so well that a common step 
 _MOST_TOLERANCES = 3.3
 _MOST_OF_CHAIN = 5.0
 _WORTH_A_STEP = 0.5  # of chi2
-_SHARES = (1.0, 0.3, 0.1)  # of a step that are tried; without the last a static friction stayed at chi2 235 of 154
+_SHARES = (1.0, 0.3, 0.1)  # of a step; a static friction stayed at chi2 235 without the last, and went to 158 with it
 # Effects that change a number of the rig table alone: it and the effect are one direction. With a derivative of its own for each,
-# the number stayed at its bound and the effect at 3 of 10 %: chi2 196 instead of 125, and another effect was named.
+# the number stayed at its bound and the effect at 3 of 10 %: chi2 196, where 133 was to be had, and another effect was named.
 _LEVELS = {
     "coulomb-level": "coulomb_force_N",
     "static-level": "static_force_N",
@@ -150,7 +150,7 @@ class Fitter:
 
     def whitened(self, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
         """Whitened compressed differences [compared], and the derivative of the compression there."""
-        return independent(self.floor, self.problem, predicted, knee)
+        return whitened(self.floor, self.problem, predicted, knee)
 
     def column(self, here: Floats, there: Floats, slope: Floats) -> Floats:
         """The way from one prediction [features] to another as it shows in whitened compressed differences."""

@@ -77,7 +77,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
 def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness) -> float:
     """chi2 of a perfect model: of new replicates of the refitted one, each refitted along the nuisances' derivatives.
 
-    Evidence without a gap has 0.6 to 1.7 times that. What it is depends on the evidence: 115 to 186 of 600 features.
+    Evidence without a gap has 0.6 to 1.7 times that. What it is depends on the evidence: 102 to 185 of 600 features.
     """
     point = fitter.nuisances.point(fit.deviations, {})
     surface = roughness._replace(ratio=roughness.ratio / _MARGIN)

@@ -8,7 +8,7 @@ import pytest
 
 import diagnosis.twin
 from diagnosis.evidence import load_evidence
-from diagnosis.gap import Floor, between, compress, differences, floor_of, gap, independent, replicates
+from diagnosis.gap import Floor, between, compress, differences, floor_of, gap, replicates, whitened
 from diagnosis.making import Case, make_evidence
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
@@ -85,7 +85,7 @@ def test_slips_that_the_model_lacks_count_once_each(bench):
         for file, label in bench.problem.labels
     ]
     measured, bench.problem.measured = bench.problem.measured, plain + bench.floor.bias  # all else is as predicted
-    counted, _ = independent(bench.floor, bench.problem, np.where(of_slips, np.nan, plain))
+    counted, _ = whitened(bench.floor, bench.problem, np.where(of_slips, np.nan, plain))
     apart = bench.gap_to(np.where(of_slips, np.nan, plain))
     bench.problem.measured = measured
     assert slips > 5
