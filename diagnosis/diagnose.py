@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,10 +30,11 @@ from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Shrinkag
 from diagnosis.retuning import retuned_rig
 from diagnosis.search import (
     Origin,
+    Start,
     best_of_each,
-    each,
     middle_fits,
     pairs_of_effects,
+    refit,
     refitted,
     refitted_rest,
     screened,
@@ -41,10 +42,10 @@ from diagnosis.search import (
 from diagnosis.summary import summary
 from diagnosis.twin import Roughness
 from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, hidden_by_noise, judge, much_left
+from diagnosis.workers import each
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
-_Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 10.0
 _LEADING = 2  # fits that are refitted further: one that was not had a second effect named for what it left
@@ -64,7 +65,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     runs = prepare(evidence)
     fitted = [run for run in runs if not run.holdout]
     problem = Problem(evidence.rig, fitted)
-    fitter, retuned, roughness, expected_chi2 = retuned_rig(evidence, problem, progress)
+    fitter, retuned, roughness, expected_chi2 = retuned_rig(evidence, problem, progress, jobs)
     described = np.zeros(len(fitter.nuisances))
     tried = trials(problem)
     origins = [Origin(retuned, KNEE)]
@@ -72,18 +73,21 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         origins.append(Origin(fitter.described(described), FAR_KNEE))
     found = screened(fitter, origins, tried, jobs)
     singles = _finished(fitter, refitted(fitter, origins, found, jobs), expected_chi2, jobs)
+    done = singles[:_LEADING]
     pairs: list[Fit] = []
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE and singles[0].chi2 > expected_chi2:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
         pairs = pairs_of_effects(fitter, retuned, singles, tried, expected_chi2, jobs)
-        pairs = _finished(fitter, pairs, expected_chi2, jobs)
+        if pairs and much_left(pairs[0], expected_chi2):
+            pairs = _finished(fitter, pairs, expected_chi2, jobs)
         singles = _again(fitter, singles, _alone(pairs), jobs)
     if singles:  # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
         again = fitter.refit(NOTHING, singles[0].deviations, np.zeros(0))
         retuned = min(retuned, again, key=lambda fit: fit.chi2)
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
-        singles = _again(fitter, singles, _starts_of_contenders(retuned, singles), jobs)
-        singles = _finished(fitter, singles, expected_chi2, jobs)
+        contenders = _contenders(singles, pairs, expected_chi2)
+        singles = _again(fitter, singles, _starts_of_contenders(retuned, contenders), jobs)
+        singles = _finished(fitter, singles, expected_chi2, jobs, done)
     verdict = judge(retuned, singles, pairs, expected_chi2)
     if verdict.kind == "unexplained":
         progress("nothing explains it yet: every effect gets a refit", 0.7)
@@ -128,31 +132,38 @@ def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> Ra
     return RandomFriction(effect, fitter, min(others, key=lambda fit: fit.chi2))
 
 
-def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int) -> list[Fit]:
-    """The fits, best first, the leading ones refitted as long as that gains where they leave much."""
-    leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2)]
+def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int, done: Sequence[Fit] = ()) -> list[Fit]:
+    """The fits, best first, the leading ones that are not `done` refitted as long as that gains where they leave much."""
+    before = {id(fit) for fit in done}
+    leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2) and id(fit) not in before]
     return _with(fits, each(jobs, Fitter.further, fitter, leading))
 
 
-def _alone(pairs: list[Fit]) -> list[_Start]:
+def _alone(pairs: list[Fit]) -> list[Start]:
     """Each effect of the best pair alone, from where the pair left it."""
     if not pairs:
         return []
     best = min(pairs, key=lambda fit: fit.chi2)
-    starts: list[_Start] = []
+    starts: list[Start] = []
     for name, form in best.form.forms.items():
         own = [i for i, axis in enumerate(best.form.axes) if axis.effect == name]
         starts.append((Form({name: form}, tuple(best.form.axes[i] for i in own)), best.deviations, best.w[own]))
     return starts
 
 
-def _starts_of_contenders(retuned: Fit, singles: list[Fit]) -> list[_Start]:
+def _contenders(singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> list[Fit]:
+    """The leading single effects; what none of them explains, and two do, is not for another one to take."""
+    two_do = pairs and not much_left(pairs[0], expected_chi2)
+    return singles[:1] if two_do and much_left(singles[0], expected_chi2) else singles[:_CONTENDERS]
+
+
+def _starts_of_contenders(retuned: Fit, contenders: list[Fit]) -> list[Start]:
     """The contenders from the described rig, from the retuned one and from the best one's nuisances, and that one from theirs.
 
     A lag was named at chi2 155, as the static friction that it was had ended at 235: from the described rig and from the lag's
     nuisances it came to 143. A roll-off at 481 got a second effect; from the retuned rig it came to 245, refitted further to 117.
     """
-    best, *others = singles[:_CONTENDERS]
+    best, *others = contenders
     least = _CONTENDS * (retuned.chi2 - best.chi2)
     close = [fit for fit in others if retuned.chi2 - fit.chi2 > least]
     nuisances = (np.zeros_like(retuned.deviations), retuned.deviations)
@@ -160,13 +171,9 @@ def _starts_of_contenders(retuned: Fit, singles: list[Fit]) -> list[_Start]:
     return starts + [(one.form, other.deviations, one.w) for fit in close for one, other in ((fit, best), (best, fit))]
 
 
-def _again(fitter: Fitter, singles: list[Fit], starts: list[_Start], jobs: int) -> list[Fit]:
+def _again(fitter: Fitter, singles: list[Fit], starts: list[Start], jobs: int) -> list[Fit]:
     """Single effects, best first, after refits from other starts."""
-    return _with(singles, each(jobs, _refit, fitter, starts))
-
-
-def _refit(fitter: Fitter, start: _Start) -> Fit:
-    return fitter.refit(*start)
+    return _with(singles, each(jobs, refit, fitter, starts))
 
 
 def _with(singles: list[Fit], more: list[Fit]) -> list[Fit]:

@@ -258,6 +258,9 @@ def _regime(at: float) -> str:
     return "breakaway" if at < -0.4 else "slip" if at < 0.6 else "restick"
 
 
+_SHAPES = tuple((f"shape {instant:g}", _regime(instant)) for instant in SHAPE_AT.tolist())
+
+
 def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Scales, frequency_Hz: float) -> None:
     width = scales.slip_s / BLOCK_S
     shaken = frequency_Hz > 0.0  # a vibration that the sampling folds down would pass for a ring
@@ -282,8 +285,8 @@ def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Sc
             shape = shape - shape.mean()
         if name == "mass_position_m":
             shape = shape - shape[0]
-        for instant, value in zip(SHAPE_AT, shape, strict=True):
-            found.add(f"shape {instant:g}", name, _regime(instant), MIDDLE, number, float(value))
+        for (label, regime), value in zip(_SHAPES, shape.tolist(), strict=True):
+            found.add(label, name, regime, MIDDLE, number, value)
         found.add("ring", name, "restick", HIGH, number, ring)
 
 
@@ -319,10 +322,11 @@ def _parity(found: Features, signals: Signals, commands: Commands, scales: Scale
     extension_m = extension_m - extension_m.mean() + force_N.mean() / scales.stiffness_N_per_m
     reach_m = scales.force_N / scales.stiffness_N_per_m
     both = force_N.min() < -0.3 * scales.force_N and force_N.max() > 0.3 * scales.force_N
+    reaches = extension_m / reach_m
     columns = {
-        "stiffness": extension_m / reach_m,
+        "stiffness": reaches,
         "rate": rate_mps * 1e3,
-        "cube": (extension_m / reach_m) ** 3,
+        "cube": reaches * reaches * reaches,  # a power takes as long as all the rest of this
         "time": np.linspace(-1.0, 1.0, len(even))[even],
     }
     if both:

@@ -16,6 +16,7 @@ a few floors and a logarithm beyond: a drive that ripples by 500 floors of a las
 ripples by 50, and must not hide everything else.
 """
 
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ import numpy.typing as npt
 from diagnosis.features import DRIVE_WAVES, POWERS, Feature
 from diagnosis.problem import Draw, Point, Problem
 from diagnosis.twin import Roughness
+from diagnosis.workers import each
 
 Floats = npt.NDArray[np.floating[Any]]
 DEFINITION = (
@@ -68,15 +70,22 @@ def slope_of_compress(z: Floats, knee: float = KNEE) -> Floats:
     return 1.0 / np.sqrt(1.0 + (z / knee) ** 2)
 
 
-def replicates(problem: Problem, point: Point, roughness: Roughness, count: int, seed: int) -> Floats:
-    """Runs of one model on other surfaces with other noise, [count, features]."""
+def replicates(problem: Problem, point: Point, roughness: Roughness, count: int, seed: int, jobs: int = 1) -> Floats:
+    """Runs of one model on other surfaces with other noise, [count, features]; the same ones in any number of processes."""
+    shares = np.array_split(np.arange(count), jobs)
+    drawn = each(jobs, _drawn, problem, [(point, roughness, seed, share.tolist()) for share in shares])
+    return np.array(list(chain.from_iterable(drawn)))
+
+
+def _drawn(problem: Problem, share: tuple[Point, Roughness, int, list[int]]) -> list[Floats]:
+    point, roughness, seed, numbers = share
     drawn: list[Floats] = []
-    for number in range(count):
+    for number in numbers:
         random = np.random.default_rng([seed, number])
         length_m = float(roughness.length_m * np.exp(random.uniform(-1.0, 1.0)))
         surface = Roughness(roughness.ratio, length_m, int(random.integers(1_000_000)))
         drawn.append(problem.predicted(point, Draw(random, surface)))
-    return np.array(drawn)
+    return drawn
 
 
 def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None = None) -> Floor:

@@ -15,7 +15,7 @@ from diagnosis.problem import Problem
 from diagnosis.refit import NOTHING, Fit, Fitter
 from diagnosis.search import Directions
 from diagnosis.twin import Roughness
-from diagnosis.verdict import much_left
+from diagnosis.workers import each
 
 Floats = npt.NDArray[np.floating[Any]]
 ROUGHNESS = Roughness(0.003, 1.5e-4, 0)  # before the breakaways of the evidence say more
@@ -39,7 +39,7 @@ class Retuned(NamedTuple):
     expected_chi2: float  # that a perfect model would leave
 
 
-def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None]) -> Retuned:
+def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, float], None], jobs: int = 1) -> Retuned:
     """Refit the rig of an evidence to its fitted runs. Raises Fault BAD_EVIDENCE when nothing can be compared."""
     nuisances = Nuisances(evidence.rig)
     described = np.zeros(len(nuisances))
@@ -57,31 +57,31 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
     fit = Fitter(problem, floor, nuisances).refit(NOTHING, described, np.zeros(0))
     point = nuisances.point(fit.deviations, {})
-    floor = floor_of(problem, point, replicates(problem, point, roughness, REPLICATES, 2), floor)
-    fitter = Fitter(problem, floor, nuisances)
-    start = fit.deviations
-    fit = fitter.retuned(start)
-    expected = _expected_chi2(fitter, fit, roughness)
-    if much_left(fit, expected):
-        # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
-        other = fitter.for_problem(problem)
-        again = other.retuned(0.5 * start)
-        if again.chi2 < fit.chi2:
-            fitter, fit = other, again
-            expected = _expected_chi2(fitter, fit, roughness)
+    floor = floor_of(problem, point, replicates(problem, point, roughness, REPLICATES, 2, jobs), floor)
+    # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
+    starts = [fit.deviations, 0.5 * fit.deviations]
+    found = each(jobs, _retuned, Fitter(problem, floor, nuisances), starts)
+    fitter, fit = min(found, key=lambda one: one[1].chi2)
+    expected = _expected_chi2(fitter, fit, roughness, jobs)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
     return Retuned(fitter, fit, roughness, expected)
 
 
-def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness) -> float:
+def _retuned(fitter: Fitter, deviations: Floats) -> tuple[Fitter, Fit]:
+    """The rig refitted from a start, and a fitter with the derivatives there."""
+    own = fitter.for_problem(fitter.problem)
+    return own, own.retuned(deviations)
+
+
+def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness, jobs: int) -> float:
     """chi2 of a perfect model: of new replicates of the refitted one, each refitted along the nuisances' derivatives.
 
     Evidence without a gap has 0.6 to 1.7 times that. What it is depends on the evidence: 102 to 185 of 600 features.
     """
     point = fitter.nuisances.point(fit.deviations, {})
     surface = roughness._replace(ratio=roughness.ratio / _MARGIN)
-    drawn = replicates(fitter.problem, point, surface, _NEW_REPLICATES, 3)
+    drawn = replicates(fitter.problem, point, surface, _NEW_REPLICATES, 3, jobs)
     z = between(fitter.floor, fitter.predicted(fit.deviations, {}), drawn)
     z = np.where(np.isfinite(z), z, 0.0)  # what a rig does not show is not compared
     directions = Directions(fit)

@@ -124,6 +124,13 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             heat_share -= p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * block_s) / p.sag_settling_s))
         if disturbed and p.force_driven:
             drive_velocity_mps = 0.0
+        # turned on from step to step: a sine in each made a load that varies half as slow again
+        load_omega = TWO_PI * p.load_frequency_Hz
+        load_sin, load_cos = (
+            math.sin(load_omega * t_s + p.load_phase_rad),
+            math.cos(load_omega * t_s + p.load_phase_rad),
+        )
+        load_sin_step, load_cos_step = math.sin(load_omega * dt), math.cos(load_omega * dt)
         x, v, z, v_r, g, s_d = s.x, s.v, s.z, s.v_r, s.g, s.s_d
         force_f, position_f, drive_f = s.force_f, s.mass_position_f, s.drive_position_f
         mass_f, mass_slow_f = s.mass_accel_f, s.mass_accel_slow_f
@@ -184,7 +191,11 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                         spring_mps2 = base_omega * base_omega * (base_m + 0.5 * dt * base_mps)
                         base_free_mps = (base_mps - 0.5 * dt * spring_mps2) / (1.0 + base_loss)
                         base_mid_mps += base_free_mps
-                    friction = level(p, t_s, x - base_m, v_r)
+                    friction = level(p, t_s, x - base_m, v_r, load_sin, load_cos)
+                    load_sin, load_cos = (
+                        load_sin * load_cos_step + load_cos * load_sin_step,
+                        load_cos * load_cos_step - load_sin * load_sin_step,
+                    )
                     v_g = v_r
                     if p.lag_distance_m > 0.0:
                         slid_m = math.fabs(v_r) * dt

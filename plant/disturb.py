@@ -28,15 +28,18 @@ def smooth_noise(at: float, seed: float) -> float:
 @kernel
 def wave(angle_rad: float, second_sin: float, second_cos: float) -> float:
     """A sine with its second harmonic."""
-    result = math.sin(angle_rad)
-    if second_sin != 0.0 or second_cos != 0.0:
-        result += second_sin * math.sin(2.0 * angle_rad) + second_cos * math.cos(2.0 * angle_rad)
-    return result
+    return with_second(math.sin(angle_rad), math.cos(angle_rad), second_sin, second_cos)
 
 
 @kernel
-def level(p: Record, t_s: float, x: float, v_r: float) -> float:
-    """What the friction is multiplied by, here and now."""
+def with_second(sin: float, cos: float, second_sin: float, second_cos: float) -> float:
+    """A sine with its second harmonic, from the sine and the cosine of its angle."""
+    return sin + second_sin * 2.0 * sin * cos + second_cos * (1.0 - 2.0 * sin * sin)
+
+
+@kernel
+def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos: float) -> float:
+    """What the friction is multiplied by, here and now; the load's wave has come to the angle of this sine and cosine."""
     result = 1.0 + p.drift_per_s * t_s
     if p.drift_settling_s > 0.0:
         result += p.drift_ratio * (1.0 - math.exp(-(p.drift_before_s + t_s) / p.drift_settling_s))
@@ -47,11 +50,10 @@ def level(p: Record, t_s: float, x: float, v_r: float) -> float:
         else:
             result *= 1.0 + p.position_ratio * smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)
     if p.load_ratio != 0.0:
-        turns = p.load_frequency_Hz * t_s
         if p.load_seed < 0.0:
-            result *= 1.0 + p.load_ratio * wave(TWO_PI * turns + p.load_phase_rad, p.load_sin_2, p.load_cos_2)
+            result *= 1.0 + p.load_ratio * with_second(load_sin, load_cos, p.load_sin_2, p.load_cos_2)
         else:
-            result *= 1.0 + p.load_ratio * smooth_noise(2.0 * turns, p.load_seed)
+            result *= 1.0 + p.load_ratio * smooth_noise(2.0 * p.load_frequency_Hz * t_s, p.load_seed)
     if p.roughness_ratio != 0.0:
         result *= 1.0 + p.roughness_ratio * smooth_noise(x / p.roughness_length_m, p.roughness_seed)
     # noise has no bound: a slide that lifts off is not this model's
