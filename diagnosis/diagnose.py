@@ -104,7 +104,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
             retuned, singles, verdict = without, [again], checked
     best = verdict.named or retuned
     progress(f"verdict: {verdict.kind}", 0.8)
-    return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began)
+    return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began, jobs)
 
 
 def _may_scatter(verdict: Verdict, retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> bool:
@@ -191,15 +191,16 @@ def _assembled(
     tried: list[Trial],
     roughness: Roughness,
     began: float,
+    jobs: int,
 ) -> Diagnosis:
     nuisances = fitter.nuisances
     unseen = [run for run in runs if run.holdout]
     cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(retuned.deviations, {})))
     judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
     if unseen:
-        held_out = HeldOut(Problem(evidence.rig, unseen), nuisances, best, retuned, roughness)
+        held_out = HeldOut(Problem(evidence.rig, unseen), nuisances, best, retuned, roughness, jobs)
         cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
-        judged = _judged(fitter, held_out, retuned, best, verdict, tried)
+        judged = _judged(fitter, held_out, retuned, best, verdict, tried, jobs)
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
     by_effect = {fit.form.effects[0]: fit for fit in reversed(singles)}
@@ -239,7 +240,9 @@ def _assembled(
     return done._replace(summary=summary(done))
 
 
-def _judged(fitter: Fitter, held_out: HeldOut, retuned: Fit, best: Fit, verdict: Verdict, tried: list[Trial]) -> Gap:
+def _judged(
+    fitter: Fitter, held_out: HeldOut, retuned: Fit, best: Fit, verdict: Verdict, tried: list[Trial], jobs: int
+) -> Gap:
     closed = held_out.closed_by(best)
     compared: list[Shrinkage] = []
     if verdict.named is not None:
@@ -247,7 +250,7 @@ def _judged(fitter: Fitter, held_out: HeldOut, retuned: Fit, best: Fit, verdict:
     if verdict.runner_up is not None:
         compared.append(_shrinkage(verdict.runner_up.form.effects[0], held_out.closed_by(verdict.runner_up)))
     compared.append(_shrinkage("parameters alone", held_out.closed_by(retuned)))
-    blend = flexible_differences(fitter, retuned, tried, held_out)
+    blend = flexible_differences(fitter, retuned, tried, held_out, jobs)
     compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))
     named = verdict.named is not None
     return Gap(

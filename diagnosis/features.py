@@ -65,12 +65,17 @@ class Features:
     """Collects features of one run."""
 
     def __init__(self) -> None:
-        self.labels: list[Feature] = []
+        self._labels: list[tuple[str, str, str, Band, int]] = []
         self.values: list[float] = []
+
+    @property
+    def labels(self) -> list[Feature]:
+        """What the values are; a prediction is never asked, and thousands are made."""
+        return [Feature(*label) for label in self._labels]
 
     def add(self, name: str, signal: str, regime: str, band_Hz: Band, segment: int, value: float) -> None:
         """Append one number; NaN where this run has no such thing."""
-        self.labels.append(Feature(name, signal, regime, band_Hz, segment))
+        self._labels.append((name, signal, regime, band_Hz, segment))
         self.values.append(value)
 
 

@@ -4,6 +4,7 @@ It names nothing; it says how far the gap could be closed by something as free a
 against it.
 """
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,21 +14,22 @@ from diagnosis.heldout import HeldOut
 from diagnosis.library import Trial
 from diagnosis.refit import Fit, Fitter
 from diagnosis.search import Directions
+from diagnosis.workers import each
 
 Floats = npt.NDArray[np.floating[Any]]
 _STEP = 0.5  # of a nuisance's tolerance
 
 
-def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut) -> Floats:
+def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
     """Differences on the held-out runs in floors [compared] under the blend that was fitted to the others."""
-    firsts = {trial.form.effects: trial for trial in reversed(trials)}
-    trials = list(firsts.values())
+    firsts = list({trial.form.effects: trial for trial in reversed(trials)}.values())
+    shares_of_work = [firsts[i::jobs] for i in range(jobs)]
+    trials = list(chain.from_iterable(shares_of_work))
     directions = Directions(base)
     here = fitter.predicted(base.deviations, {})
     _, slope = fitter.whitened(here)
-    columns = [
-        fitter.column(here, fitter.predicted(base.deviations, trial.form.tables(trial.w)), slope) for trial in trials
-    ]
+    shown = each(jobs, _shown, fitter, [(base.deviations, share) for share in shares_of_work])
+    columns = [fitter.column(here, there, slope) for there in chain.from_iterable(shown)]
     free = np.stack([directions.freed(column) for column in columns], axis=1)
     shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
     blended = np.stack(columns, axis=1) @ shares
@@ -41,6 +43,11 @@ def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_ou
         ahead[i] += _STEP
         total += change / _STEP * _finite(_predicted(fitter, held_out, ahead, None) - unseen)
     return held_out.differences_of(total)
+
+
+def _shown(fitter: Fitter, work: tuple[Floats, list[Trial]]) -> list[Floats]:
+    deviations, trials = work
+    return [fitter.predicted(deviations, trial.form.tables(trial.w)) for trial in trials]
 
 
 def _predicted(fitter: Fitter, held_out: HeldOut, deviations: Floats, trial: Trial | None) -> Floats:

@@ -34,8 +34,11 @@ class Closed(NamedTuple):
 class HeldOut:
     """The held-out runs and their floor."""
 
-    def __init__(self, problem: Problem, nuisances: Nuisances, best: Fit, retuned: Fit, roughness: Roughness) -> None:
+    def __init__(
+        self, problem: Problem, nuisances: Nuisances, best: Fit, retuned: Fit, roughness: Roughness, jobs: int = 1
+    ) -> None:
         self.problem = problem
+        self._jobs = jobs
         self._nuisances = nuisances
         plain = {name: table for name, table in best.effects.items() if table["form"] != RANDOM}
         self.floor: Floor = self._floor_at(best, plain, roughness, None)
@@ -51,7 +54,8 @@ class HeldOut:
 
     def _floor_at(self, best: Fit, effects: Effects, roughness: Roughness, before: Floor | None) -> Floor:
         point = self._nuisances.point(best.deviations, effects)
-        return floor_of(self.problem, point, replicates(self.problem, point, roughness, _REPLICATES, _SEED), before)
+        drawn = replicates(self.problem, point, roughness, _REPLICATES, _SEED, self._jobs)
+        return floor_of(self.problem, point, drawn, before)
 
     def closed_by(self, fit: Fit) -> Closed:
         """The gap under a fit, with an interval from the spread over cells and the fit's own uncertainty."""

@@ -109,6 +109,7 @@ class Fit(NamedTuple):
     chi2: float  # with the priors' terms
     residual: Floats  # whitened [compared]
     columns: Floats  # whitened derivatives, nuisances then axes [compared, nuisances + axes]
+    converged: bool = False  # to the end: no step gained any more, with renewed derivatives
 
     @property
     def effects(self) -> Effects:
@@ -194,8 +195,13 @@ class Fitter:
         return self.fit(form, deviations, w, _NEAR)
 
     def further(self, fit: Fit) -> Fit:
-        """A fit refitted again as long as that gains: a lag in distance went from chi2 298 to 230, 212 and 85."""
+        """A fit refitted again as long as that gains: a lag in distance went from chi2 298 to 230, 212 and 85.
+
+        Where no step gained any more, a refit from there took 4 % of chi2 at most, nothing in 18 of 24 (seven rigs).
+        """
         for _ in range(_MORE_REFITS):
+            if fit.converged:
+                break
             again = self.refit(fit.form, fit.deviations, fit.w)
             gains = again.chi2 < _GAINED * fit.chi2
             fit = min(fit, again, key=lambda one: one.chi2)
@@ -213,6 +219,7 @@ class Fitter:
         chi2 = self._chi2(prior, residual, now)
         nuisance_rates = self._rates
         renewed = 0
+        converged = False
         columns = np.zeros((len(residual), len(now)))
         for step in range(stage.steps + 1):
             if step == stage.steps and not stage.columns:
@@ -237,10 +244,11 @@ class Fitter:
                     break
             if gain < _WORTH_A_STEP:
                 if renewed == stage.renewals:
+                    converged = renewed > 0
                     break
                 nuisance_rates = self._nuisance_rates(now[:own], form.tables(now[own:]), here, _STEPS[renewed])
                 renewed += 1
-        return Fit(form, now[:own], now[own:], chi2, residual, columns)
+        return Fit(form, now[:own], now[own:], chi2, residual, columns, converged)
 
     def _with_levels(self, nuisance_rates: Floats, axis_rates: Floats, form: Form, now: Floats) -> Floats:
         """The nuisances' derivatives, of a number that an effect changes that of the effect."""

@@ -196,7 +196,7 @@ def _promising_waves(found: list[Screened], chi2: float) -> list[Screened]:
     """The first start of each of the two effects, or pairs, with a wave that promise most, if they promise much."""
     much = [start for start in found if start.chi2 < chi2 - _PROMISING_MUCH]
     waves = [start for start in much if any(axis.name == "phase_rad" for axis in start.form.axes)]
-    first = {start.form.effects: start for start in reversed(waves)}
+    first = {frozenset(start.form.effects): start for start in reversed(waves)}
     return sorted(first.values(), key=lambda start: start.chi2)[:2]
 
 
