@@ -124,7 +124,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             heat_share -= p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * block_s) / p.sag_settling_s))
         if disturbed and p.force_driven:
             drive_velocity_mps = 0.0
-        # turned on from step to step: a sine in each made a load that varies half as slow again
+        # turned on from step to step: a sine in each step made a rig whose load varies a third slower
         load_omega = TWO_PI * p.load_frequency_Hz
         load_sin, load_cos = (
             math.sin(load_omega * t_s + p.load_phase_rad),
