@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from diagnosis.axis_features import friction_share
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
-from diagnosis.waves import Series, Wave, fitted
+from diagnosis.waves import Series, Wave, fitted, wave_of
 
 _EVERY = 8  # blocks that make one sample
 _MOST_TURNS = 200  # of a wave within the longest run
@@ -30,10 +30,9 @@ def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
     span = max((float(np.ptp(one.at)) for one in series), default=0.0)
     if span <= 0.0:
         return []
-    turns = np.arange(1, _MOST_TURNS * _STEPS_PER_TURN) / _STEPS_PER_TURN
-    found = [fitted(series, span / number) for number in turns.tolist()]
-    power = np.array([gain for gain, _ in found])
+    periods = span * _STEPS_PER_TURN / np.arange(1, _MOST_TURNS * _STEPS_PER_TURN)
+    power, shares = fitted(series, periods)
     near = 2 * _STEPS_PER_TURN
     peaks = [i for i in range(len(power)) if power[i] == power[max(0, i - near) : i + near + 1].max()]
-    best = [found[i][1] for i in sorted(peaks, key=lambda i: -power[i])[:most]]
+    best = [wave_of(float(periods[i]), shares[i]) for i in sorted(peaks, key=lambda i: -power[i])[:most]]
     return [wave._replace(spread=min(0.5 * wave.period / span, 0.2)) for wave in best]

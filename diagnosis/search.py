@@ -220,6 +220,7 @@ def _refitted(
         forms += best_of_each([fit for fit in quickly if set(fit.form.effects) == effects], by_form=True)[:2]
     led_on = {id(start) for start, fit in zip(starts, two_steps, strict=True) if any(fit is one for one in forms)}
     again = [*(one for one in promising if id(one) not in led_on), *forms]
+    again.sort(key=lambda one: -len(one.form.axes))  # long refits first: else one process ended with one, alone for 4 s
     finished = each(jobs, refit, fitter, [(one.form, one.deviations, one.w) for one in again])
     finished += [fit for fit in best if set(fit.form.effects) not in names]
     return best_of_each(sorted(finished, key=lambda fit: fit.chi2))

@@ -107,32 +107,43 @@ def _strongest(series: list[Series], most: int, harmonics: int = 1) -> list[Wave
         return []
     reach = max(float(one.at.max()) for one in series) - min(float(one.at.min()) for one in series)
     periods = np.geomspace(max(0.3 * spacing, span / 100.0), 2.0 * span, _GRID)
-    found = [fitted(series, float(period), harmonics) for period in periods]
-    power = np.array([gain for gain, _ in found])
+    power, shares = fitted(series, periods, harmonics)
     # the best of every range of periods: short ones fit the few breakaways best whatever is there
     edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
     best: list[int] = []
     for first, last in pairwise(edges.tolist()):
         peaks = [i for i in range(first, last) if power[i] == power[max(0, i - _LOBE) : i + _LOBE + 1].max()]
         best += sorted(peaks, key=lambda i: -power[i])[:_LOBES]
-    waves = [found[i][1] for i in best if power[i] > 0.0]
+    waves = [wave_of(float(periods[i]), shares[i]) for i in best if power[i] > 0.0]
     return [wave._replace(spread=min(0.5 * wave.period / reach, 0.2)) for wave in waves]
 
 
-def fitted(series: list[Series], period: float, harmonics: int = 1) -> tuple[float, Wave]:
-    """What a wave of this period, with up to two harmonics, takes of the sum of squares, and the wave."""
-    normal, right = np.zeros((2 * harmonics, 2 * harmonics)), np.zeros(2 * harmonics)
+def fitted(series: list[Series], periods: Floats, harmonics: int = 1) -> tuple[Floats, Floats]:
+    """Waves with up to two harmonics, fitted each alone.
+
+    Returns:
+        What each takes of the sum of squares [periods], and its shares of sine and cosine [periods, 2 x harmonics].
+
+    """
+    normal = np.zeros((len(periods), 2 * harmonics, 2 * harmonics))
+    right = np.zeros((len(periods), 2 * harmonics))
     for one in series:
-        turns = 2.0 * np.pi * one.at / period
-        columns = np.stack([wave(k * turns) for k in range(1, harmonics + 1) for wave in (np.sin, np.cos)], axis=1)
-        columns = one.weight * (columns - columns.mean(axis=0))
-        normal += columns.T @ columns
-        right += one.weight * (columns.T @ one.value)
-    shares = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(2 * harmonics), right)
+        turns = 2.0 * np.pi * one.at / periods[:, None]
+        columns = np.stack([wave(k * turns) for k in range(1, harmonics + 1) for wave in (np.sin, np.cos)], axis=2)
+        columns = one.weight * (columns - columns.mean(axis=1, keepdims=True))
+        normal += columns.transpose(0, 2, 1) @ columns
+        right += one.weight * (one.value @ columns)
+    held = 1e-9 * np.trace(normal, axis1=1, axis2=2)
+    shares = np.linalg.solve(normal + held[:, None, None] * np.eye(2 * harmonics), right[..., None])[..., 0]
+    return np.sum(right * shares, axis=1), shares
+
+
+def wave_of(period: float, shares: Floats) -> Wave:
+    """The wave of one period with its shares of sine and cosine [2 x harmonics]."""
     ratio, phase = float(np.hypot(*shares[:2])), float(np.arctan2(shares[1], shares[0]))
     wave = Wave(period, ratio, phase)
-    if harmonics == 2 and ratio > 0.0:
+    if len(shares) == 4 and ratio > 0.0:
         turned = complex(*shares[2:]) * np.exp(-2j * phase) / ratio
         second = np.clip((turned.real, turned.imag), -_STEEPEST, _STEEPEST).tolist()
         wave = wave._replace(second_sin=second[0], second_cos=second[1])
-    return float(right @ shares), wave
+    return wave
