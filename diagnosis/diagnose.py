@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -73,7 +73,6 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         origins.append(Origin(fitter.described(described), FAR_KNEE))
     found = screened(fitter, origins, tried, jobs)
     singles = _finished(fitter, refitted(fitter, origins, found, jobs), expected_chi2, jobs)
-    done = singles[:_LEADING]
     pairs: list[Fit] = []
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE and singles[0].chi2 > expected_chi2:
         progress(f"best single effect so far: {singles[0].form.effects[0]}; looking for a second", 0.6)
@@ -87,7 +86,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
         contenders = _contenders(singles, pairs, expected_chi2)
         singles = _again(fitter, singles, _starts_of_contenders(retuned, contenders), jobs)
-        singles = _finished(fitter, singles, expected_chi2, jobs, done)
+        singles = _finished(fitter, singles, expected_chi2, jobs)
     verdict = judge(retuned, singles, pairs, expected_chi2)
     if verdict.kind == "unexplained":
         progress("nothing explains it yet: every effect gets a refit", 0.7)
@@ -132,10 +131,9 @@ def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> Ra
     return RandomFriction(effect, fitter, min(others, key=lambda fit: fit.chi2))
 
 
-def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int, done: Sequence[Fit] = ()) -> list[Fit]:
-    """The fits, best first, the leading ones that are not `done` refitted as long as that gains where they leave much."""
-    before = {id(fit) for fit in done}
-    leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2) and id(fit) not in before]
+def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int) -> list[Fit]:
+    """The fits, best first, the leading ones refitted as long as that gains where they leave much."""
+    leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2) and not fit.finished]
     return _with(fits, each(jobs, Fitter.further, fitter, leading))
 
 
@@ -152,9 +150,10 @@ def _alone(pairs: list[Fit]) -> list[Start]:
 
 
 def _contenders(singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> list[Fit]:
-    """The leading single effects; what none of them explains, and two do, is not for another one to take."""
-    two_do = pairs and not much_left(pairs[0], expected_chi2)
-    return singles[:1] if two_do and much_left(singles[0], expected_chi2) else singles[:_CONTENDERS]
+    """The leading single effects; what none of them explains, and two do, only one of the two may still explain alone."""
+    if not pairs or much_left(pairs[0], expected_chi2) or not much_left(singles[0], expected_chi2):
+        return singles[:_CONTENDERS]
+    return [fit for fit in singles[:1] if fit.form.effects[0] in pairs[0].form.effects]
 
 
 def _starts_of_contenders(retuned: Fit, contenders: list[Fit]) -> list[Start]:
@@ -163,6 +162,8 @@ def _starts_of_contenders(retuned: Fit, contenders: list[Fit]) -> list[Start]:
     A lag was named at chi2 155, as the static friction that it was had ended at 235: from the described rig and from the lag's
     nuisances it came to 143. A roll-off at 481 got a second effect; from the retuned rig it came to 245, refitted further to 117.
     """
+    if not contenders:
+        return []
     best, *others = contenders
     least = _CONTENDS * (retuned.chi2 - best.chi2)
     close = [fit for fit in others if retuned.chi2 - fit.chi2 > least]
@@ -176,8 +177,9 @@ def _again(fitter: Fitter, singles: list[Fit], starts: list[Start], jobs: int) -
     return _with(singles, each(jobs, refit, fitter, starts))
 
 
-def _with(singles: list[Fit], more: list[Fit]) -> list[Fit]:
-    return best_of_each(sorted((*singles, *more), key=lambda fit: fit.chi2))
+def _with(fits: list[Fit], more: list[Fit]) -> list[Fit]:
+    """All of them, best first; of two as good the one of `more`, which may be marked as finished."""
+    return best_of_each(sorted((*more, *fits), key=lambda fit: fit.chi2))
 
 
 def _assembled(

@@ -4,7 +4,6 @@ It names nothing; it says how far the gap could be closed by something as free a
 against it.
 """
 
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -22,14 +21,12 @@ _STEP = 0.5  # of a nuisance's tolerance
 
 def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
     """Differences on the held-out runs in floors [compared] under the blend that was fitted to the others."""
-    firsts = list({trial.form.effects: trial for trial in reversed(trials)}.values())
-    shares_of_work = [firsts[i::jobs] for i in range(jobs)]
-    trials = list(chain.from_iterable(shares_of_work))
+    trials = list({trial.form.effects: trial for trial in reversed(trials)}.values())
     directions = Directions(base)
     here = fitter.predicted(base.deviations, {})
     _, slope = fitter.whitened(here)
-    shown = each(jobs, _shown, fitter, [(base.deviations, share) for share in shares_of_work])
-    columns = [fitter.column(here, there, slope) for there in chain.from_iterable(shown)]
+    shown = each(jobs, _shown, fitter, [(base.deviations, trials[i::jobs]) for i in range(jobs)])
+    columns = [fitter.column(here, shown[i % jobs][i // jobs], slope) for i in range(len(trials))]
     free = np.stack([directions.freed(column) for column in columns], axis=1)
     shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
     blended = np.stack(columns, axis=1) @ shares

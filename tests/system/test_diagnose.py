@@ -91,14 +91,19 @@ def test_the_report_and_the_rig_file_are_there(command):
     assert "drive-damping" in load_rig(out / "rig.toml").effects
 
 
-def test_nothing_leaks_from_the_held_out_run(short, tmp_path, monkeypatch):
-    """Another held-out run changes what is judged, and not a digit of what was fitted."""
-    wanted = {"drive-damping", "viscous-friction"}
+@pytest.fixture
+def few_effects(monkeypatch):
+    wanted = {"drive-damping", "viscous-friction", "static-level"}
 
     def few(problem: Problem):
         return [trial for trial in trials(problem) if set(trial.form.effects) <= wanted]
 
     monkeypatch.setattr(diagnosis.diagnose, "trials", few)
+
+
+@pytest.mark.usefixtures("few_effects")
+def test_nothing_leaks_from_the_held_out_run(short, tmp_path):
+    """Another held-out run changes what is judged, and not a digit of what was fitted."""
     own, other, alien = (tmp_path / name for name in ("own", "other", "alien"))
     make_evidence(own, Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
     make_evidence(alien, Case(short), seed=99)
@@ -109,6 +114,13 @@ def test_nothing_leaks_from_the_held_out_run(short, tmp_path, monkeypatch):
     assert one.candidates == two.candidates
     assert one.rig == two.rig
     assert one.gap.retuned != two.gap.retuned
+
+
+@pytest.mark.usefixtures("few_effects")
+def test_the_number_of_processes_changes_not_a_digit(short, tmp_path):
+    make_evidence(tmp_path / "damped", Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
+    one, two = (diagnosis.diagnose.diagnose(load_evidence(tmp_path / "damped"), quiet, jobs) for jobs in (1, 2))
+    assert one._replace(elapsed_s=0.0, pictures=()) == two._replace(elapsed_s=0.0, pictures=())
 
 
 def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(short, tmp_path):
