@@ -59,6 +59,7 @@ class _Mistaken(NamedTuple):
 _MISTAKEN_NONE = _Mistaken(0.0, 0.14, 0.07)
 _MISTAKEN_UNEXPLAINED = _Mistaken(0.03, 0.0, 0.2)
 _MISTAKEN_EFFECT = _Mistaken(0.0, 0.04, 0.05)
+_MISTAKEN_PAIR = _Mistaken(0.0, 0.05, 0.12)  # of 6 one, and the wrong one of its effects stood for the right one
 # Of 8 on development cases: what scatters may be bursts, or noise that nobody described.
 _MISTAKEN_RANDOM = _Mistaken(0.0, 0.25, 0.13)
 
@@ -170,8 +171,10 @@ def judge(
             scores[name] = double.evidence - math.log(2.0)
     for name in EFFECTS:
         scores.setdefault(name, -30.0)
-    probabilities = _with_mistakes(_softmax(scores), best is not None and is_random(best.fit.form))
     top = max(scores, key=lambda name: scores[name])
+    leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
+    mistaken = _mistaken(leaders, best is not None and is_random(best.fit.form))
+    probabilities = _with_mistakes(_softmax(scores), leaders, mistaken)
     if best is None or top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
     followed = [one.fit for one in ranked if not is_random(one.fit.form)]  # no run separates a path from a path
@@ -194,17 +197,30 @@ def _softmax(scores: dict[str, float]) -> dict[str, float]:
     return {name: weight / total for name, weight in sorted(weights.items(), key=lambda item: -item[1])}
 
 
-def _with_mistakes(probabilities: dict[str, float], random: bool) -> dict[str, float]:
-    """Probabilities, highest first, of which the highest gives to all others what verdicts like it were mistaken in.
+def _mistaken(leaders: tuple[str, ...], random: bool) -> _Mistaken:
+    """`random`: the best model varies at random."""
+    if leaders == ("none",):
+        return _MISTAKEN_NONE
+    if leaders == ("unexplained",):
+        return _MISTAKEN_UNEXPLAINED
+    if random:
+        return _MISTAKEN_RANDOM
+    return _MISTAKEN_EFFECT if len(leaders) == 1 else _MISTAKEN_PAIR
 
-    In proportion to how far it is ahead, so that it stays the highest. `random`: the best model varies at random.
+
+def _with_mistakes(probabilities: dict[str, float], leaders: tuple[str, ...], mistaken: _Mistaken) -> dict[str, float]:
+    """Probabilities of which the leading ones give to all others what verdicts like it were mistaken in.
+
+    In proportion to how far each is ahead, so that it stays ahead.
     """
-    (top, highest), (_, second) = list(probabilities.items())[:2]
-    named = _MISTAKEN_RANDOM if random else _MISTAKEN_EFFECT
-    mistaken = {"none": _MISTAKEN_NONE, "unexplained": _MISTAKEN_UNEXPLAINED}.get(top, named)
-    others = [name for name in EFFECTS if name != top]
+    behind = max(value for name, value in probabilities.items() if name not in leaders)
+    ahead = {name: probabilities[name] - behind for name in leaders}
+    others = [name for name in EFFECTS if name not in leaders]
     given = dict.fromkeys(others, mistaken.other_effect / len(others))
     given |= {"none": mistaken.none, "unexplained": mistaken.unexplained}
-    given[top] = -sum(mistaken)
-    found = {name: value + (highest - second) * given[name] for name, value in probabilities.items()}
+    lost = sum(mistaken)
+    found = {
+        name: value + sum(ahead.values()) * given.get(name, 0.0) - ahead.get(name, 0.0) * lost
+        for name, value in probabilities.items()
+    }
     return dict(sorted(found.items(), key=lambda item: -item[1]))

@@ -73,9 +73,13 @@ def test_no_verdict_is_surer_than_such_verdicts_were():
     named = judge(fit(4000.0), [fit(50.0, "coulomb-level")], [], EXPECTED).probabilities
     assert named["coulomb-level"] == pytest.approx(0.91, abs=0.01)
     assert named["unexplained"] == pytest.approx(0.04, abs=0.01)
+    pair = judge(fit(4000.0), [fit(900.0, "coulomb-level")], [fit(50.0, "coulomb-level", "drive-backlash")], EXPECTED)
+    both = {name: pair.probabilities[name] for name in ("coulomb-level", "drive-backlash")}
+    assert list(pair.probabilities)[:2] == list(both)
+    assert sum(both.values()) == pytest.approx(0.83, abs=0.01)
     left = judge(fit(40000.0), [fit(39000.0, "coulomb-level")], [], EXPECTED).probabilities
     assert left["unexplained"] == pytest.approx(0.77, abs=0.01)
-    for probabilities in (named, left):
+    for probabilities in (named, pair.probabilities, left):
         assert sum(probabilities.values()) == pytest.approx(1.0)
 
 
