@@ -35,6 +35,9 @@ DEFINITION = (
 )
 KNEE = 6.0
 _LEAST_POWER = 1e-30
+# Floors, of every feature of a rig that cannot be: more than any other may have. A base too light to compute came out best for a
+# log that nothing explains, as what lacks everything had only what lacking costs.
+_IMPOSSIBLE = 1e4
 _LACKING = 8.0  # floors, of a feature that the rig shows and the model does not: it is far off
 # What a slip that the model lacks counts once differences are made independent: more than what slips differ by, or lacking it
 # would pay; no more, or there is no way from a model that slips too late. Eight floors for each signal were 690 for one slip.
@@ -151,6 +154,9 @@ def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
 
 def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
     """Differences compressed and made independent [compared], and the derivative of the compression."""
+    if not np.isfinite(predicted).any():
+        count = int(floor.compared.sum())
+        return np.full(count, _IMPOSSIBLE), np.ones(count)
     z = between(floor, predicted, problem.measured)
     lacking = np.logical_not(np.isfinite(z))
     if lacking.any():
