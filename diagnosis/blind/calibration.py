@@ -11,6 +11,7 @@ from diagnosis.blind.outcomes import Opened
 
 _BINS = 10
 _FEWEST_IN_BIN = 10
+_DRAWS = 1000
 _LEAST_PROBABILITY = 1e-6  # a single certain mistake must not be the whole log score
 
 
@@ -44,6 +45,16 @@ def reliability(pairs: Sequence[tuple[float, bool]]) -> list[Bin]:
 def calibration_error(pairs: Sequence[tuple[float, bool]]) -> Score | None:
     """Mean over the cases of how far the rate of right ones in their bin is from the mean probability in it."""
     return bootstrapped(pairs, _error)
+
+
+def error_of_perfect(pairs: Sequence[tuple[float, bool]]) -> Score | None:
+    """The calibration error that as many cases would show if these probabilities were the true ones: mean, and 95 % of draws."""
+    if not pairs:
+        return None
+    random = np.random.default_rng(1)
+    drawn = [_error([(p, bool(random.random() < p)) for p, _ in pairs]) for _ in range(_DRAWS)]
+    low, high = np.quantile(drawn, (0.025, 0.975))
+    return Score(float(np.mean(drawn)), float(low), float(high), len(pairs))
 
 
 def log_score(cases: Sequence[Opened]) -> Score | None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from diagnosis.blind.calibration import Bin, calibration_error, judged, log_score, reliability
+from diagnosis.blind.calibration import Bin, calibration_error, error_of_perfect, judged, log_score, reliability
 from diagnosis.blind.intervals import Score, mean, rate, ratio
 from diagnosis.blind.locating import f1
 from diagnosis.blind.outcomes import OTHER_NAMES, SENSOR_NAMES, Opened
@@ -63,6 +63,7 @@ class Scores(NamedTuple):
     real_logs: Singles  # sensor faults put into measured logs, whose own gaps nobody knows
     log_score: Score | None
     calibration_error: Score | None
+    calibration_error_of_perfect: Score | None  # what chance alone shows in as many cases
     reliability: tuple[Bin, ...]
     sensor_or_physics: Score | None
     locating_f1: Score | None
@@ -122,6 +123,7 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
         real_logs=of_singles([case for case in cases if case.stratum == "real-log"]),
         log_score=log_score(cases),
         calibration_error=calibration_error(pairs),
+        calibration_error_of_perfect=error_of_perfect(pairs),
         reliability=tuple(reliability(pairs)),
         sensor_or_physics=rate([_class(case.named) == _class(case.truth) for case in named_one]),
         locating_f1=mean([value for value in located if value is not None]),

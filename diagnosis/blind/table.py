@@ -59,6 +59,7 @@ def rows(methods: dict[str, Scores]) -> list[Row]:
         row("  truth in the named group", "", [one.real_logs.in_group for one in every]),
         row("log score", "", [one.log_score for one in every]),
         row("calibration error", "<= 0.05", [one.calibration_error for one in every]),
+        row("  if every probability were true", "", [one.calibration_error_of_perfect for one in every]),
         row("sensor or physics", "", [one.sensor_or_physics for one in every]),
         row("localisation F1", "", [one.locating_f1 for one in every]),
         row("held-out shrinkage", "", [one.shrinkage for one in every]),

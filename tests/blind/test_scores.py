@@ -7,7 +7,7 @@ import pytest
 
 from bridge.config import validate
 from diagnosis.blind import baselines
-from diagnosis.blind.calibration import calibration_error, log_score, reliability
+from diagnosis.blind.calibration import calibration_error, error_of_perfect, log_score, reliability
 from diagnosis.blind.intervals import bootstrapped, mean, rate, ratio
 from diagnosis.blind.locating import f1
 from diagnosis.blind.outcomes import Opened, opened
@@ -117,6 +117,13 @@ def test_probabilities_are_judged():
         np.array([(0.5, 0.1), (0.8, 0.8)])
     )
     assert calibration_error([]) is None
+
+
+def test_what_chance_alone_shows_is_told():
+    """Of 10 fair coins the number of heads is off by 1.23 in the mean; what is certain is never off."""
+    assert error_of_perfect([(0.5, True)] * 10).value == pytest.approx(0.123, abs=0.01)
+    assert error_of_perfect([(1.0, False)] * 10).value == 0.0
+    assert error_of_perfect([]) is None
 
 
 def test_places_are_compared_with_the_counterfactual():
