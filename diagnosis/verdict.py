@@ -53,9 +53,9 @@ class _Mistaken(NamedTuple):
     other_effect: float
 
 
-# How often verdicts on opened cases were mistaken: 17 of 58 without a gap, 8 of 29 unexplained, 6 of 24 on two effects, 5 of which
-# had one right. On one effect 4 of 57; of another 57, those of the last sealed set that were surest, 2. What is too small shows no
-# gap, an effect whose formula is not the library's may end as unexplained, and one that the library lacks under another's name.
+# How often verdicts on opened cases were wrong: 17 of 58 without a gap, 8 of 29 unexplained, 6 of 24 on two effects, of which 5
+# had one right. On one effect 4 of 57; of the 57 of the last sealed set that were surest 2. What is too small shows no gap, an
+# effect whose formula is not the library's may end as unexplained, and one that the library lacks under another's name.
 _MISTAKEN_NONE = _Mistaken(0.0, 0.12, 0.17)
 _MISTAKEN_UNEXPLAINED = _Mistaken(0.02, 0.0, 0.25)
 _MISTAKEN_EFFECT = _Mistaken(0.0, 0.04, 0.03)
