@@ -76,7 +76,9 @@ def _confusions(scores: Scores) -> "Figure":
         axis.set_xticks(range(len(said)), said, rotation=90, fontsize=7)
         axis.set_yticks(range(len(there)), there, fontsize=7)
         for row, column in np.argwhere(counts > 0):
-            axis.text(column, row, f"{counts[row, column]:.0f}", ha="center", va="center", fontsize=7)
+            count = counts[row, column]
+            color = "white" if count > 0.6 * counts.max() else "black"  # on dark blue black is not seen
+            axis.text(column, row, f"{count:.0f}", ha="center", va="center", fontsize=7, color=color)
     axis.set(xlabel="said", ylabel="there")
     return figure
 
