@@ -122,7 +122,8 @@ def judge(
             for fit in (base, *[one for one in singles if effect.effect not in one.form.effects][:_UNDER_RANDOM])
         ]
 
-    fits = [base, *singles, *pairs, *(one.fit for _, one in scattered(JITTER))]
+    closest = scattered(JITTER)
+    fits = [base, *singles, *pairs, *(one.fit for _, one in closest)]
     scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> Model:
@@ -132,8 +133,8 @@ def judge(
 
     alone = [model(fit) for fit in singles]
     doubles = [model(fit) for fit in pairs]
-    for under, both in scattered(scale * JITTER):
-        if both.fit.chi2 > NEVER_WITHOUT_GAP * expected_chi2:
+    for (under, both), (_, close) in zip(scattered(scale * JITTER), closest, strict=True):
+        if close.fit.chi2 > NEVER_WITHOUT_GAP * expected_chi2:
             continue  # so free a path leaves no more if it is the cause; a plug that came loose left 4.5 times the expected
         if under is base:
             alone.append(Model(both.fit, both.gained))
@@ -157,9 +158,9 @@ def judge(
     # what an effect must pay it owes to `unexplained` where `none` is out: every model wrong, the least wrong one is no cause
     credited = 1.0 if hidden_by_noise(base, expected_chi2) else _CLOSED_BY_UNKNOWN
     unknown = 0.5 * credited * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
-    if best is not None and is_random(best.fit.form) and not much_left(best.fit, expected_chi2):
-        # a path as free as this one would cost the unwritten model as much
-        unknown -= 0.5 * (base.chi2 - best.fit.chi2) / (scale * JITTER) - best.evidence
+    if best is not None:  # what is unwritten would cost as much freedom as the best of what is written
+        freedom = 0.5 * (base.chi2 - best.fit.chi2) / (scale * JITTER) - best.evidence
+        unknown -= freedom if is_random(best.fit.form) else max(freedom - _COST_OF_UNKNOWN, 0.0)
     if against_none > 0.0:
         scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
     else:

@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.random_friction import Scattered
 from diagnosis.refit import NOTHING, Axis, Fit, Form
-from diagnosis.verdict import judge
+from diagnosis.verdict import JITTER, judge
 
 FEATURES = 100
 NUISANCES = 2
@@ -95,12 +95,13 @@ class Scatter:
 
     effect = "normal-load-fluctuation"
 
-    def __init__(self, left, gained):
-        self.left, self.gained = left, gained
+    def __init__(self, left, gained, more=0.0):
+        self.left, self.gained, self.more = left, gained, more
 
-    def on(self, under, _noise):
+    def on(self, under, noise):
         form = Form(under.form.forms | {self.effect: "random"}, under.form.axes)
-        return Scattered(under._replace(form=form, chi2=self.left), self.gained)
+        left = self.left + self.more * (noise - JITTER)  # the more is put down to noise, the shorter is the path
+        return Scattered(under._replace(form=form, chi2=left), self.gained)
 
 
 @pytest.mark.parametrize(
@@ -117,3 +118,10 @@ def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind
     verdict = judge(fit(1000.0), [fit(single, "coulomb-level")], [], EXPECTED, [Scatter(left, gained)])
     assert verdict.kind == kind
     assert sorted(verdict.named.form.effects if verdict.named else []) == effects
+
+
+def test_a_path_is_judged_by_what_it_can_explain_not_by_what_noise_takes_from_it():
+    scatter = Scatter(60.0, 150.0, more=40.0)  # 1.5 of the expected, 2.25 where half as much again is noise
+    verdict = judge(fit(1000.0), [fit(900.0, "coulomb-level")], [], EXPECTED, [scatter])
+    assert verdict.named is not None
+    assert verdict.named.form.effects == ("normal-load-fluctuation",)
