@@ -91,9 +91,10 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         singles = _finished(fitter, singles, expected_chi2, jobs)
     verdict = judge(retuned, singles, pairs, expected_chi2)
     if verdict.kind == "unexplained" or (verdict.named is not None and much_left(verdict.named, expected_chi2)):
-        progress("nothing explains it well yet: every effect gets a refit, alone and beside the best one", 0.7)
-        singles = _with(singles, refitted_rest(fitter, origins, found, jobs))
+        progress("nothing explains it well yet: every effect gets a refit", 0.65)
+        singles = _with(singles, refitted_rest(fitter, origins, found, tried, jobs))
         if singles and much_left(singles[0], expected_chi2):
+            progress(f"every effect gets a refit beside the best one, {singles[0].form.effects[0]}", 0.7)
             pairs = _finished(fitter, _with(pairs, pairs_with(fitter, singles[0], tried, jobs)), expected_chi2, jobs)
             singles = _again(fitter, singles, _alone(pairs), jobs)
         verdict = judge(retuned, singles, pairs, expected_chi2)

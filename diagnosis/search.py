@@ -140,14 +140,22 @@ def refitted(fitter: Fitter, origins: list[Origin], found: list[list[Screened]],
     return _refitted(fitter, origins[0].fit.chi2, starts, promising, jobs, _FULL)
 
 
-def refitted_rest(fitter: Fitter, origins: list[Origin], found: list[list[Screened]], jobs: int = 1) -> list[Fit]:
-    """As `refitted`, for the best start of every form that it passed over, from the last origin.
+def refitted_rest(
+    fitter: Fitter, origins: list[Origin], found: list[list[Screened]], trials: list[Trial], jobs: int = 1
+) -> list[Fit]:
+    """As `refitted`, from the last origin: the best start of every form that it passed over, and every form as it was tried.
 
     What a trial promises is linear: friction 0.4 ms behind the velocity was the 63rd of 86, and took chi2 from 640 to 426.
+    Screening sent a roll-off of 9 kHz to 23, from where it came to 310; from 4 kHz, where it was to be tried, to 77. A wave
+    begins where the data have it, or nowhere.
     """
     seen = {tuple(one.form.forms.items()) for one in found[-1][:_QUICK]}
     starts = [one for one in _first_of_each_form(found[-1]) if tuple(one.form.forms.items()) not in seen]
-    return _refitted(fitter, origins[0].fit.chi2, starts, [], jobs, _FULL)
+    fits = _refitted(fitter, origins[0].fit.chi2, starts, [], jobs, _FULL)
+    first = {tuple(one.form.forms.items()): one for one in reversed(trials) if not _is_wave(one.form)}
+    described = origins[-1].fit.deviations
+    fits += each(jobs, refit, fitter, [(one.form, described, one.w) for one in first.values()])
+    return best_of_each(sorted(fits, key=lambda fit: fit.chi2))
 
 
 def pairs_with(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int = 1) -> list[Fit]:
@@ -158,7 +166,11 @@ def pairs_with(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int = 1) -
     """
     others = [trial for trial in trials if not set(trial.form.effects) & set(first.form.effects)]
     starts = _first_of_each_form(_screened(fitter, first, KNEE, others, jobs))
-    return _refitted(fitter, first.chi2, starts, [], jobs, _FULL_PAIRS)
+    return _refitted(fitter, first.chi2, starts, [], jobs, _FULL)
+
+
+def _is_wave(form: Form) -> bool:
+    return any(axis.name == "phase_rad" for axis in form.axes)
 
 
 def _first_of_each_form(found: list[Screened]) -> list[Screened]:
@@ -209,7 +221,7 @@ def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit) -> tu
 def _promising_waves(found: list[Screened], chi2: float) -> list[Screened]:
     """The first start of each of the two effects, or pairs, with a wave that promise most, if they promise much."""
     much = [start for start in found if start.chi2 < chi2 - _PROMISING_MUCH]
-    waves = [start for start in much if any(axis.name == "phase_rad" for axis in start.form.axes)]
+    waves = [start for start in much if _is_wave(start.form)]
     first = {frozenset(start.form.effects): start for start in reversed(waves)}
     return sorted(first.values(), key=lambda start: start.chi2)[:2]
 
