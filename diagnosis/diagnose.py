@@ -55,8 +55,8 @@ _CONTENDERS, _CONTENDS = 3, 0.3  # single effects, if they close this share of w
 # load whose wave began anew in every run one of 7.7 %; a clock that ran fast, a coupling that slipped and a loose plug, which a
 # path that free would take for scatter, 1 to 3 %.
 _STRONGEST_WAVE = 0.05
-# Times the expected chi2: right effects whose formula is another leave up to 2.5, a gain of the force sensor that stood for a
-# Coulomb friction never tried left 5.5. What is searched then takes as long as all before.
+# Times the expected chi2: right effects whose formula is another leave up to 2.5 (but one, seen by the force alone, 28), a gain
+# of the force sensor that stood for a Coulomb friction never tried left 5.5. What is searched then takes as long as all before.
 _DOUBTFUL = 3.0
 _WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
 

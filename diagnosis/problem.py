@@ -25,7 +25,7 @@ _PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_o
 # of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
 _SCALE_SPREAD = 0.004
 _KEPT = 24  # simulated runs, of 0.6 MB each
-_BURST = 1e100  # SI units, of a feature: its square must still be a number
+_DIVERGED = 1e100  # SI units, of a feature: its square must still be a number
 _SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
 
 
@@ -85,13 +85,13 @@ class Problem:
         """Features of the model, [features]; with a draw those of one rough and noisy run; NaN where no rig is like that."""
         parts: list[float] = []
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # where a far start of a refit makes the model burst
+            with np.errstate(over="ignore", invalid="ignore"):  # where a far start of a refit makes the model diverge
                 for run in self.runs:
                     parts += self._features(run, self.signals(run, point, draw)).values
         except ValidationError:
             return np.full(len(self.measured), np.nan)
         features = np.array(parts)
-        return np.where(np.abs(features) < _BURST, features, np.nan)
+        return np.where(np.abs(features) < _DIVERGED, features, np.nan)
 
     def signals(self, run: Prepared, point: Point, draw: Draw | None = None) -> Signals:
         """Predicted signals of one run, as its sensors would show them."""

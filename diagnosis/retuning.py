@@ -23,7 +23,7 @@ _MARGIN = 1.2  # on the roughness: too small a floor makes causes out of scatter
 # What surfaces lie within, a factor of two of 0.3 %, says as much as this many slips; breakaway and re-stick count twice. Pooled
 # over the segments, the estimate is off by 28 % (rms over 26 rigs).
 _SLIPS_OF_OTHERS = 8.0
-# Rougher than that is no surface but an effect: friction that varies along the track makes the breakaways scatter too, and would
+# Rougher than 0.5 % is no surface but an effect: friction that varies along the track makes the breakaways scatter too, and would
 # be in the floor. Of 28 rigs without a gap the scatter said 0.04 to 0.53 %, of 13 with friction or load that vary 0.47 to 2.7 %.
 _SMOOTHEST, _ROUGHEST = 0.002, 0.005
 FIRST_REPLICATES, REPLICATES = 12, 32

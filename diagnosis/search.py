@@ -7,7 +7,7 @@ away, into a valley of its own. What survives is refitted, and only the refit co
 
 import math
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,9 @@ class Screened(NamedTuple):
     w: Floats
     chi2: float
     unmoved: tuple[Floats, Floats]  # deviations and w with the nuisances where they were
+
+
+_Formed = TypeVar("_Formed", Screened, Trial)
 
 
 class Origin(NamedTuple):
@@ -149,12 +152,13 @@ def refitted_rest(
     Screening sent a roll-off of 9 kHz to 23, from where it came to 310; from 4 kHz, where it was to be tried, to 77. A wave
     begins where the data have it, or nowhere.
     """
-    seen = {tuple(one.form.forms.items()) for one in found[-1][:_QUICK]}
-    starts = [one for one in _first_of_each_form(found[-1]) if tuple(one.form.forms.items()) not in seen]
-    fits = _refitted(fitter, origins[0].fit.chi2, starts, [], jobs, _FULL)
-    first = {tuple(one.form.forms.items()): one for one in reversed(trials) if not _is_wave(one.form)}
+    passed_over = _first_of_each_form(found[-1])
+    for one in found[-1][:_QUICK]:
+        passed_over.pop(_key(one.form), None)
+    fits = _refitted(fitter, origins[0].fit.chi2, list(passed_over.values()), [], jobs, _FULL)
     described = origins[-1].fit.deviations
-    fits += each(jobs, refit, fitter, [(one.form, described, one.w) for one in first.values()])
+    as_tried = _first_of_each_form([trial for trial in trials if not _is_wave(trial.form)]).values()
+    fits += each(jobs, refit, fitter, [(trial.form, described, trial.w) for trial in as_tried])
     return best_of_each(sorted(fits, key=lambda fit: fit.chi2))
 
 
@@ -164,17 +168,20 @@ def pairs_with(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int = 1) -
     `pairs_of_effects` begins before the single effects are where they end. From a Coulomb friction that was not there yet the
     Stribeck velocity beside it was passed over, and with it chi2 falls from 2609 to 264.
     """
-    others = [trial for trial in trials if not set(trial.form.effects) & set(first.form.effects)]
-    starts = _first_of_each_form(_screened(fitter, first, KNEE, others, jobs))
-    return _refitted(fitter, first.chi2, starts, [], jobs, _FULL)
+    starts = _first_of_each_form(_beside(fitter, first, trials, jobs)).values()
+    return _refitted(fitter, first.chi2, list(starts), [], jobs, _FULL)
 
 
 def _is_wave(form: Form) -> bool:
     return any(axis.name == "phase_rad" for axis in form.axes)
 
 
-def _first_of_each_form(found: list[Screened]) -> list[Screened]:
-    return list({tuple(one.form.forms.items()): one for one in reversed(found)}.values())
+def _key(form: Form) -> tuple[tuple[str, str], ...]:
+    return tuple(form.forms.items())
+
+
+def _first_of_each_form(found: list[_Formed]) -> dict[tuple[tuple[str, str], ...], _Formed]:
+    return {_key(one.form): one for one in reversed(found)}
 
 
 def pairs_of_effects(
@@ -197,8 +204,7 @@ def pairs_of_effects(
         firsts = [one for one in singles[:_PAIRED] if base.chi2 - one.chi2 > _WORTH_PAIRING * (base.chi2 - best)]
     starts: list[Screened] = []
     for first in firsts:
-        others = [trial for trial in trials if not set(trial.form.effects) & set(first.form.effects)]
-        starts += _screened(fitter, first, KNEE, others, jobs)[:_QUICK]
+        starts += _beside(fitter, first, trials, jobs)[:_QUICK]
     worth = sorted((one for one in starts if one.chi2 < best - _LEAST_OF_SECOND), key=lambda one: one.chi2)
     return _refitted(fitter, best, worth[:_QUICK], _promising_waves(worth, best), jobs, _FULL_PAIRS)
 
@@ -256,6 +262,12 @@ def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs:
     """All trials that change anything, the most promising first."""
     shares = each(jobs, _screened_share, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
     return sorted(chain.from_iterable(shares), key=lambda one: one.chi2)
+
+
+def _beside(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int) -> list[Screened]:
+    """The trials of other effects beside one that is there."""
+    others = [trial for trial in trials if not set(trial.form.effects) & set(first.form.effects)]
+    return _screened(fitter, first, KNEE, others, jobs)
 
 
 def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened]:

@@ -158,9 +158,9 @@ def judge(
     # what an effect must pay it owes to `unexplained` where `none` is out: every model wrong, the least wrong one is no cause
     credited = 1.0 if hidden_by_noise(base, expected_chi2) else _CLOSED_BY_UNKNOWN
     unknown = 0.5 * credited * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
-    if best is not None:  # what is unwritten would cost as much freedom as the best of what is written
-        freedom = 0.5 * (base.chi2 - best.fit.chi2) / (scale * JITTER) - best.evidence
-        unknown -= freedom if is_random(best.fit.form) else max(freedom - _COST_OF_UNKNOWN, 0.0)
+    # a random path pays for its freedom, and what nobody wrote down would pay as much for closing what it closes
+    if best is not None and is_random(best.fit.form):
+        unknown -= 0.5 * (base.chi2 - best.fit.chi2) / (scale * JITTER) - best.evidence
     if against_none > 0.0:
         scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
     else:
