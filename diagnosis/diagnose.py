@@ -41,7 +41,6 @@ from diagnosis.search import (
     screened,
 )
 from diagnosis.summary import summary
-from diagnosis.twin import Roughness
 from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, hidden_by_noise, judge, much_left
 from diagnosis.workers import each
 
@@ -101,6 +100,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
             pairs = _finished(fitter, _with(pairs, pairs_with(fitter, singles[0], tried, jobs)), expected_chi2, jobs)
             singles = _again(fitter, singles, _alone(pairs), jobs)
         verdict = judge(retuned, singles, pairs, expected_chi2)
+    random: list[RandomFriction] = []
     if _may_scatter(verdict, retuned, singles, pairs, expected_chi2):
         progress("could what is left be friction that varies at random?", 0.75)
         random = [_random(effect, fitter, retuned, singles) for effect in RANDOM_EFFECTS]
@@ -109,10 +109,17 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit)
         checked = judge(without, [again], [], expected_chi2)
         if checked.named is None:
-            retuned, singles, verdict = without, [again], checked
+            retuned, singles, pairs, random, verdict = without, [again], [], [], checked
     best = verdict.named or retuned
+    unseen = [run for run in runs if run.holdout]
+    held_out: HeldOut | None = None
+    if unseen:
+        problem = Problem(evidence.rig, unseen)
+        held_out = HeldOut(problem, fitter.nuisances, best, retuned, roughness, jobs)
+        if verdict.kind != "unexplained" and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
+            verdict, best = judge(retuned, singles, pairs, expected_chi2, random, refuted=True), retuned
     progress(f"verdict: {verdict.kind}", 0.8)
-    return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, roughness, began, jobs)
+    return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, held_out, began, jobs)
 
 
 def _may_scatter(verdict: Verdict, retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> bool:
@@ -200,16 +207,14 @@ def _assembled(
     singles: list[Fit],
     verdict: Verdict,
     tried: list[Trial],
-    roughness: Roughness,
+    held_out: HeldOut | None,
     began: float,
     jobs: int,
 ) -> Diagnosis:
     nuisances = fitter.nuisances
-    unseen = [run for run in runs if run.holdout]
     cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(retuned.deviations, {})))
     judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
-    if unseen:
-        held_out = HeldOut(Problem(evidence.rig, unseen), nuisances, best, retuned, roughness, jobs)
+    if held_out is not None:
         cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
         judged = _judged(fitter, held_out, retuned, best, verdict, tried, jobs)
     total = sum(cell.share for cell in cells)
@@ -259,7 +264,7 @@ def _judged(
     if verdict.named is not None:
         compared.append(_shrinkage(" and ".join(best.form.effects), closed))
     if verdict.runner_up is not None:
-        compared.append(_shrinkage(verdict.runner_up.form.effects[0], held_out.closed_by(verdict.runner_up)))
+        compared.append(_shrinkage(" and ".join(verdict.runner_up.form.effects), held_out.closed_by(verdict.runner_up)))
     compared.append(_shrinkage("parameters alone", held_out.closed_by(retuned)))
     blend = flexible_differences(fitter, retuned, tried, held_out, jobs)
     compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))
@@ -274,6 +279,7 @@ def _judged(
         shrinkage=closed.shrinkage if named else None,
         interval_90=closed.interval_90 if named else None,
         compared=tuple(compared),
+        refuted=verdict.refuted,
     )
 
 

@@ -59,6 +59,7 @@ class Gap(NamedTuple):
     shrinkage: float | None
     interval_90: tuple[float, float] | None
     compared: tuple[Shrinkage, ...]  # best effect, runner-up, parameters alone, flexible residual
+    refuted: tuple[str, ...] = ()  # effects that the fitted runs would have named, or `none`, and these do not bear out
 
 
 class Parameter(NamedTuple):

@@ -80,6 +80,7 @@ class Verdict(NamedTuple):
     runner_up: Fit | None
     ranked: tuple[Model, ...]  # single effects by evidence, the best first
     scale: float  # the misfit that all evidence is divided by
+    refuted: tuple[str, ...] = ()  # effects that won, or `none`, and that the runs kept aside do not bear out
 
 
 def much_left(fit: Fit, expected_chi2: float) -> bool:
@@ -102,7 +103,12 @@ def occam(fit: Fit) -> float:
 
 
 def judge(
-    base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, random: Sequence[RandomFriction] = ()
+    base: Fit,
+    singles: list[Fit],
+    pairs: list[Fit],
+    expected_chi2: float,
+    random: Sequence[RandomFriction] = (),
+    refuted: bool = False,
 ) -> Verdict:
     """The verdict over single effects and pairs of them.
 
@@ -111,6 +117,7 @@ def judge(
         singles, pairs: the best fit of each, best first.
         expected_chi2: of a perfect model.
         random: effects that vary at random, to be judged alone and on top of the best single effects.
+        refuted: the runs kept aside do not bear out what wins here.
 
     """
 
@@ -174,14 +181,19 @@ def judge(
         scores.setdefault(name, -30.0)
     top = max(scores, key=lambda name: scores[name])
     leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
+    gone: tuple[str, ...] = ()
+    if refuted:
+        scores["unexplained"] = scores[top] + _COST_OF_UNKNOWN
+        gone, top, leaders = leaders, "unexplained", ("unexplained",)
     mistaken = _mistaken(leaders, best is not None and is_random(best.fit.form))
     probabilities = _with_mistakes(_softmax(scores), leaders, mistaken)
     if best is None or top == "none":
-        return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
+        kind = "unexplained" if refuted else "no-gap"
+        return Verdict(kind, None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale, gone)
     followed = [one.fit for one in ranked if not is_random(one.fit.form)]  # no run separates a path from a path
     if top == "unexplained":
         nearest = followed[0] if followed and is_random(best.fit.form) else best.fit
-        return Verdict("unexplained", None, probabilities, nearest, tuple(ranked), scale)
+        return Verdict("unexplained", None, probabilities, nearest, tuple(ranked), scale, gone)
     others = [fit for fit in followed if fit is not best.fit and fit.form.effects[0] not in best.fit.form.effects]
     runner_up = others[0] if others else None
     return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)

@@ -103,7 +103,7 @@ def few_effects(monkeypatch):
 
 @pytest.mark.usefixtures("few_effects")
 def test_nothing_leaks_from_the_held_out_run(short, tmp_path):
-    """Another held-out run changes what is judged, and not a digit of what was fitted."""
+    """A held-out run of another rig refutes the name, and changes not a digit of what was fitted."""
     own, other, alien = (tmp_path / name for name in ("own", "other", "alien"))
     make_evidence(own, Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
     make_evidence(alien, Case(short), seed=99)
@@ -111,9 +111,24 @@ def test_nothing_leaks_from_the_held_out_run(short, tmp_path):
     shutil.copy(alien / "run-03.parquet", other / "run-03.parquet")
     one, two = (diagnosis.diagnose.diagnose(load_evidence(folder), quiet) for folder in (own, other))
     assert one.effects == ("drive-damping",)
-    assert one.candidates == two.candidates
-    assert one.rig == two.rig
+    assert {(c.effect, c.chi2) for c in one.candidates} == {(c.effect, c.chi2) for c in two.candidates}
+    fitted = ({c.effect: c.parameters for c in found.candidates} for found in (one, two))
+    assert next(fitted) == next(fitted)
     assert one.gap.retuned != two.gap.retuned
+    assert (two.verdict, two.effects, two.gap.refuted) == ("unexplained", (), ("drive-damping",))
+    assert two.candidates[0].effect == "unexplained"
+    assert "drive-damping explains the runs that were fitted, but run-03.parquet" in two.summary[1]
+
+
+@pytest.mark.usefixtures("few_effects")
+def test_a_held_out_run_that_is_far_off_refutes_no_gap(short, tmp_path):
+    make_evidence(tmp_path / "own", Case(short), seed=21)
+    make_evidence(tmp_path / "alien", Case(short, {"drive-damping": {"damping_Ns_per_m": 40.0}}), seed=99)
+    shutil.copy(tmp_path / "alien" / "run-03.parquet", tmp_path / "own" / "run-03.parquet")
+    found = diagnosis.diagnose.diagnose(load_evidence(tmp_path / "own"), quiet)
+    assert (found.verdict, found.gap.refuted) == ("unexplained", ("none",))
+    assert found.gap.retuned > 2.0
+    assert "yet run-03.parquet, kept aside" in found.summary[1]
 
 
 @pytest.mark.usefixtures("few_effects")
