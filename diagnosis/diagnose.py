@@ -109,14 +109,14 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit)
         checked = judge(without, [again], [], expected_chi2)
         if checked.named is None:
-            retuned, singles, pairs, random, verdict = without, [again], [], [], checked
+            retuned, singles, verdict = without, [again], checked
     best = verdict.named or retuned
     unseen = [run for run in runs if run.holdout]
     held_out: HeldOut | None = None
     if unseen:
         problem = Problem(evidence.rig, unseen)
         held_out = HeldOut(problem, fitter.nuisances, best, retuned, roughness, jobs)
-        if verdict.kind != "unexplained" and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
+        if verdict.named is not None and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
             verdict, best = judge(retuned, singles, pairs, expected_chi2, random, refuted=True), retuned
     progress(f"verdict: {verdict.kind}", 0.8)
     return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, held_out, began, jobs)

@@ -24,7 +24,6 @@ _SMALLEST_GAP = 0.05  # above the floor: less leaves nothing to divide by
 # Of chi2 above the expected: a name closes this share, or it is refuted. Of 56 right ones the least closed 0.27, a drift of two
 # detection limits, the next 0.37; a tilted track named as bias and wave 0.17, one as a drift -0.5, a seal as a static level -1.5.
 _LEAST_CLOSED = 0.25
-_FAR_WITHOUT_GAP = 2.0  # floors; evidence without a gap shows 0.6 to 1.7
 _CHANCE = 8.0  # of chi2 that a right one may be worse by, where it shows little: a seal named as ageing was by 16
 
 
@@ -77,12 +76,10 @@ class HeldOut:
         return self._closed(here, drawn)
 
     def refutes(self, fit: Fit, expected_chi2: float) -> bool:
-        """Whether these runs do not bear out a fit: nothing shows of its effects, or a gap where it has none.
+        """Whether these runs show nothing of what a fit promises: it leaves about as much as the rig without effects, or more.
 
         `expected_chi2` is what a perfect model leaves of one compared feature. What varies at random promises no path.
         """
-        if not fit.form.effects:
-            return self.retuned > _FAR_WITHOUT_GAP
         if is_random(fit.form):
             return False
         above = max(self._chi2_retuned - expected_chi2 * len(self.floor.whitening), 0.0)

@@ -80,7 +80,7 @@ class Verdict(NamedTuple):
     runner_up: Fit | None
     ranked: tuple[Model, ...]  # single effects by evidence, the best first
     scale: float  # the misfit that all evidence is divided by
-    refuted: tuple[str, ...] = ()  # effects that won, or `none`, and that the runs kept aside do not bear out
+    refuted: tuple[str, ...] = ()  # effects that won, and of which the runs kept aside show nothing
 
 
 def much_left(fit: Fit, expected_chi2: float) -> bool:
@@ -117,7 +117,7 @@ def judge(
         singles, pairs: the best fit of each, best first.
         expected_chi2: of a perfect model.
         random: effects that vary at random, to be judged alone and on top of the best single effects.
-        refuted: the runs kept aside do not bear out what wins here.
+        refuted: the runs kept aside show nothing of the effect that wins here.
 
     """
 
@@ -180,19 +180,18 @@ def judge(
     for name in EFFECTS:
         scores.setdefault(name, -30.0)
     top = max(scores, key=lambda name: scores[name])
-    leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
-    gone: tuple[str, ...] = ()
     if refuted:
         scores["unexplained"] = scores[top] + _COST_OF_UNKNOWN
-        gone, top, leaders = leaders, "unexplained", ("unexplained",)
+        top = "unexplained"
+    leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
     mistaken = _mistaken(leaders, best is not None and is_random(best.fit.form))
     probabilities = _with_mistakes(_softmax(scores), leaders, mistaken)
     if best is None or top == "none":
-        kind = "unexplained" if refuted else "no-gap"
-        return Verdict(kind, None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale, gone)
+        return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
     followed = [one.fit for one in ranked if not is_random(one.fit.form)]  # no run separates a path from a path
     if top == "unexplained":
         nearest = followed[0] if followed and is_random(best.fit.form) else best.fit
+        gone = best.fit.form.effects if refuted else ()
         return Verdict("unexplained", None, probabilities, nearest, tuple(ranked), scale, gone)
     others = [fit for fit in followed if fit is not best.fit and fit.form.effects[0] not in best.fit.form.effects]
     runner_up = others[0] if others else None

@@ -121,17 +121,6 @@ def test_nothing_leaks_from_the_held_out_run(short, tmp_path):
 
 
 @pytest.mark.usefixtures("few_effects")
-def test_a_held_out_run_that_is_far_off_refutes_no_gap(short, tmp_path):
-    make_evidence(tmp_path / "own", Case(short), seed=21)
-    make_evidence(tmp_path / "alien", Case(short, {"drive-damping": {"damping_Ns_per_m": 40.0}}), seed=99)
-    shutil.copy(tmp_path / "alien" / "run-03.parquet", tmp_path / "own" / "run-03.parquet")
-    found = diagnosis.diagnose.diagnose(load_evidence(tmp_path / "own"), quiet)
-    assert (found.verdict, found.gap.refuted) == ("unexplained", ("none",))
-    assert found.gap.retuned > 2.0
-    assert "yet run-03.parquet, kept aside" in found.summary[1]
-
-
-@pytest.mark.usefixtures("few_effects")
 def test_the_number_of_processes_changes_not_a_digit(short, tmp_path):
     make_evidence(tmp_path / "damped", Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
     one, two = (diagnosis.diagnose.diagnose(load_evidence(tmp_path / "damped"), quiet, jobs) for jobs in (1, 2))

@@ -43,13 +43,6 @@ def test_what_the_runs_kept_aside_refute_is_unexplained():
     assert next(iter(verdict.probabilities)) == "unexplained"
 
 
-@pytest.mark.parametrize("singles", [[], [fit(48.0, "coulomb-level")]])
-def test_no_gap_is_refuted_too(singles):
-    verdict = judge(fit(50.0), singles, [], EXPECTED, refuted=True)
-    assert (verdict.kind, verdict.refuted) == ("unexplained", ("none",))
-    assert next(iter(verdict.probabilities)) == "unexplained"
-
-
 @pytest.mark.parametrize(("expected", "kind"), [(40.0, "effect"), (50.0, "unexplained")])
 def test_where_noise_hides_the_slips_an_effect_must_leave_nothing(expected, kind):
     assert judge(fit(1000.0), [fit(250.0, "coulomb-level")], [], expected).kind == kind
