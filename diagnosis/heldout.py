@@ -1,4 +1,4 @@
-"""How far an explanation closes the gap, on runs that no fit has seen, and whether they show anything of it at all.
+"""How far an explanation closes the gap, on runs that no fit has seen, and whether they bear it out at all.
 
 The held-out runs are a problem of their own: the fitter that knows the fitted runs never holds them, so nothing can leak.
 """
@@ -21,8 +21,8 @@ _DRAWS = 8  # of a fit's parameters
 _RESAMPLES = 400  # of the cells
 _SEED = 3
 _SMALLEST_GAP = 0.05  # above the floor: less leaves nothing to divide by
-# Of chi2 above the expected: a name closes this share, or it is refuted. Of 56 right ones the least closed 0.27, a drift of two
-# detection limits, the next 0.37; a tilted track named as bias and wave 0.17, one as a drift -0.5, a seal as a static level -1.5.
+# Of chi2 above the expected: a name closes this share, or it is refuted. Of 56 right ones the least closed 0.26, a drift of two
+# detection limits, the next 0.36; a tilted track named as bias and wave 0.17, one as a drift -0.5, a seal as a static level -1.5.
 _LEAST_CLOSED = 0.25
 _CHANCE = 8.0  # of chi2 that a right one may be worse by, where it shows little: a seal named as ageing was by 16
 
@@ -76,7 +76,7 @@ class HeldOut:
         return self._closed(here, drawn)
 
     def refutes(self, fit: Fit, expected_chi2: float) -> bool:
-        """Whether these runs show nothing of what a fit promises: it leaves about as much as the rig without effects, or more.
+        """Whether these runs do not bear a fit out: it leaves nearly as much of them as the rig without effects, or more.
 
         `expected_chi2` is what a perfect model leaves of one compared feature. What varies at random promises no path.
         """

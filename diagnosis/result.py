@@ -59,7 +59,7 @@ class Gap(NamedTuple):
     shrinkage: float | None
     interval_90: tuple[float, float] | None
     compared: tuple[Shrinkage, ...]  # best effect, runner-up, parameters alone, flexible residual
-    refuted: tuple[str, ...] = ()  # what the fitted runs would have named, and these show nothing of
+    refuted: tuple[str, ...] = ()  # what the fitted runs would have named, and these do not bear out
 
 
 class Parameter(NamedTuple):

@@ -45,7 +45,7 @@ class Screened(NamedTuple):
     unmoved: tuple[Floats, Floats]  # deviations and w with the nuisances where they were
 
 
-_Formed = TypeVar("_Formed", Screened, Trial)
+_Formed = TypeVar("_Formed", Fit, Screened, Trial)
 
 
 class Origin(NamedTuple):
@@ -152,12 +152,11 @@ def refitted_rest(
     Screening sent a roll-off of 9 kHz to 23, from where it came to 310; from 4 kHz, where it was to be tried, to 77. A wave
     begins where the data have it, or nowhere.
     """
-    passed_over = _first_of_each_form(found[-1])
-    for one in found[-1][:_QUICK]:
-        passed_over.pop(_key(one.form), None)
-    fits = _refitted(fitter, origins[0].fit.chi2, list(passed_over.values()), [], jobs, _FULL)
+    seen = best_of_each(found[-1][:_QUICK], by_form=True)
+    passed_over = best_of_each(found[-1], by_form=True)[len(seen) :]
+    fits = _refitted(fitter, origins[0].fit.chi2, passed_over, [], jobs, _FULL)
     described = origins[-1].fit.deviations
-    as_tried = _first_of_each_form([trial for trial in trials if not _is_wave(trial.form)]).values()
+    as_tried = best_of_each([trial for trial in trials if not _is_wave(trial.form)], by_form=True)
     fits += each(jobs, refit, fitter, [(trial.form, described, trial.w) for trial in as_tried])
     return best_of_each(sorted(fits, key=lambda fit: fit.chi2))
 
@@ -168,20 +167,12 @@ def pairs_with(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int = 1) -
     `pairs_of_effects` begins before the single effects are where they end. From a Coulomb friction that was not there yet the
     Stribeck velocity beside it was passed over, and with it chi2 falls from 2609 to 264.
     """
-    starts = _first_of_each_form(_beside(fitter, first, trials, jobs)).values()
-    return _refitted(fitter, first.chi2, list(starts), [], jobs, _FULL)
+    starts = best_of_each(_beside(fitter, first, trials, jobs), by_form=True)
+    return _refitted(fitter, first.chi2, starts, [], jobs, _FULL)
 
 
 def _is_wave(form: Form) -> bool:
     return any(axis.name == "phase_rad" for axis in form.axes)
-
-
-def _key(form: Form) -> tuple[tuple[str, str], ...]:
-    return tuple(form.forms.items())
-
-
-def _first_of_each_form(found: list[_Formed]) -> dict[tuple[tuple[str, str], ...], _Formed]:
-    return {_key(one.form): one for one in reversed(found)}
 
 
 def pairs_of_effects(
@@ -289,13 +280,13 @@ def refit(fitter: Fitter, start: Start) -> Fit:
     return fitter.refit(*start)
 
 
-def best_of_each(fits: list[Fit], by_form: bool = False) -> list[Fit]:
-    """The first fit of every effect, or of every form of it, in their order."""
+def best_of_each(found: list[_Formed], by_form: bool = False) -> list[_Formed]:
+    """The first of every effect, or of every form of it, in their order."""
     seen: set[frozenset[tuple[str, str]]] = set()
-    result: list[Fit] = []
-    for fit in fits:
-        key = frozenset((name, form if by_form else "") for name, form in fit.form.forms.items())
+    result: list[_Formed] = []
+    for one in found:
+        key = frozenset((name, form if by_form else "") for name, form in one.form.forms.items())
         if key not in seen:
             seen.add(key)
-            result.append(fit)
+            result.append(one)
     return result

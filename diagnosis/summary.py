@@ -31,7 +31,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             names = " and ".join(gap.refuted)
             with_it = next(one.gap for one in gap.compared if one.who == names)
             sentences.append(
-                f"{names} explains the runs that were fitted, but {', '.join(gap.runs)}, kept aside, shows nothing of it: "
+                f"{names} explains the runs that were fitted, but not {', '.join(gap.runs)}, kept aside: "
                 f"there the gap is {times(with_it)} noise floors with it, {times(gap.retuned)} without."
             )
     if gap.runs and math.isfinite(gap.nominal):

@@ -80,7 +80,7 @@ class Verdict(NamedTuple):
     runner_up: Fit | None
     ranked: tuple[Model, ...]  # single effects by evidence, the best first
     scale: float  # the misfit that all evidence is divided by
-    refuted: tuple[str, ...] = ()  # effects that won, and of which the runs kept aside show nothing
+    refuted: tuple[str, ...] = ()  # effects that won, and that the runs kept aside do not bear out
 
 
 def much_left(fit: Fit, expected_chi2: float) -> bool:
@@ -117,7 +117,7 @@ def judge(
         singles, pairs: the best fit of each, best first.
         expected_chi2: of a perfect model.
         random: effects that vary at random, to be judged alone and on top of the best single effects.
-        refuted: the runs kept aside show nothing of the effect that wins here.
+        refuted: the runs kept aside do not bear out the effect that wins here.
 
     """
 
