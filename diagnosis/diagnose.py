@@ -32,17 +32,17 @@ from diagnosis.search import (
     Origin,
     Start,
     best_of_each,
+    each_beside,
     middle_fits,
     pairs_of_effects,
     pairs_with,
-    refit,
+    refits,
     refitted,
     refitted_rest,
     screened,
 )
 from diagnosis.summary import summary
 from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, hidden_by_noise, judge, much_left
-from diagnosis.workers import each
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
@@ -106,7 +106,7 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         random = [_random(effect, fitter, retuned, singles) for effect in RANDOM_EFFECTS]
         verdict = judge(retuned, singles, pairs, expected_chi2, random)
     if _refittable(verdict) and verdict.ranked[0].evidence < _SURE:
-        without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit)
+        without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit, jobs)
         checked = judge(without, [again], [], expected_chi2)
         if checked.named is None:
             retuned, singles, verdict = without, [again], checked
@@ -150,7 +150,7 @@ def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> Ra
 def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int) -> list[Fit]:
     """The fits, best first, the leading ones refitted as long as that gains where they leave much."""
     leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2) and not fit.finished]
-    return _with(fits, each(jobs, Fitter.further, fitter, leading))
+    return _with(fits, each_beside(jobs, Fitter.further, fitter, leading))
 
 
 def _alone(pairs: list[Fit]) -> list[Start]:
@@ -190,7 +190,7 @@ def _starts_of_contenders(retuned: Fit, contenders: list[Fit]) -> list[Start]:
 
 def _again(fitter: Fitter, singles: list[Fit], starts: list[Start], jobs: int) -> list[Fit]:
     """Single effects, best first, after refits from other starts."""
-    return _with(singles, each(jobs, refit, fitter, starts))
+    return _with(singles, refits(fitter, starts, jobs))
 
 
 def _with(fits: list[Fit], more: list[Fit]) -> list[Fit]:

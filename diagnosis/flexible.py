@@ -31,25 +31,19 @@ def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_ou
     shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
     blended = np.stack(columns, axis=1) @ shares
     moved = directions.moved(blended, 1.0) - base.deviations
-    unseen = _predicted(fitter, held_out, base.deviations, None)
+    points = [fitter.nuisances.point(base.deviations, {})]
+    points += [fitter.nuisances.point(base.deviations, trial.form.tables(trial.w)) for trial in trials]
+    points += [fitter.nuisances.point(ahead, {}) for ahead in base.deviations + _STEP * np.eye(len(moved))]
+    unseen, *others = held_out.problem.predicted_many(points)
     total = unseen.copy()
-    for trial, share in zip(trials, shares.tolist(), strict=True):
-        total += share * _finite(_predicted(fitter, held_out, base.deviations, trial) - unseen)
-    for i, change in enumerate(moved.tolist()):
-        ahead = base.deviations.copy()
-        ahead[i] += _STEP
-        total += change / _STEP * _finite(_predicted(fitter, held_out, ahead, None) - unseen)
+    for share, there in zip([*shares, *(moved / _STEP)], others, strict=True):
+        total += share * _finite(there - unseen)
     return held_out.differences_of(total)
 
 
 def _shown(fitter: Fitter, work: tuple[Floats, list[Trial]]) -> list[Floats]:
     deviations, trials = work
-    return [fitter.predicted(deviations, trial.form.tables(trial.w)) for trial in trials]
-
-
-def _predicted(fitter: Fitter, held_out: HeldOut, deviations: Floats, trial: Trial | None) -> Floats:
-    effects = trial.form.tables(trial.w) if trial else {}
-    return held_out.problem.predicted(fitter.nuisances.point(deviations, effects))
+    return fitter.predicted_many([(deviations, trial.form.tables(trial.w)) for trial in trials])
 
 
 def _finite(values: Floats) -> Floats:

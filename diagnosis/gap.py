@@ -82,13 +82,13 @@ def replicates(problem: Problem, point: Point, roughness: Roughness, count: int,
 
 def _drawn(problem: Problem, share: tuple[Point, Roughness, int, list[int]]) -> list[Floats]:
     point, roughness, seed, numbers = share
-    drawn: list[Floats] = []
+    draws: list[Draw] = []
     for number in numbers:
         random = np.random.default_rng([seed, number])
         length_m = float(roughness.length_m * np.exp(random.uniform(-1.0, 1.0)))
         surface = Roughness(roughness.ratio, length_m, int(random.integers(1_000_000)))
-        drawn.append(problem.predicted(point, Draw(random, surface)))
-    return drawn
+        draws.append(Draw(random, surface))
+    return problem.predicted_many([point] * len(draws), draws)
 
 
 def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None = None) -> Floor:

@@ -3,6 +3,7 @@
 The held-out runs are a problem of their own: the fitter that knows the fitted runs never holds them, so nothing can leak.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,16 +65,15 @@ class HeldOut:
 
     def closed_by(self, fit: Fit) -> Closed:
         """The gap under a fit, with an interval from the spread over cells and the fit's own uncertainty."""
-        here = cell_squares(self.floor, self.differences(fit.deviations, fit.form, fit.w))
         random = np.random.default_rng(_SEED)
-        drawn = [here]
         spread = np.linalg.cholesky(fit.covariance() + 1e-12 * np.eye(len(fit.deviations) + len(fit.w)))
         at = np.concatenate([fit.deviations, fit.w])
-        for _ in range(_DRAWS):
-            moved = at + spread @ random.normal(size=len(at))
-            own = len(fit.deviations)
-            drawn.append(cell_squares(self.floor, self.differences(moved[:own], fit.form, moved[own:])))
-        return self._closed(here, drawn)
+        moved = [at, *(at + spread @ random.normal(size=len(at)) for _ in range(_DRAWS))]
+        own = len(fit.deviations)
+        drawn = [
+            cell_squares(self.floor, z) for z in self._differences(fit.form, [(one[:own], one[own:]) for one in moved])
+        ]
+        return self._closed(drawn[0], drawn)
 
     def refutes(self, fit: Fit, expected_chi2: float) -> bool:
         """Whether these runs do not bear a fit out: it leaves nearly as much of them as the rig without effects, or more.
@@ -116,10 +116,12 @@ class HeldOut:
 
     def differences(self, deviations: Floats, form: Form, w: Floats) -> Floats:
         """Measured less predicted in floors [compared]."""
+        return self._differences(form, [(deviations, w)])[0]
+
+    def _differences(self, form: Form, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
         floor = self._wider if is_random(form) else self.floor
-        return differences(
-            floor, self.problem, self.problem.predicted(self._nuisances.point(deviations, form.tables(w)))
-        )
+        points = [self._nuisances.point(deviations, form.tables(w)) for deviations, w in at]
+        return [differences(floor, self.problem, predicted) for predicted in self.problem.predicted_many(points)]
 
     def differences_of(self, predicted: Floats) -> Floats:
         """The same for a prediction [features] from elsewhere."""

@@ -1,5 +1,8 @@
 """Runs of one evidence made ready for comparison: measured features, and predicted ones for any parameters and effects."""
 
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,14 +20,15 @@ from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.reduced import BLOCK_S, reduce_run
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
-from diagnosis.twin import Effects, Entry, Roughness, Start, predict, rig_config
+from diagnosis.twin import Effects, Entry, Roughness, Start, predict, predict_many, rig_config
+from plant.config import RigConfig
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
 # of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
 _SCALE_SPREAD = 0.004
-_KEPT = 24  # simulated runs, of 0.6 MB each
+_KEPT = 32  # simulated runs, of 0.6 MB each
 _DIVERGED = 1e100  # SI units, of a feature: its square must still be a number
 _SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
 
@@ -58,6 +62,17 @@ class Draw(NamedTuple):
     roughness: Roughness
 
 
+class _Asked(NamedTuple):
+    """A run of the model as it is to be simulated."""
+
+    point: Point
+    draw: Draw | None
+    effects: Effects  # those that sensors have no part in
+    start: Start
+    entries: tuple[Entry, ...]
+    chain: Chain
+
+
 class Problem:
     """A set of runs under one rig table. Arrays of features are [features], the runs' features one after the other."""
 
@@ -66,7 +81,7 @@ class Problem:
         self.runs = runs
         self.scales = scales_of(rig)
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
-        self._simulated: dict[object, Signals] = {}
+        self._simulated: dict[object, Signals | None] = {}
         self._measured = [self._features(run, run.signals) for run in runs]
         self.measured = np.concatenate([np.array(found.values) for found in self._measured])
 
@@ -81,58 +96,43 @@ class Problem:
             (run.file, label) for run, found in zip(self.runs, self._measured, strict=True) for label in found.labels
         ]
 
-    def predicted(self, point: Point, draw: Draw | None = None) -> Floats:
-        """Features of the model, [features]; with a draw those of one rough and noisy run; NaN where no rig is like that."""
-        parts: list[float] = []
-        try:
-            with np.errstate(over="ignore", invalid="ignore"):  # where a far start of a refit makes the model diverge
-                for run in self.runs:
-                    parts += self._features(run, self.signals(run, point, draw)).values
-        except ValidationError:
-            return np.full(len(self.measured), np.nan)
-        features = np.array(parts)
-        return np.where(np.abs(features) < _DIVERGED, features, np.nan)
+    def predicted(self, point: Point) -> Floats:
+        """Features of the model, [features]; NaN where no rig is like that."""
+        return self.predicted_many([point])[0]
 
-    def signals(self, run: Prepared, point: Point, draw: Draw | None = None) -> Signals:
-        """Predicted signals of one run, as its sensors would show them."""
-        moving = {name: table for name, table in point.effects.items() if name not in SENSOR_EFFECTS}
-        if not run.commands.frequency_Hz.any():
-            moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
-        if "before_s" in moving.get("friction-drift", {}):
-            moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
-        moving = _with_paths(moving, run, draw)
-        t_s = run.start.t_s
-        start = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects, t_s))
-        entries = tuple(
-            entry._replace(force_N=true_force_N(entry.force_N, point.effects, t_s + entry.block * BLOCK_S))
-            for entry in run.entries
-        )
-        chain = point.chain
-        roughness = None
-        if draw is not None:
-            start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
-            chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
-            roughness = draw.roughness
-            entries = tuple(misread(entry, run.noise, draw.random) for entry in entries)
-        if self.rig.drive == "force":
-            return self._led(run, point, moving, start, draw)
-        raw = self._raw(run, run.commands, point.values, moving, start, roughness, entries, None)
-        result = sensed(raw, run.commands.frequency_Hz, point.effects, chain, t_s)
-        result = {name: result[name] for name in run.signals}
-        for name in result:
-            if name.endswith("shake_mps2"):
-                result[name] = np.hypot(result[name], run.noise.shake_mps2[name])
-        if draw is not None:
-            for name, values in result.items():
-                result[name] = values + run.noise.drawn(name, len(values), draw.random)
-        for name, (low, high) in run.clipped.items():
-            result[name] = np.clip(result[name], low, high)
+    def predicted_many(self, points: Sequence[Point], draws: Sequence[Draw] = ()) -> list[Floats]:
+        """As `predicted` of every point, in less time than one after the other; with draws those of rough and noisy runs."""
+        parts: list[list[float]] = [[] for _ in points]
+        with np.errstate(over="ignore", invalid="ignore"):  # where a far start of a refit makes the model diverge
+            for run in self.runs:
+                for part, signals in zip(parts, self._signals(run, points, draws or [None] * len(points)), strict=True):
+                    part.extend([math.nan] if signals is None else self._features(run, signals).values)
+        result: list[Floats] = []
+        for part in parts:
+            features = np.array(part) if len(part) == len(self.measured) else np.full(len(self.measured), np.nan)
+            result.append(np.where(np.abs(features) < _DIVERGED, features, np.nan))
         return result
 
-    def _led(self, run: Prepared, point: Point, moving: Effects, start: Start, draw: Draw | None) -> Signals:
-        """As `signals`, for a force drive: the force that leads the model along the measured motion."""
-        chain = relative(point.chain)
-        commands = true_commands(run.commands, point.effects, chain, run.start.t_s)
+    def signals(self, run: Prepared, point: Point) -> Signals:
+        """Predicted signals of one run, as its sensors would show them. Raises ValueError where no rig is like that."""
+        (found,) = self._signals(run, [point], [None])
+        if found is None:
+            raise ValueError(f"no rig is like that: {point}")
+        return found
+
+    def _signals(self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None]) -> list[Signals | None]:
+        """Of every point; None where no rig is like that."""
+        asked = [_asked(run, point, draw) for point, draw in zip(points, draws, strict=True)]
+        if self.rig.drive == "force":
+            return [self._led(run, one) for one in asked]
+        raws = self._raw(run, run.commands, asked)
+        return [None if raw is None else _shown(run, one, raw) for one, raw in zip(asked, raws, strict=True)]
+
+    def _led(self, run: Prepared, one: _Asked) -> Signals | None:
+        """As `_signals`, for a force drive: the force that leads the model along the measured motion."""
+        effects, draw = one.point.effects, one.draw
+        chain = relative(one.point.chain)
+        commands = true_commands(run.commands, effects, chain, run.start.t_s)
         blocks = len(commands.drive)
         noise: Signals = {}
         if draw is not None:
@@ -142,52 +142,96 @@ class Problem:
                 motion = motion._replace(position_m=motion.position_m + noise["mass_position_m"])
             # a disturbed input moves the mass, and what it takes to put that right is what noise costs
             commands = commands._replace(drive=commands.drive + noise["drive_force_N"], motion=motion)
-        sensors = {name: table for name, table in point.effects.items() if name in SENSOR_EFFECTS}
-        inputs = (
-            chain,
-            tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(sensors.items())),
-        )
-        raw = self._raw(run, commands, point.values, moving, start, draw.roughness if draw else None, (), inputs)
-        result = sensed(raw, commands.frequency_Hz, point.effects, chain, run.start.t_s)
+        sensors = {name: table for name, table in effects.items() if name in SENSOR_EFFECTS}
+        (raw,) = self._raw(run, commands, [one], (chain, _hashable(sensors)))
+        if raw is None:
+            return None
+        result = sensed(raw, commands.frequency_Hz, effects, chain, run.start.t_s)
         result = {name: result[name] for name in run.signals}
         for name, values in noise.items():
             result[name] = result[name] - values if name == "drive_force_N" else result[name] + values
         return result
 
     def _raw(
-        self,
-        run: Prepared,
-        commands: Commands,
-        values: dict[str, float],
-        effects: Effects,
-        start: Start,
-        roughness: Roughness | None,
-        entries: tuple[Entry, ...],
-        inputs: object,
-    ) -> Signals:
-        force_driven = self.rig.drive == "force"
-        if roughness is not None:
-            return predict(rig_config(self.rig, values, effects, roughness), force_driven, commands, start, entries)
-        key = (
-            run.file,
-            start.force_N,
-            entries,
-            inputs,
-            tuple(sorted(values.items())),
-            tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(effects.items())),
-        )
-        found = self._simulated.pop(key, None)
-        if found is None:
-            if len(self._simulated) > _KEPT:
-                self._simulated.pop(next(iter(self._simulated)))
-            found = predict(rig_config(self.rig, values, effects, None), force_driven, commands, start, entries)
-        self._simulated[key] = found  # the last one again: where all trials start from is asked for again and again
-        return found
+        self, run: Prepared, commands: Commands, asked: Sequence[_Asked], inputs: object = None
+    ) -> list[Signals | None]:
+        """Simulated signals; what was drawn is nobody's else, the rest may be there already."""
+        keys = [
+            number
+            if one.draw is not None
+            else (run.file, one.start.force_N, one.entries, inputs, _hashable({"": one.point.values} | one.effects))
+            for number, one in enumerate(asked)
+        ]
+        found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
+        todo = {key: one for key, one in zip(keys, asked, strict=True) if key not in found}
+        found |= zip(todo, self._simulate(commands, list(todo.values())), strict=True)
+        # at the end again: where all trials start from is asked for again and again
+        self._simulated |= {key: found[key] for key, one in zip(keys, asked, strict=True) if one.draw is None}
+        for key in list(self._simulated)[:-_KEPT]:
+            del self._simulated[key]
+        return [found[key] for key in keys]
+
+    def _simulate(self, commands: Commands, asked: Sequence[_Asked]) -> list[Signals | None]:
+        configs: dict[int, RigConfig] = {}
+        for number, one in enumerate(asked):
+            with suppress(ValidationError):
+                configs[number] = rig_config(
+                    self.rig, one.point.values, one.effects, one.draw.roughness if one.draw else None
+                )
+        starts = [asked[number].start for number in configs]
+        entries = [asked[number].entries for number in configs]
+        found = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries)
+        by_number = dict(zip(configs, found, strict=True))
+        return [by_number.get(number) for number in range(len(asked))]
 
     def _features(self, run: Prepared, signals: Signals) -> Features:
         if self.rig.drive == "force":
             return axis_features(signals, run.commands, self.rig)
         return spring_features(signals, run.commands, self.scales)
+
+
+def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
+    t_s = run.start.t_s
+    start = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects, t_s))
+    entries = tuple(
+        entry._replace(force_N=true_force_N(entry.force_N, point.effects, t_s + entry.block * BLOCK_S))
+        for entry in run.entries
+    )
+    chain = point.chain
+    if draw is not None:
+        start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
+        chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
+        entries = tuple(misread(entry, run.noise, draw.random) for entry in entries)
+    return _Asked(point, draw, _moving(run, point.effects, draw), start, entries, chain)
+
+
+def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
+    """The effects that move the rig in this run, as it shows them."""
+    moving = {name: table for name, table in effects.items() if name not in SENSOR_EFFECTS}
+    if not run.commands.frequency_Hz.any():
+        moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
+    if "before_s" in moving.get("friction-drift", {}):
+        moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
+    return _with_paths(moving, run, draw)
+
+
+def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
+    """What the sensors make of a simulated run."""
+    result = sensed(raw, run.commands.frequency_Hz, one.point.effects, one.chain, run.start.t_s)
+    result = {name: result[name] for name in run.signals}
+    for name in result:
+        if name.endswith("shake_mps2"):
+            result[name] = np.hypot(result[name], run.noise.shake_mps2[name])
+    if one.draw is not None:
+        for name, values in result.items():
+            result[name] = values + run.noise.drawn(name, len(values), one.draw.random)
+    for name, (low, high) in run.clipped.items():
+        result[name] = np.clip(result[name], low, high)
+    return result
+
+
+def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:
+    return tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(tables.items()))
 
 
 def _with_paths(effects: Effects, run: Prepared, draw: Draw | None) -> Effects:

@@ -82,11 +82,11 @@ class RandomFriction:
 
     def _drawn(self, fitter: Fitter, base: Fit, table: dict[str, float]) -> _Paths:
         here = fitter.predicted(base.deviations, base.effects)
+        paths = [{self.effect: {"form": RANDOM, "seed": seed, **table}} for seed in range(1, _DRAWS + 1)]
         shown: list[Floats] = []
-        for seed in range(1, _DRAWS + 1):
-            effects = base.effects | {self.effect: {"form": RANDOM, "seed": seed, **table}}
+        for measured in fitter.predicted_many([(base.deviations, base.effects | path) for path in paths]):
             varied = copy.copy(fitter.problem)
-            varied.measured = fitter.predicted(base.deviations, effects) + fitter.floor.bias
+            varied.measured = measured + fitter.floor.bias
             shown.append(whitened(fitter.floor, varied, here)[0])
         drawn = np.array(shown)
         covariance = np.cov(drawn, rowvar=False)

@@ -5,6 +5,7 @@ own columns at every step, since effects are as nonlinear as a gap that opens or
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from diagnosis.gap import KNEE, Floor, differences, whitened
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
+from diagnosis.together import At, Work, together
 from diagnosis.twin import Effects
 from plant.effects import EFFECTS
 
@@ -93,7 +95,7 @@ FAR_KNEE = 60.0
 _FAR = Stage(4, 1, FAR_KNEE)
 _NEAR = Stage(6, 1, KNEE)
 _RETUNE = Stage(9, 3, KNEE)  # what everything is measured against
-QUICK = Stage(2, 0, FAR_KNEE, columns=False)
+_QUICK = Stage(2, 0, FAR_KNEE, columns=False)
 _FAR_OFF = 3.0 * KNEE
 # of a tolerance, for derivatives: large against the grid, small against the curvature; the second and third time the other
 # way and wider, over the jumps that slips make where they come and go
@@ -147,7 +149,11 @@ class Fitter:
 
     def predicted(self, deviations: Floats, effects: Effects) -> Floats:
         """Features of the model, free of noise [features]."""
-        return self.problem.predicted(self.nuisances.point(deviations, effects))
+        return self.predicted_many([(deviations, effects)])[0]
+
+    def predicted_many(self, at: Sequence[At]) -> list[Floats]:
+        """As `predicted` of every point, in less time than one after the other."""
+        return self.problem.predicted_many([self.nuisances.point(deviations, effects) for deviations, effects in at])
 
     def whitened(self, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
         """Whitened compressed differences [compared], and the derivative of the compression there."""
@@ -161,40 +167,59 @@ class Fitter:
 
     def retuned(self, deviations: Floats) -> Fit:
         """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
-        fit = self.refit(NOTHING, deviations, np.zeros(0))
-        fit = self.fit(NOTHING, fit.deviations, fit.w, _RETUNE)
-        here = self.predicted(fit.deviations, {})
-        self._rates = self._nuisance_rates(fit.deviations, {}, here, _STEPS[0])
+        return together(self.predicted_many, [self.retuning(deviations)])[0]
+
+    def retuning(self, deviations: Floats) -> Work[Fit]:
+        """As `retuned`, beside others."""
+        fit = yield from self.refitting(NOTHING, deviations, np.zeros(0))
+        fit = yield from self.fitting(NOTHING, fit.deviations, fit.w, _RETUNE)
+        (here,) = yield [(fit.deviations, {})]
+        self._rates = yield from self._nuisance_rates(fit.deviations, {}, here, _STEPS[0])
         return fit
 
     def described(self, deviations: Floats) -> Fit:
         """The rig as it stands, with its nuisances' derivatives, under the wide compression of a far start."""
         here = self.predicted(deviations, {})
         residual, slope = self.whitened(here, FAR_KNEE)
-        rates = self._nuisance_rates(deviations, {}, here, _STEPS[0])
+        (rates,) = together(self.predicted_many, [self._nuisance_rates(deviations, {}, here, _STEPS[0])])
         chi2 = self._chi2(np.ones(len(deviations)), residual, deviations)
         return Fit(NOTHING, deviations, np.zeros(0), chi2, residual, self.floor.whitening @ (rates * slope[:, None]))
 
+    def refit(self, form: Form, deviations: Floats, w: Floats) -> Fit:
+        """Fit a form to the end, from a starting point that may be far off."""
+        return together(self.predicted_many, [self.refitting(form, deviations, w)])[0]
+
+    def quick(self, form: Form, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
+        """A form fitted a little, from the best of some starts, with the chi2 of the gap's own compression."""
+        there = yield [(deviations, form.tables(w)) for deviations, w in starts]
+        far = [self.far_chi2(form, *one) for one in zip(starts, there, strict=True)]
+        fit = yield from self.fitting(form, *starts[far.index(min(far))], _QUICK)
+        return (yield from self._judging(fit))
+
     def judged(self, fit: Fit) -> Fit:
         """A fit of any stage with the chi2 and the residual of the gap's own compression."""
-        residual, _ = self.whitened(self.predicted(fit.deviations, fit.effects))
+        return together(self.predicted_many, [self._judging(fit)])[0]
+
+    def _judging(self, fit: Fit) -> Work[Fit]:
+        (predicted,) = yield [(fit.deviations, fit.effects)]
+        residual, _ = self.whitened(predicted)
         chi2 = self._chi2(_prior(fit.form, fit.deviations), residual, np.concatenate([fit.deviations, fit.w]))
         return fit._replace(chi2=chi2, residual=residual)
 
-    def far_chi2(self, form: Form, deviations: Floats, w: Floats) -> float:
-        """chi2 of a point under the wide compression of a far start."""
-        residual, _ = self.whitened(self.predicted(deviations, form.tables(w)), FAR_KNEE)
-        return self._chi2(_prior(form, deviations), residual, np.concatenate([deviations, w]))
+    def far_chi2(self, form: Form, at: tuple[Floats, Floats], predicted: Floats) -> float:
+        """chi2 of a prediction [features] for nuisances and axes, under the wide compression of a far start."""
+        residual, _ = self.whitened(predicted, FAR_KNEE)
+        return self._chi2(_prior(form, at[0]), residual, np.concatenate(at))
 
-    def refit(self, form: Form, deviations: Floats, w: Floats) -> Fit:
-        """Fit a form to the end, from a starting point that may be far off."""
-        z = differences(self.floor, self.problem, self.predicted(deviations, form.tables(w)))
-        if np.abs(z).max() > _FAR_OFF:
-            fit = self.fit(form, deviations, w, _FAR)
+    def refitting(self, form: Form, deviations: Floats, w: Floats) -> Work[Fit]:
+        """As `refit`, beside others."""
+        (predicted,) = yield [(deviations, form.tables(w))]
+        if np.abs(differences(self.floor, self.problem, predicted)).max() > _FAR_OFF:
+            fit = yield from self.fitting(form, deviations, w, _FAR)
             deviations, w = fit.deviations, fit.w
-        return self.fit(form, deviations, w, _NEAR)
+        return (yield from self.fitting(form, deviations, w, _NEAR))
 
-    def further(self, fit: Fit) -> Fit:
+    def further(self, fit: Fit) -> Work[Fit]:
         """A fit refitted again as long as that gains: a lag in distance went from chi2 298 to 230, 212 and 85.
 
         Where no step gained any more, a refit from there took 4 % of chi2 at most, nothing in 18 of 24 (seven rigs).
@@ -202,19 +227,19 @@ class Fitter:
         for _ in range(_MORE_REFITS):
             if fit.finished:
                 break
-            again = self.refit(fit.form, fit.deviations, fit.w)
+            again = yield from self.refitting(fit.form, fit.deviations, fit.w)
             gains = again.chi2 < _GAINED * fit.chi2
             fit = min(fit, again, key=lambda one: one.chi2)
             if not gains:
                 break
         return fit._replace(finished=True)
 
-    def fit(self, form: Form, deviations: Floats, w: Floats, stage: Stage) -> Fit:
+    def fitting(self, form: Form, deviations: Floats, w: Floats, stage: Stage) -> Work[Fit]:
         """Fit a form from a starting point, in the way of one stage."""
         own = len(deviations)
         prior = _prior(form, deviations)
         now = np.concatenate([deviations, w])
-        here = self.predicted(now[:own], form.tables(now[own:]))
+        (here,) = yield [(deviations, form.tables(w))]
         residual, slope = self.whitened(here, stage.knee)
         chi2 = self._chi2(prior, residual, now)
         nuisance_rates = self._rates
@@ -224,7 +249,7 @@ class Fitter:
         for step in range(stage.steps + 1):
             if step == stage.steps and not stage.columns:
                 break
-            axis_rates = self._axis_rates(form, now[:own], now[own:], here)
+            axis_rates = yield from self._axis_rates(form, now[:own], now[own:], here)
             rates = np.column_stack([self._with_levels(nuisance_rates, axis_rates, form, now), axis_rates])
             columns = self.floor.whitening @ (rates * slope[:, None])
             if step == stage.steps:
@@ -235,7 +260,7 @@ class Fitter:
             for share in _SHARES:
                 ahead = now + share * change
                 ahead[:own] = np.clip(ahead[:own], -self._most, self._most)
-                there = self.predicted(ahead[:own], form.tables(ahead[own:]))
+                (there,) = yield [(ahead[:own], form.tables(ahead[own:]))]
                 new_residual, new_slope = self.whitened(there, stage.knee)
                 new_chi2 = self._chi2(prior, new_residual, ahead)
                 if new_chi2 < chi2:
@@ -246,7 +271,8 @@ class Fitter:
                 if renewed == stage.renewals:
                     finished = renewed > 0  # no step gains any more, with renewed derivatives
                     break
-                nuisance_rates = self._nuisance_rates(now[:own], form.tables(now[own:]), here, _STEPS[renewed])
+                size = _STEPS[renewed]
+                nuisance_rates = yield from self._nuisance_rates(now[:own], form.tables(now[own:]), here, size)
                 renewed += 1
         return Fit(form, now[:own], now[own:], chi2, residual, columns, finished)
 
@@ -266,24 +292,22 @@ class Fitter:
         held = prior * at
         return float(residual @ residual + held @ held)
 
-    def _nuisance_rates(self, deviations: Floats, effects: Effects, here: Floats, size: float) -> Floats:
-        columns: list[Floats] = []
-        for i in range(len(deviations)):
-            ahead = deviations.copy()
-            step = -size if ahead[i] > 0.0 else size
-            ahead[i] += step
-            columns.append(self._rate(here, self.predicted(ahead, effects), step))
-        return np.column_stack(columns)
+    def _nuisance_rates(self, deviations: Floats, effects: Effects, here: Floats, size: float) -> Work[Floats]:
+        steps = np.where(deviations > 0.0, -size, size)
+        ahead = deviations + np.diag(steps)
+        there = yield [(one, effects) for one in ahead]
+        return np.column_stack([self._rate(here, *one) for one in zip(there, steps.tolist(), strict=True)])
 
-    def _axis_rates(self, form: Form, deviations: Floats, w: Floats, here: Floats) -> Floats:
-        columns = np.zeros((int(self.floor.compared.sum()), len(w)))
+    def _axis_rates(self, form: Form, deviations: Floats, w: Floats, here: Floats) -> Work[Floats]:
+        steps = np.zeros(len(w))
         for i, axis in enumerate(form.axes):
-            step = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
+            steps[i] = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
             if axis.prior < _NARROW:  # the period of a wave that passes many times
-                step = 0.02 * axis.prior
-            ahead = w.copy()
-            ahead[i] += step
-            columns[:, i] = self._rate(here, self.predicted(deviations, form.tables(ahead)), step)
+                steps[i] = 0.02 * axis.prior
+        columns = np.zeros((int(self.floor.compared.sum()), len(w)))
+        there = yield [(deviations, form.tables(ahead)) for ahead in w + np.diag(steps)]
+        for i, one in enumerate(there):
+            columns[:, i] = self._rate(here, one, float(steps[i]))
         return columns
 
     def _rate(self, here: Floats, there: Floats, step: float) -> Floats:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
 from diagnosis.refit import NOTHING, Fit, Fitter
 from diagnosis.search import Directions
+from diagnosis.together import together
 from diagnosis.twin import Roughness
 from diagnosis.workers import each
 
@@ -63,18 +65,19 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     floor = floor_of(problem, point, replicates(problem, point, roughness, REPLICATES, 2, jobs), floor)
     # where slips come and go chi2 is jagged: from half the way 166 was found instead of 410
     starts = [fit.deviations, 0.5 * fit.deviations]
-    found = each(jobs, _retuned, Fitter(problem, floor, nuisances), starts)
-    fitter, fit = min(found, key=lambda one: one[1].chi2)
+    shares = each(jobs, _retuned, Fitter(problem, floor, nuisances), [starts[i::jobs] for i in range(jobs)])
+    fitter, fit = min(chain.from_iterable(shares), key=lambda one: one[1].chi2)
     expected = _expected_chi2(fitter, fit, roughness, jobs)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
     return Retuned(fitter, fit, roughness, expected)
 
 
-def _retuned(fitter: Fitter, deviations: Floats) -> tuple[Fitter, Fit]:
-    """The rig refitted from a start, and a fitter with the derivatives there."""
-    own = fitter.for_problem(fitter.problem)
-    return own, own.retuned(deviations)
+def _retuned(fitter: Fitter, starts: list[Floats]) -> list[tuple[Fitter, Fit]]:
+    """The rig refitted from every start, and a fitter with the derivatives there."""
+    fitters = [fitter.for_problem(fitter.problem) for _ in starts]
+    works = [own.retuning(deviations) for own, deviations in zip(fitters, starts, strict=True)]
+    return list(zip(fitters, together(fitter.predicted_many, works), strict=True))
 
 
 def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness, jobs: int) -> float:

@@ -6,6 +6,7 @@ away, into a valley of its own. What survives is refitted, and only the refit co
 """
 
 import math
+from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any, NamedTuple, TypeVar
 
@@ -14,7 +15,8 @@ import numpy.typing as npt
 
 from diagnosis.gap import KNEE
 from diagnosis.library import Trial
-from diagnosis.refit import NOTHING, QUICK, Fit, Fitter, Form
+from diagnosis.refit import NOTHING, Fit, Fitter, Form
+from diagnosis.together import Work, together
 from diagnosis.verdict import much_left
 from diagnosis.workers import each
 
@@ -46,6 +48,7 @@ class Screened(NamedTuple):
 
 
 _Formed = TypeVar("_Formed", Fit, Screened, Trial)
+T = TypeVar("T")
 
 
 class Origin(NamedTuple):
@@ -92,10 +95,9 @@ def added(base: Form, more: Form) -> Form:
     return Form(base.forms | more.forms, (*base.axes, *more.axes))
 
 
-def _screen(fitter: Fitter, origin: _Base, trial: Trial) -> Screened | None:
-    """Scale a trial's start so that it explains most; nothing where it changes nothing."""
+def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Screened | None:
+    """Scale a trial's start, where the model predicts `there`, so that it explains most; nothing where it changes nothing."""
     base, directions = origin.fit, origin.directions
-    there = fitter.predicted(base.deviations, base.effects | trial.form.tables(trial.w))
     column = fitter.column(origin.predicted, there, origin.slope)
     direction = directions.freed(column)
     power = float(direction @ direction)
@@ -157,7 +159,7 @@ def refitted_rest(
     fits = _refitted(fitter, origins[0].fit.chi2, passed_over, [], jobs, _FULL)
     described = origins[-1].fit.deviations
     as_tried = best_of_each([trial for trial in trials if not _is_wave(trial.form)], by_form=True)
-    fits += each(jobs, refit, fitter, [(trial.form, described, trial.w) for trial in as_tried])
+    fits += refits(fitter, [(trial.form, described, trial.w) for trial in as_tried], jobs)
     return best_of_each(sorted(fits, key=lambda fit: fit.chi2))
 
 
@@ -200,7 +202,7 @@ def pairs_of_effects(
     return _refitted(fitter, best, worth[:_QUICK], _promising_waves(worth, best), jobs, _FULL_PAIRS)
 
 
-def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit) -> tuple[Fit, Fit]:
+def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit, jobs: int = 1) -> tuple[Fit, Fit]:
     """The rig without effects and the named effect again, each from the same starts: the middle fit of each.
 
     Effects were refitted from many starts, the rig without from few: the best of many valleys of a jagged chi2 is deeper by
@@ -209,8 +211,8 @@ def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit) -> tu
     starts = [named, none, *(fit for fit in singles if fit is not named)][:_SAME_STARTS]
 
     def middle(form: Form, w: Floats) -> Fit:
-        fits = sorted((fitter.refit(form, start.deviations, w) for start in starts), key=lambda fit: fit.chi2)
-        return fits[len(fits) // 2]
+        fits = refits(fitter, [(form, start.deviations, w) for start in starts], jobs)
+        return sorted(fits, key=lambda fit: fit.chi2)[len(fits) // 2]
 
     return middle(NOTHING, np.zeros(0)), middle(named.form, named.w)
 
@@ -232,7 +234,7 @@ def _refitted(
     One of the friction that screening saw at 241 went to 981 in two steps and to 198 in a whole refit, others to 602. Those whose
     two steps lead on to the end came no further from where they began: to 921 instead of 890, to 752 instead of 664.
     """
-    two_steps = each(jobs, _quick, fitter, starts)
+    two_steps = each_beside(jobs, _quick, fitter, starts)
     quickly = sorted(two_steps, key=lambda fit: fit.chi2)
     best = best_of_each(quickly)
     gain = chi2 - best[0].chi2 if best else 0.0
@@ -244,7 +246,7 @@ def _refitted(
     led_on = {id(start) for start, fit in zip(starts, two_steps, strict=True) if any(fit is one for one in forms)}
     again = [*(one for one in promising if id(one) not in led_on), *forms]
     again.sort(key=lambda one: -len(one.form.axes))  # long refits first: else one process ended with one, alone for 4 s
-    finished = each(jobs, refit, fitter, [(one.form, one.deviations, one.w) for one in again])
+    finished = refits(fitter, [(one.form, one.deviations, one.w) for one in again], jobs)
     finished += [fit for fit in best if set(fit.form.effects) not in names]
     return best_of_each(sorted(finished, key=lambda fit: fit.chi2))
 
@@ -265,19 +267,34 @@ def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> lis
     base, knee, trials = work
     predicted = fitter.predicted(base.deviations, base.effects)
     origin = _Base(base, predicted, fitter.whitened(predicted, knee)[1], Directions(base))
-    return [one for trial in trials if (one := _screen(fitter, origin, trial)) is not None]
+    there = fitter.predicted_many([(base.deviations, base.effects | trial.form.tables(trial.w)) for trial in trials])
+    found = [_screen(fitter, origin, *one) for one in zip(trials, there, strict=True)]
+    return [one for one in found if one is not None]
 
 
-def _quick(fitter: Fitter, one: Screened) -> Fit:
+def _quick(fitter: Fitter, one: Screened) -> Work[Fit]:
     # where nuisances move far, not all is linear: a slow force sensor went to 5061 from there and to 341 from where they were
-    starts = ((one.deviations, one.w), one.unmoved)
-    deviations, w = min(starts, key=lambda start: fitter.far_chi2(one.form, *start))
-    return fitter.judged(fitter.fit(one.form, deviations, w, QUICK))
+    return fitter.quick(one.form, ((one.deviations, one.w), one.unmoved))
 
 
-def refit(fitter: Fitter, start: Start) -> Fit:
-    """A refit to the end from a start."""
-    return fitter.refit(*start)
+def refits(fitter: Fitter, starts: Sequence[Start], jobs: int) -> list[Fit]:
+    """A refit to the end from every start."""
+    return each_beside(jobs, _refitting, fitter, starts)
+
+
+def _refitting(fitter: Fitter, start: Start) -> Work[Fit]:
+    return fitter.refitting(*start)
+
+
+def each_beside(jobs: int, work: Callable[[Fitter, T], Work[Fit]], fitter: Fitter, items: Sequence[T]) -> list[Fit]:
+    """What becomes of every item, beside the others, in `jobs` processes."""
+    shares = each(jobs, _share, fitter, [(work, items[i::jobs]) for i in range(jobs)])
+    return [shares[number % jobs][number // jobs] for number in range(len(items))]
+
+
+def _share(fitter: Fitter, share: tuple[Callable[[Fitter, T], Work[Fit]], Sequence[T]]) -> list[Fit]:
+    work, items = share
+    return together(fitter.predicted_many, [work(fitter, item) for item in items])
 
 
 def best_of_each(found: list[_Formed], by_form: bool = False) -> list[_Formed]:

@@ -1,7 +1,8 @@
 """The model beside the rig: one run predicted under the run's own commands, reduced to the 1 ms grid.
 
-The kernel is the plant's own. Its sensors' bandwidths are opened wide, since a manifest states none. Without vibration 70 us a
-step are enough: no feature differs by a third of a floor from 10 us (tests/truth/test_gap.py). With it, 20 steps a period.
+The equations are the plant's own: with a force drive in its kernel, with a spring in `side_by_side`, many rigs at once. Its
+sensors' bandwidths are opened wide, since a manifest states none. Without vibration 70 us a step are enough: no feature differs
+by a third of a floor from 10 us (tests/truth/test_gap.py). With it, 20 steps a period.
 
 Every segment begins with the force that was measured there. In what phase of its cycle the slide is when the vibration changes is
 chance; it decides for seconds how the force settles where nothing slips any more, and how many slips a segment has.
@@ -18,9 +19,9 @@ from bridge.kernel import Record, kernel
 from diagnosis.commands import Commands
 from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S, SIGNALS
+from diagnosis.side_by_side import LANES, advance_lanes
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
-from plant.disturb import spring_N
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -32,7 +33,6 @@ _CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiff
 # follows the noise of the encoder, slower smears a reversal: errors of the friction show up to 10 Hz.
 _HOLDING_RAD_PER_S = 2.0 * math.pi * 10.0
 _RATE_FILTER_S = 3e-3  # of the damper: keeps 0.1 um of encoder noise to 0.2 N, turns the phase at 10 Hz by 11 degrees
-_FURTHEST, _HALVINGS = 4.0, 40  # to find the extension for a force: times that of the linear spring, to 1e-12 of that
 _LED_STEP_S = 1e-4  # its features are equal to 1e-3 N to those at 10 us
 
 
@@ -53,6 +53,14 @@ class Entry(NamedTuple):
     block: int
     force_N: float  # in the drive's spring
     age_s: float | None  # of the contact, where the slide sticks; None: it slides on
+
+
+class Rig(NamedTuple):
+    """Parameters and state at the start, as the plant's kernel wants them, and steps in every block."""
+
+    params: npt.NDArray[Any]
+    state: npt.NDArray[Any]
+    steps: npt.NDArray[np.int64]
 
 
 class Roughness(NamedTuple):
@@ -96,6 +104,34 @@ def predict(
     config: RigConfig, force_driven: bool, commands: Commands, start: Start, entries: Sequence[Entry] = ()
 ) -> dict[str, Floats]:
     """Signals by name, [blocks] each, free of noise. With a force drive the motion says where the slide is, and no entry."""
+    return predict_many([config], force_driven, commands, [start], [entries])[0]
+
+
+def predict_many(
+    configs: Sequence[RigConfig],
+    force_driven: bool,
+    commands: Commands,
+    starts: Sequence[Start],
+    entries: Sequence[Sequence[Entry]],
+) -> list[dict[str, Floats]]:
+    """As `predict` for each of many rigs in the same run; their entries are in the same blocks."""
+    rigs = [built(config, force_driven, commands, start) for config, start in zip(configs, starts, strict=True)]
+    if force_driven:
+        return [dict(zip(SIGNALS, _led(rig, commands), strict=True)) for rig in rigs]
+    same_steps: dict[bytes, list[int]] = {}
+    for number, rig in enumerate(rigs):
+        same_steps.setdefault(rig.steps.tobytes(), []).append(number)
+    found: dict[int, Floats] = {}
+    for numbers in same_steps.values():
+        for group in (numbers[first : first + LANES] for first in range(0, len(numbers), LANES)):
+            lanes = [*group, *[group[-1]] * (LANES - len(group))]
+            signals = _side_by_side([rigs[number] for number in lanes], commands, [entries[one] for one in lanes])
+            found |= zip(group, signals, strict=False)
+    return [dict(zip(SIGNALS, found[number], strict=True)) for number in range(len(configs))]
+
+
+def built(config: RigConfig, force_driven: bool, commands: Commands, start: Start) -> Rig:
+    """A rig as the kernels want it, where a run begins."""
     params, state = build(config)
     p: Any = params[0]
     p.force_keep = p.accel_keep = p.position_keep = 0.0
@@ -113,25 +149,38 @@ def predict(
         math.ceil(BLOCK_S / coarsest_s - 1e-9),
         np.ceil(_STEPS_PER_PERIOD * commands.frequency_Hz * BLOCK_S - 1e-9),
     ).astype(np.int64)
+    return Rig(params, state, steps)
+
+
+def _led(rig: Rig, commands: Commands) -> Floats:
+    """A rig with a force drive along the measured motion, [signals, blocks]."""
+    assert commands.motion is not None, "a force drive without a motion is refused when it is read"  # noqa: S101
+    params, state, steps = rig
+    p: Any = params[0]
     out = np.empty((len(SIGNALS), len(commands.drive)))
     scratch = int(steps.max())
     analogue, truth = np.empty((len(CHANNELS), scratch)), np.empty((len(TRUTH), scratch))
-    if force_driven:
-        assert commands.motion is not None, "a force drive without a motion is refused when it is read"  # noqa: S101
-        stiffness = p.m * _HOLDING_RAD_PER_S**2
-        damping = 2.0 * p.m * _HOLDING_RAD_PER_S
-        _follow(
-            params, state, commands.drive, commands.frequency_Hz, commands.amplitude_m, steps,
-            analogue, truth, out, commands.motion.position_m, stiffness, damping,
-        )  # fmt: skip
-    else:
-        _enter(
-            params, state, commands.drive, commands.frequency_Hz, commands.amplitude_m, steps, analogue, truth, out,
-            np.array([entry.block for entry in entries], np.int64),
-            np.array([entry.force_N for entry in entries], np.float64),
-            np.array([math.nan if entry.age_s is None else entry.age_s for entry in entries], np.float64),
-        )  # fmt: skip
-    return dict(zip(SIGNALS, out, strict=True))
+    stiffness = p.m * _HOLDING_RAD_PER_S**2
+    damping = 2.0 * p.m * _HOLDING_RAD_PER_S
+    _follow(
+        params, state, commands.drive, commands.frequency_Hz, commands.amplitude_m, steps,
+        analogue, truth, out, commands.motion.position_m, stiffness, damping,
+    )  # fmt: skip
+    return out
+
+
+def _side_by_side(rigs: Sequence[Rig], commands: Commands, entries: Sequence[Sequence[Entry]]) -> Floats:
+    """`LANES` rigs with the same steps through a run, [LANES, signals, blocks]."""
+    blocks = np.array([entry.block for entry in entries[0]], np.int64)
+    ages_s = [[math.nan if entry.age_s is None else entry.age_s for entry in own] for own in entries]
+    forces_N = [[entry.force_N for entry in own] for own in entries]
+    out = np.empty((LANES, len(SIGNALS), len(commands.drive)))
+    advance_lanes(
+        np.concatenate([rig.params for rig in rigs]), np.concatenate([rig.state for rig in rigs]),
+        commands.drive, commands.frequency_Hz, commands.amplitude_m, rigs[0].steps,
+        blocks, np.array(forces_N).T.copy(), np.array(ages_s).T.copy(), out,
+    )  # fmt: skip
+    return out
 
 
 def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
@@ -187,49 +236,6 @@ def _predict(
                 about = analogue[row, i] - out[row, block]
                 total += about * about
             out[4 + row, block] = math.sqrt(total / samples)
-
-
-@kernel
-def _enter(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    drive: Floats,
-    frequency_Hz: Floats,
-    amplitude_m: Floats,
-    steps: npt.NDArray[np.int64],
-    analogue: Floats,
-    truth: Floats,
-    out: Floats,
-    entry_blocks: npt.NDArray[np.int64],
-    force_N: Floats,
-    age_s: Floats,
-) -> None:
-    """As `_predict`; at `entry_blocks` the slide is put where the spring has the force, stuck where the age is a number."""
-    p: Record = params[0]
-    s: Record = state[0]
-    first = 0
-    for entry in range(len(entry_blocks) + 1):
-        last = entry_blocks[entry] if entry < len(entry_blocks) else len(drive)
-        _predict(params, state, drive[first:last], frequency_Hz[first:last], amplitude_m[first:last],
-                 steps[first:last], analogue, truth, out[:, first:last])  # fmt: skip
-        first = last
-        if entry < len(entry_blocks):
-            held_N = force_N[entry] - s.arm_N
-            extension_m = 0.0
-            step_m = _FURTHEST * held_N / p.k_d + math.copysign(0.5 * p.gap_m, held_N)
-            for _ in range(_HALVINGS):
-                step_m *= 0.5
-                if math.fabs(spring_N(p, extension_m + step_m)) < math.fabs(held_N):
-                    extension_m += step_m
-            s.frame_m, s.frame_mps = force_N[entry] * p.frame_m_per_N, 0.0
-            s.base_m, s.base_mps = force_N[entry] * p.base_m_per_N, 0.0
-            s.x = s.s_d - s.frame_m - extension_m
-            s.z = min(max(force_N[entry], -p.F_s), p.F_s) / p.k_t
-            if math.isnan(age_s[entry]):
-                s.v = s.v_r = drive[first]
-            else:
-                s.v = s.v_r = 0.0
-                s.age_s = age_s[entry]
 
 
 @kernel

@@ -110,7 +110,7 @@ def _training(folder: Path, number: int) -> tuple[list[Row], list[str]]:
                 effects = _drawn(random, own[int(random.integers(len(own)))])
             point = bench.nuisances.point(random.standard_normal(len(bench.nuisances)), effects)
             surface = ROUGHNESS._replace(seed=int(random.integers(1_000_000)))
-            features = bench.problem.predicted(point, Draw(random, surface))
+            (features,) = bench.problem.predicted_many([point], [Draw(random, surface)])
             if np.isfinite(features).any():  # no rig is like that
                 rows.append(bench.row(features))
                 labels.append(name)

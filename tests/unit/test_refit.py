@@ -41,6 +41,8 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
     described = np.zeros(len(fitter.nuisances))
     yielding, sliding = start_of(fitter, "base-compliance"), start_of(fitter, "coulomb-level")
     weightless = yielding.w + 20.0  # as soft and as quick as the ranges allow
-    assert not np.isfinite(fitter.predicted(described, yielding.form.tables(weightless))).any()
-    even = fitter.far_chi2(sliding.form, described, np.array([30.0]))
-    assert fitter.far_chi2(yielding.form, described, weightless) > even > 1e3
+    rough = np.array([30.0])
+    impossible = fitter.predicted(described, yielding.form.tables(weightless))
+    assert not np.isfinite(impossible).any()
+    even = fitter.far_chi2(sliding.form, (described, rough), fitter.predicted(described, sliding.form.tables(rough)))
+    assert fitter.far_chi2(yielding.form, (described, weightless), impossible) > even > 1e3

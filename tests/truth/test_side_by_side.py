@@ -1,0 +1,97 @@
+"""Rigs side by side against the plant's own kernel, form by form, and against themselves in other company."""
+
+import numpy as np
+import pytest
+
+from diagnosis.commands import Commands
+from diagnosis.library import trials
+from diagnosis.problem import Problem
+from diagnosis.sensing import SENSOR_EFFECTS
+from diagnosis.side_by_side import LANES
+from diagnosis.twin import Entry, Roughness, Start, predict, predict_many, rig_config
+from plant.effects import EFFECTS
+from tests.one_by_one import one_by_one
+from tests.prepared import prepared
+
+FORMS = [(name, form) for name, effect in EFFECTS.items() if name not in SENSOR_EFFECTS for form in effect.forms]
+ROUNDING = 1e-8  # of the largest value of a signal: slips make it grow, to 5e-10 here
+
+
+@pytest.fixture(scope="module")
+def ladder(tmp_path_factory):
+    evidence, runs = prepared(tmp_path_factory.mktemp("ladder") / "ladder", "ladder")
+    return evidence.rig, runs
+
+
+@pytest.fixture(scope="module")
+def tables(ladder):
+    """Every form as the library tries it; a random one as it might be drawn."""
+    rig, runs = ladder
+    tried = {
+        next(iter(trial.form.forms.items())): trial.form.tables(trial.w)
+        for trial in reversed(trials(Problem(rig, runs)))
+    }
+    load = {"form": "random", "ratio": 0.03, "frequency_Hz": 4.0, "seed": 3.0}
+    friction = {"form": "random", "ratio": 0.03, "wavelength_m": 3e-4, "seed": 3.0}
+    tried["normal-load-fluctuation", "random"] = {"normal-load-fluctuation": load}
+    tried["position-dependent-friction", "random"] = {"position-dependent-friction": friction}
+    return tried
+
+
+def there_and_back(seconds_a_leg: float = 0.6) -> Commands:
+    """Stick-slip, then under vibration, the same backwards, and at rest."""
+    blocks = round(1e3 * seconds_a_leg)
+    drive = np.repeat([3e-3, 3e-3, -3e-3, -3e-3, 0.0], blocks)
+    frequency_Hz = np.repeat([0.0, 2200.0, 3300.0, 0.0, 0.0], blocks)
+    amplitude_m = np.repeat([0.0, 2.6e-7, 1.5e-7, 0.0, 0.0], blocks)
+    return Commands(drive, frequency_Hz, amplitude_m, (), None)
+
+
+def worst(found, expected) -> float:
+    return max(
+        float(np.abs(one[name] - other[name]).max() / (np.abs(other[name]).max() + 1e-12))
+        for one, other in zip(found, expected, strict=True)
+        for name in other
+    )
+
+
+def rigs(rig, effects, roughness=None, count=LANES):
+    """As many, each with other numbers."""
+    values = [{"coulomb_force_N": rig.coulomb_force_N * (1.0 + 0.004 * number)} for number in range(count)]
+    return [rig_config(rig, value, effects, roughness) for value in values]
+
+
+@pytest.mark.parametrize(("name", "form"), [("", ""), *FORMS])
+def test_as_the_plants_kernel(ladder, tables, name, form):
+    rig, _ = ladder
+    configs = rigs(rig, tables[name, form] if name else {}, count=2)
+    commands, start = there_and_back(), Start(0.0, 0.5 * rig.coulomb_force_N, 0.0)
+    found = predict_many(configs, False, commands, [start] * 2, [()] * 2)
+    expected = one_by_one(configs, commands, start)
+    assert np.ptp(expected[0]["drive_force_N"]) > 20.0  # it slides both ways
+    assert worst(found, expected) < ROUNDING
+
+
+def test_as_the_plants_kernel_on_a_rough_surface_and_with_a_tail(ladder):
+    rig, _ = ladder
+    configs = rigs(rig, {}, Roughness(0.01, 2e-5, 7), count=2) + rigs(
+        rig.model_copy(update={"stribeck_tail": 0.3}), {}, count=2
+    )
+    commands, start = there_and_back(), Start(0.0, 0.5 * rig.coulomb_force_N, 0.0)
+    assert (
+        worst(predict_many(configs, False, commands, [start] * 4, [()] * 4), one_by_one(configs, commands, start))
+        < ROUNDING
+    )
+
+
+def test_to_the_last_bit_the_same_in_any_company(ladder, tables):
+    """More rigs than go side by side, each with another effect, entered where runs are entered."""
+    rig, _ = ladder
+    commands, start = there_and_back(0.1), Start(0.0, 0.5 * rig.coulomb_force_N, 0.0)
+    entries = (Entry(130, 9.0, 0.4), Entry(260, -11.0, None))
+    configs = [rig_config(rig, {}, tables[key], None) for key in FORMS]
+    assert len(configs) > 2 * LANES
+    together = predict_many(configs, False, commands, [start] * len(configs), [entries] * len(configs))
+    for config, found in zip(configs, together, strict=True):
+        alone = predict(config, False, commands, start, entries)
+        assert all(np.array_equal(found[name], alone[name]) for name in alone)
