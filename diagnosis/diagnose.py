@@ -150,7 +150,7 @@ def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> Ra
 def _finished(fitter: Fitter, fits: list[Fit], expected_chi2: float, jobs: int) -> list[Fit]:
     """The fits, best first, the leading ones refitted as long as that gains where they leave much."""
     leading = [fit for fit in fits[:_LEADING] if much_left(fit, expected_chi2) and not fit.finished]
-    return _with(fits, each_beside(jobs, Fitter.further, fitter, leading))
+    return _with(fits, each_beside(jobs, Fitter.going_further, fitter, leading))
 
 
 def _alone(pairs: list[Fit]) -> list[Start]:
