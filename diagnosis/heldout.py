@@ -78,9 +78,9 @@ class HeldOut:
     def refutes(self, fit: Fit, expected_chi2: float) -> bool:
         """Whether these runs do not bear a fit out: it leaves nearly as much of them as the rig without effects, or more.
 
-        `expected_chi2` is what a perfect model leaves of one compared feature. What varies at random promises no path.
+        `expected_chi2` is what a perfect model leaves of one compared feature.
         """
-        if is_random(fit.form):
+        if not foretells(fit.form):
             return False
         above = max(self._chi2_retuned - expected_chi2 * len(self.floor.whitening), 0.0)
         return self._chi2(fit) > self._chi2_retuned - _LEAST_CLOSED * above + _CHANCE
@@ -129,3 +129,12 @@ class HeldOut:
 
     def _gap(self, squares: Floats) -> float:
         return float(np.sqrt(squares.mean())) / self.floor.level
+
+
+def foretells(form: Form) -> bool:
+    """Whether effects say what another run will show.
+
+    What varies at random takes another path there. A wave over time, a load that turns, may be in any phase when a run begins:
+    one of 10 detection limits, named, with 0.467 for 0.487 Hz, closed 22 % of chi2.
+    """
+    return not is_random(form) and not {"phase_rad", "frequency_Hz"} <= {axis.name for axis in form.axes}
