@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from diagnosis.gap import Floor, cell_squares, differences, floor_of, replicates, whitened
 from diagnosis.nuisance import Nuisances
+from diagnosis.phases import PHASE, Table, has_own_phases
 from diagnosis.problem import Problem
 from diagnosis.random_friction import RANDOM, is_random
 from diagnosis.refit import NOTHING, Fit, Form
@@ -45,11 +46,11 @@ class HeldOut:
         self.problem = problem
         self._jobs = jobs
         self._nuisances = nuisances
-        plain = {name: table for name, table in best.effects.items() if table["form"] != RANDOM}
+        plain = {name: table for name, table in best.effects.items() if _follows(table)}
         self.floor: Floor = self._floor_at(best, plain, roughness, None)
         self._wider = self.floor
         if len(plain) < len(best.effects):
-            # what friction does that varies at random is scatter: it is in the floor of the models that have it
+            # what friction does that varies at random, or in an unknown phase, is scatter: in the floor of models that have it
             wider = self._floor_at(best, best.effects, roughness, self.floor)
             self._wider = self.floor._replace(bias=wider.bias, scatter=wider.scatter, level=wider.level)
         described = np.zeros(len(nuisances))
@@ -119,8 +120,9 @@ class HeldOut:
         return self._differences(form, [(deviations, w)])[0]
 
     def _differences(self, form: Form, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
-        floor = self._wider if is_random(form) else self.floor
-        points = [self._nuisances.point(deviations, form.tables(w)) for deviations, w in at]
+        tables = [form.tables(w) for _, w in at]
+        floor = self.floor if all(_follows(table) for table in tables[0].values()) else self._wider
+        points = [self._nuisances.point(deviations, table) for (deviations, _), table in zip(at, tables, strict=True)]
         return [differences(floor, self.problem, predicted) for predicted in self.problem.predicted_many(points)]
 
     def differences_of(self, predicted: Floats) -> Floats:
@@ -131,10 +133,15 @@ class HeldOut:
         return float(np.sqrt(squares.mean())) / self.floor.level
 
 
+def _follows(table: Table) -> bool:
+    """Whether a prediction follows an effect through a run that was kept aside."""
+    return table["form"] != RANDOM and not has_own_phases(table)
+
+
 def foretells(form: Form) -> bool:
     """Whether effects say what another run will show.
 
     What varies at random takes another path there. A wave over time, a load that turns, may be in any phase when a run begins:
     one of 10 detection limits, named, with 0.467 for 0.487 Hz, closed 22 % of chi2.
     """
-    return not is_random(form) and not {"phase_rad", "frequency_Hz"} <= {axis.name for axis in form.axes}
+    return not is_random(form) and not {PHASE, "frequency_Hz"} <= {axis.name for axis in form.axes}

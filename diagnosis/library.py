@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from diagnosis.axis_waves import axis_waves
 from diagnosis.manifest import RigTable
+from diagnosis.phases import PHASE
 from diagnosis.problem import Prepared, Problem
 from diagnosis.refit import Axis, Form
 from diagnosis.ringing import ringing_Hz
-from diagnosis.waves import Wave, drive_waves, friction_waves
+from diagnosis.waves import Wave, drive_series, drive_waves, friction_series, friction_waves, waves_apart
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -57,16 +58,19 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
     rig, runs = problem.rig, problem.runs
     scale = scales(name, form, rig, runs, highest_Hz)
     waves: list[Wave] = []
-    if rig.drive == "force" and "phase_rad" in scale:
+    if rig.drive == "force" and PHASE in scale:
         waves = axis_waves(runs, "position" if "wavelength_m" in scale else "time", _AXIS_WAVES)
     elif name == "position-dependent-friction":
         waves = friction_waves(runs, problem.scales, "position", _WAVES)
     elif name == "normal-load-fluctuation":
         waves = friction_waves(runs, problem.scales, "time", _WAVES)
+        waves += waves_apart(friction_series(runs, problem.scales, "time"), runs, _WAVES)
     elif name == "drive-speed-ripple":
         over = "position" if form == "screw" else "time"
         waves = drive_waves(runs, over, _WAVES) or friction_waves(runs, problem.scales, over, _WAVES)
-    if "phase_rad" in scale:
+        if form == "time":
+            waves += waves_apart(drive_series(runs, over) or friction_series(runs, problem.scales, over), runs, _WAVES)
+    if PHASE in scale:
         return [_wave_trial(name, form, wave) for wave in waves]
     starts: list[dict[str, float]] = [{}]
     if name == "frame-compliance":
@@ -102,8 +106,8 @@ def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, floa
 def _wave_trial(name: str, form: str, wave: Wave) -> Trial:
     axes: list[Axis] = []
     for row in EFFECTS[name].forms[form].parameters:
-        if row.name == "phase_rad":
-            axes.append(Axis(name, row.name, 1.0, False, 3.0, -20.0, 20.0))
+        if row.name == PHASE:
+            axes += [Axis(name, one, 1.0, False, 3.0, -20.0, 20.0) for one in (PHASE, *wave.phases_of)]
         elif row.name == "ratio":
             axes.append(Axis(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
         elif row.name in {"second_sin", "second_cos"}:
@@ -111,7 +115,7 @@ def _wave_trial(name: str, form: str, wave: Wave) -> Trial:
         else:
             size = wave.period if row.name == "wavelength_m" else 1.0 / wave.period
             axes.append(Axis(name, row.name, size, True, wave.spread, row.low, row.high))
-    start = {"phase_rad": wave.phase_rad, "second_sin": wave.second_sin, "second_cos": wave.second_cos}
+    start = {PHASE: wave.phase_rad, "second_sin": wave.second_sin, "second_cos": wave.second_cos} | dict(wave.phases_of)
     w = np.array([start.get(axis.name, 0.0) / axis.scale for axis in axes])
     return Trial(Form({name: form}, tuple(axes)), w)
 

@@ -18,6 +18,7 @@ from diagnosis.evidence import Evidence, Run
 from diagnosis.features import Feature, Features, Scales, Signals, settled, spring_features
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
+from diagnosis.phases import in_run
 from diagnosis.reduced import BLOCK_S, reduce_run
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
 from diagnosis.twin import Effects, Entry, Roughness, Start, predict, predict_many, rig_config
@@ -207,7 +208,9 @@ def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
 
 def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
     """The effects that move the rig in this run, as it shows them."""
-    moving = {name: table for name, table in effects.items() if name not in SENSOR_EFFECTS}
+    seed = draw.roughness.seed if draw else None
+    shown = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
+    moving = {name: table for name, table in shown.items() if table is not None and name not in SENSOR_EFFECTS}
     if not run.commands.frequency_Hz.any():
         moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
     if "before_s" in moving.get("friction-drift", {}):

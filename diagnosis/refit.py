@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from diagnosis.gap import KNEE, Floor, differences, whitened
 from diagnosis.nuisance import Nuisances
+from diagnosis.phases import is_phase
 from diagnosis.problem import Problem
 from diagnosis.together import At, Work, together
 from diagnosis.twin import Effects
@@ -51,7 +52,7 @@ class Axis(NamedTuple):
     def value(self, w: float) -> float:
         """The parameter's value, within its bounds."""
         raw = self.scale * math.exp(min(max(w, -30.0), 30.0)) if self.logarithmic else self.scale * w
-        if self.name == "phase_rad":
+        if is_phase(self.name):
             return math.remainder(raw, 2.0 * math.pi)
         return min(max(raw, self.low), self.high)
 

@@ -2,6 +2,7 @@
 
 import math
 
+from diagnosis.phases import has_own_phases
 from diagnosis.result import Diagnosis
 from diagnosis.wording import EFFECT_WORDS, estimate_in_words, percent, signal_name, times
 
@@ -58,6 +59,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             sentences.append(
                 "It varies at random and is known by what it scatters, not by its path: bursts would look the same."
             )
+        if has_own_phases(candidate.parameters):
+            sentences.append("It begins in another phase in every run, so it is scatter where its phase is not known.")
     sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
     if gap.runs and math.isfinite(gap.retuned):
         kept = ", ".join(gap.runs)

@@ -3,7 +3,9 @@
 Only starting points for a refit come from here, never a verdict.
 """
 
+from collections.abc import Mapping
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +13,7 @@ import numpy.typing as npt
 
 from diagnosis.cycles import turning_points
 from diagnosis.features import Scales
+from diagnosis.phases import phase_of
 from diagnosis.problem import Prepared
 from diagnosis.reduced import BLOCK_S
 
@@ -30,6 +33,9 @@ class Wave(NamedTuple):
     second_sin: float = 0.0
     second_cos: float = 0.0
     spread: float = 0.2  # of the period, relative: one standard deviation
+    phases_of: Mapping[str, float] = MappingProxyType(
+        {}
+    )  # in the runs after the first, where it begins in another phase there
 
 
 class Series(NamedTuple):
@@ -38,6 +44,7 @@ class Series(NamedTuple):
     at: Floats
     value: Floats  # relative to the mean of its stretch
     weight: float = 1.0
+    run: str = ""  # file
 
 
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
@@ -66,19 +73,24 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Ser
             tops, bottoms = turning_points(cut, scales.drop_N)
             if len(bottoms) >= 2:
                 at = tops[: len(bottoms)]
-                series.append(Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0))
+                series.append(Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0, run=run.file))
             elif len(tops) == 0 and len(cut) > 500:
                 # where nothing slips the slide moves evenly, once the climb to that level is over
                 even = cut[len(cut) // 3 :]
                 level = even[: len(even) // 20 * 20].reshape(-1, 20).mean(axis=1)
                 if np.ptp(level) < 0.2 * scales.force_N and level.mean() > 0.5 * scales.force_N:
                     there = coordinate[own][len(cut) // 3 + 10 :: 20][: len(level)]
-                    series.append(Series(there, level / level.mean() - 1.0))
+                    series.append(Series(there, level / level.mean() - 1.0, run=run.file))
     return series
 
 
 def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
     """The strongest waves of the drive's velocity over its `position` [m] or `time` [s], relative to it, likewise."""
+    return _strongest(drive_series(runs, over), most, 2)
+
+
+def drive_series(runs: list[Prepared], over: str) -> list[Series]:
+    """The drive's velocity relative to its mean over its `position` [m] or `time` [s]; one series a segment."""
     series: list[Series] = []
     for run in runs:
         position = run.signals.get("drive_position_m")
@@ -94,11 +106,29 @@ def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
             slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
             # noise of the position is the smaller in a relative velocity the faster the drive
             speed_mm_per_s = 1e3 * abs(segment.drive_velocity_mps)
-            series.append(Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0, speed_mm_per_s))
-    return _strongest(series, most, 2)
+            series.append(
+                Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0, speed_mm_per_s, run.file)
+            )
+    return series
 
 
-def _strongest(series: list[Series], most: int, harmonics: int = 1) -> list[Wave]:
+def waves_apart(series: list[Series], runs: list[Prepared], most: int) -> list[Wave]:
+    """The strongest waves over time if each run may begin in another phase; none where no two runs show any."""
+    by_run = {run.file: [one for one in series if one.run == run.file] for run in runs}
+    if sum(bool(own) for own in by_run.values()) < 2:
+        return []
+    waves: list[Wave] = []
+    for wave in _strongest(series, most, apart=True):
+        first, *others = (
+            wave_of(wave.period, fitted(own, np.array([wave.period]))[1][0]) if own else wave for own in by_run.values()
+        )
+        ratio = float(np.sqrt(np.mean([one.ratio**2 for one in (first, *others)])))
+        phases_of = {phase_of(run.file): one.phase_rad for run, one in zip(runs[1:], others, strict=True)}
+        waves.append(wave._replace(ratio=ratio, phase_rad=first.phase_rad, phases_of=phases_of))
+    return waves
+
+
+def _strongest(series: list[Series], most: int, harmonics: int = 1, apart: bool = False) -> list[Wave]:
     if not series:
         return []
     span = max(float(np.ptp(one.at)) for one in series)
@@ -108,6 +138,9 @@ def _strongest(series: list[Series], most: int, harmonics: int = 1) -> list[Wave
     reach = max(float(one.at.max()) for one in series) - min(float(one.at.min()) for one in series)
     periods = np.geomspace(max(0.3 * spacing, span / 100.0), 2.0 * span, _GRID)
     power, shares = fitted(series, periods, harmonics)
+    if apart:
+        runs = dict.fromkeys(one.run for one in series)
+        power = np.sum([fitted([one for one in series if one.run == run], periods)[0] for run in runs], axis=0)
     # the best of every range of periods: short ones fit the few breakaways best whatever is there
     edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
     best: list[int] = []

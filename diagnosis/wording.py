@@ -67,7 +67,14 @@ def signal_name(column: str) -> str:
 
 
 def name_and_unit(name: str) -> tuple[str, str]:
-    """`gap_m` as ("gap", "m"); a bare `ratio` is given in percent, other numbers without a unit have the unit ""."""
+    """`gap_m` as ("gap", "m"); a bare `ratio` is given in percent, other numbers without a unit have the unit "".
+
+    `phase_rad of run-02.csv` is ("phase in run-02.csv", "rad").
+    """
+    name, _, file = name.partition(" of ")
+    if file:
+        word, unit = name_and_unit(name)
+        return f"{word} in {file}", unit
     if name == "ratio":
         return "relative change", "%"
     found = _UNIT.match(name)

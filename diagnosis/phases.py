@@ -1,0 +1,46 @@
+"""Waves over time whose phase differs from run to run: a load that turns does not wait for the log to begin.
+
+Such a form has a phase for every fitted run, `phase_rad` for the first and `phase_rad of FILE` for the others. What the phase is
+in a run that was kept aside nobody knows: there a draw has any, and a prediction has none of the wave, which is its mean.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+PHASE = "phase_rad"
+_OF = f"{PHASE} of "
+Table = Mapping[str, float | str]
+
+
+def phase_of(file: str) -> str:
+    """The name of the phase in one of the runs after the first."""
+    return _OF + file
+
+
+def is_phase(name: str) -> bool:
+    """Whether a parameter is a phase, in whichever run."""
+    return name == PHASE or name.startswith(_OF)
+
+
+def has_own_phases(table: Collection[str]) -> bool:
+    """Whether an effect begins in another phase in every run."""
+    return any(name.startswith(_OF) for name in table)
+
+
+def without_phases_of(table: Table) -> dict[str, float | str]:
+    """The effect as it is in the first run, which is how a rig file has it."""
+    return {name: value for name, value in table.items() if not name.startswith(_OF)}
+
+
+def in_run(table: Table, file: str, kept_aside: bool, seed: int | None) -> dict[str, float | str] | None:
+    """An effect as it is in one run, with a drawn phase where there is a seed and no phase is known; None: its mean."""
+    plain = without_phases_of(table)
+    if len(plain) == len(table):
+        return plain
+    if not kept_aside:
+        return plain | {PHASE: table.get(phase_of(file), plain[PHASE])}
+    if seed is None:
+        return None
+    return plain | {PHASE: float(np.random.default_rng([seed, len(file)]).uniform(-math.pi, math.pi))}

@@ -1,0 +1,88 @@
+"""A wave over time that begins in another phase in every run."""
+
+import math
+
+import numpy as np
+import pytest
+
+from diagnosis.gap import floor_of, replicates
+from diagnosis.library import trials
+from diagnosis.nuisance import Nuisances
+from diagnosis.phases import has_own_phases, in_run, is_phase, phase_of, without_phases_of
+from diagnosis.problem import Problem
+from diagnosis.refit import Fitter
+from diagnosis.result import Estimate
+from diagnosis.twin import Roughness
+from diagnosis.wording import estimate_in_words
+from tests.prepared import prepared
+
+LOAD = {"form": "sine", "ratio": 0.06, "frequency_Hz": 0.9}
+LATER = 2.4  # rad, in the second run
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory):
+    """Two runs of one rig under a load that turned on between them."""
+    folder = tmp_path_factory.mktemp("phases")
+    evidence, first = prepared(folder / "a", "ladder", {"normal-load-fluctuation": LOAD | {"phase_rad": 0.4}})
+    _, second = prepared(folder / "b", "ladder", {"normal-load-fluctuation": LOAD | {"phase_rad": 0.4 + LATER}})
+    return Problem(evidence.rig, [first[0], second[1]])
+
+
+def loads(problem):
+    return [trial for trial in trials(problem) if trial.form.effects == ("normal-load-fluctuation",)]
+
+
+def test_runs_apart_show_the_wave_with_a_phase_for_each(problem):
+    name = phase_of(problem.runs[1].file)
+    tables = [trial.form.tables(trial.w)["normal-load-fluctuation"] for trial in loads(problem)]
+    apart = [table for table in tables if has_own_phases(table)]
+    best = min(apart, key=lambda table: abs(float(table["frequency_Hz"]) - 0.9))
+    assert best["frequency_Hz"] == pytest.approx(0.9, rel=0.1)
+    assert best["ratio"] == pytest.approx(0.06, rel=0.3)
+    later = float(best[name]) - float(best["phase_rad"])
+    assert math.remainder(later - LATER, 2.0 * math.pi) == pytest.approx(0.0, abs=0.8)
+
+
+def test_a_refit_finds_both_phases(problem):
+    nuisances = Nuisances(problem.rig)
+    described = np.zeros(len(nuisances))
+    point = nuisances.point(described, {})
+    fitter = Fitter(
+        problem, floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 16, 1)), nuisances
+    )
+    fits = [fitter.refit(trial.form, described, trial.w) for trial in loads(problem)]
+    best = min(fits, key=lambda fit: fit.chi2)
+    one_phase = min(
+        (fit for fit in fits if not has_own_phases(fit.effects["normal-load-fluctuation"])), key=lambda fit: fit.chi2
+    )
+    assert best.chi2 < 0.5 * one_phase.chi2
+    table = best.effects["normal-load-fluctuation"]
+    assert table["ratio"] == pytest.approx(0.06, rel=0.1)
+    later = float(table[phase_of(problem.runs[1].file)]) - float(table["phase_rad"])
+    assert math.remainder(later - LATER, 2.0 * math.pi) == pytest.approx(0.0, abs=0.1)
+
+
+TABLE = LOAD | {"phase_rad": 0.4, phase_of("run-02.csv"): 2.8}
+
+
+def test_every_run_has_its_own_phase_and_nobody_knows_that_of_one_kept_aside():
+    assert in_run(TABLE, "run-01.csv", False, None) == LOAD | {"phase_rad": 0.4}
+    assert in_run(TABLE, "run-02.csv", False, 5) == LOAD | {"phase_rad": 2.8}
+    assert in_run(TABLE, "run-03.csv", True, None) is None  # its mean
+    drawn = [in_run(TABLE, "run-03.csv", True, seed) for seed in range(200)]
+    phases = np.array([table["phase_rad"] for table in drawn if table])
+    assert len(phases) == 200
+    assert abs(np.exp(1j * phases).mean()) < 0.2
+    assert in_run(LOAD | {"phase_rad": 0.4}, "run-03.csv", True, None) == LOAD | {"phase_rad": 0.4}  # one phase for all
+
+
+def test_a_rig_file_has_the_phase_of_the_first_run():
+    assert without_phases_of(TABLE) == LOAD | {"phase_rad": 0.4}
+    assert [is_phase(name) for name in ("phase_rad", phase_of("a.csv"), "frequency_Hz")] == [True, True, False]
+
+
+def test_a_phase_is_named_with_its_run():
+    assert estimate_in_words(phase_of("run-02.csv"), Estimate(1.234, (1.13, 1.33))) == (
+        "phase in run-02.csv 1.23 rad (90 %: 1.13 to 1.33)"
+    )
