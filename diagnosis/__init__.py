@@ -9,7 +9,7 @@ Comparison
     reduced                     a run on the 1 ms grid
     commands                    what the rig was told, and the segments in which that does not change
     axis_motion                 the measured motion along which a force-driven model is led
-    twin                        one run predicted by the plant's kernel under the run's own commands
+    twin, side_by_side          one run predicted under the run's own commands; by the plant's equations, eight rigs at once
     sensing                     what sensors make of a prediction: faults, and ordinary lags
     axis_drive                  a force-driven axis: the true input, freed of what its sensor did to it
     noise                       the noise of a run, taken from the run
@@ -21,15 +21,17 @@ Fit
     nuisance                    what may differ without being a gap, in units of its tolerance
     library                     every effect in every formula, with coordinates and starts
     waves, axis_waves           periods at which a wave may be looked for
+    phases                      a wave over time that begins in another phase in every run
     retuning                    the rig without effects, refitted: what all evidence is measured against
     refit                       Gauss-Newton over nuisances and the parameters of an effect
+    together                    many fits at once, whose predictions go side by side
     random_friction             friction without a path that could be followed: judged by what it scatters
     search                      from all trials to the few that are refitted in full
 Verdict
     diagnose                    the whole way, in order
     verdict                     is there a gap, which effect closes it, how sure that is
     imitation                   which effects these runs cannot tell apart
-    heldout                     how far the gap closes on runs that no fit has seen
+    heldout                     how far the gap closes on runs that no fit has seen, and which names they refute
     flexible                    what a blend of all effects would close, to compare with
     experiments, advice         runs that could be measured next; checks by hand
     next_experiment             which of them separates the leading explanations
