@@ -6,6 +6,7 @@ in a run that was kept aside nobody knows: there a draw has any, and a predictio
 
 import math
 from collections.abc import Collection, Mapping
+from zlib import crc32
 
 import numpy as np
 
@@ -43,4 +44,4 @@ def in_run(table: Table, file: str, kept_aside: bool, seed: int | None) -> dict[
         return plain | {PHASE: table.get(phase_of(file), plain[PHASE])}
     if seed is None:
         return None
-    return plain | {PHASE: float(np.random.default_rng([seed, len(file)]).uniform(-math.pi, math.pi))}
+    return plain | {PHASE: float(np.random.default_rng([seed, crc32(file.encode())]).uniform(-math.pi, math.pi))}

@@ -160,7 +160,14 @@ class Problem:
         keys = [
             number
             if one.draw is not None
-            else (run.file, one.start.force_N, one.entries, inputs, _hashable({"": one.point.values} | one.effects))
+            else (
+                run.file,
+                one.start.force_N,
+                one.entries,
+                inputs,
+                _hashable({"rig": one.point.values}),
+                _hashable(one.effects),
+            )
             for number, one in enumerate(asked)
         ]
         found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}

@@ -1,9 +1,10 @@
-"""Eight rigs in little more than the time of one: the plant's equations with the rigs' numbers side by side in vector registers.
+"""Eight rigs in the time of two to four (`make bench`): the plant's equations with the rigs' numbers side by side in registers.
 
 A refit asks for one run under many slightly different rigs. They get the same commands in the same steps, so that each operation
 is done for all of them at once. What the compiler needs for that shapes this file: all numbers of all rigs in one array, in rows
-of `LANES` at constant places; loops over the lanes alone, in which nothing is called and nothing branches; an exponential made of
-additions and multiplications. What cannot be written so has loops of its own, which run only where a rig has such an effect.
+of `LANES` at constant places; loops over the lanes alone, without a branch and with no call but to plain arithmetic; an
+exponential made of additions and multiplications. What cannot be written so has loops of its own, which run only where a rig has
+such an effect.
 
 What is right is what `plant.core` does: tests/truth/test_side_by_side.py holds every form of every effect against it.
 """
@@ -15,12 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
-from plant.disturb import ageing_N, late_mps, level, spring_N, wave
+from plant.disturb import TWO_PI, ageing_N, late_mps, level, spring_N, wave, with_second
 from plant.piezo import delivered_share
 
 Floats = npt.NDArray[np.floating[Any]]
 LANES: Final = 8
-_TWO_PI: Final = 2.0 * math.pi
 _FURTHEST, _HALVINGS = 4.0, 40  # to find the extension for a force: times that of the linear spring, to 1e-12 of that
 # The rows, by the place of their first number. Of the rig:
 _ROWS: Final = 81
@@ -110,12 +110,12 @@ def advance_lanes(
                 p.drift_before_s,
             )
         w[_LOAD + i], w[_LOAD_SIN_2 + i], w[_LOAD_COS_2 + i] = p.load_ratio, p.load_sin_2, p.load_cos_2
-        load_rad = _TWO_PI * p.load_frequency_Hz * s.t_s + p.load_phase_rad
+        load_rad = TWO_PI * p.load_frequency_Hz * s.t_s + p.load_phase_rad
         w[_LOAD_SIN + i], w[_LOAD_COS + i] = math.sin(load_rad), math.cos(load_rad)
         if p.frame_m_per_N != 0.0:
-            w[_FRAME_GIVE + i], w[_FRAME_2 + i] = p.frame_m_per_N, (_TWO_PI * p.frame_Hz) ** 2
+            w[_FRAME_GIVE + i], w[_FRAME_2 + i] = p.frame_m_per_N, (TWO_PI * p.frame_Hz) ** 2
         if p.base_m_per_N != 0.0:
-            w[_BASE_2 + i] = (_TWO_PI * p.base_Hz) ** 2
+            w[_BASE_2 + i] = (TWO_PI * p.base_Hz) ** 2
         w[_SAG_PER_N + i] = p.sag_ratio / p.F_s if p.sag_settling_s == 0.0 else 0.0
         w[_X + i], w[_V + i], w[_Z + i], w[_V_R + i], w[_G + i], w[_S_D + i] = s.x, s.v, s.z, s.v_r, s.g, s.s_d
         w[_FORCE + i], w[_FRAME + i], w[_FRAME_V + i] = s.drive_N, s.frame_m, s.frame_mps
@@ -147,7 +147,7 @@ def advance_lanes(
         amplitude_before_m = target_m
         if not vibrating:
             vibrating_s = 0.0
-        omega = _TWO_PI * frequency_Hz[block]
+        omega = TWO_PI * frequency_Hz[block]
         cos_phi, sin_phi = math.cos(phi), math.sin(phi)
         cos_half, sin_half = math.cos(0.5 * omega * dt), math.sin(0.5 * omega * dt)
         peak_mps = target_m * omega
@@ -181,7 +181,7 @@ def advance_lanes(
                     turns = p.ripple_frequency_Hz * (t_s + 0.5 * dt)
                     if p.ripple_wavelength_m > 0.0:
                         turns = w[_S_D + i] / p.ripple_wavelength_m
-                    angle_rad = _TWO_PI * turns + p.ripple_phase_rad
+                    angle_rad = TWO_PI * turns + p.ripple_phase_rad
                     w[_DRIVE + i] = drive[block] * (
                         1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
                     )
@@ -211,7 +211,7 @@ def advance_lanes(
             t_s += dt
 
         if vibrating:
-            phi = (phi + omega * dt * samples) % _TWO_PI
+            phi = (phi + omega * dt * samples) % TWO_PI
             vibrating_s += 1e-3
         for i in range(LANES):
             for row in range(5):
@@ -229,22 +229,27 @@ def _varies(p: Record) -> bool:
 
 
 @kernel
+def _spring_N(w: Floats, i: int, extension_m: float) -> float:
+    """As `plant.disturb.spring_N`, without its branches."""
+    slack_m, yield_m, knee_m = w[_SLACK + i], w[_YIELD + i], w[_KNEE + i]
+    e = extension_m - min(max(extension_m, -slack_m), slack_m)
+    e = min(max(e, -yield_m), yield_m)
+    knee_N = w[_KNEE_RATIO + i] * w[_K_D + i] * (e - min(max(e, -knee_m), knee_m))
+    return w[_K_D + i] * e * (1.0 + w[_HARDENING + i] * e * e) + knee_N
+
+
+@kernel
 def _approach(w: Floats, dt: float, t_s: float, base_mps: float) -> None:
-    """The drive's force in the middle of the step, the velocity over the base, the friction's level. No call, no branch."""
+    """The drive's force in the middle of the step, the velocity over the base, the friction's level."""
     for i in range(LANES):
         # the drive's force in the middle of the step
         anchor_mps = w[_DRIVE + i] - w[_FRAME_V + i]
         extension_m = w[_S_D + i] - w[_FRAME + i] - w[_X + i]
         ahead_m = extension_m + 0.5 * dt * (anchor_mps - w[_V + i])
-        slack_m, yield_m, knee_m = w[_SLACK + i], w[_YIELD + i], w[_KNEE + i]
-        e = ahead_m - min(max(ahead_m, -slack_m), slack_m)
-        e = min(max(e, -yield_m), yield_m)
-        knee_N = w[_KNEE_RATIO + i] * w[_K_D + i] * (e - min(max(e, -knee_m), knee_m))
-        pull_N = w[_K_D + i] * e * (1.0 + w[_HARDENING + i] * e * e) + knee_N
-        holds = 0.0 if math.fabs(extension_m) < slack_m else 1.0
+        holds = 0.0 if math.fabs(extension_m) < w[_SLACK + i] else 1.0
         w[_HELD + i] = holds
         w[_HELD_STEP + i] = holds * (w[_H_D + i] + w[_RELAXING + i] * (1.0 - w[_ARM_KEEP + i]))
-        w[_PULL + i] = pull_N + w[_ARM_KEEP + i] * w[_ARM + i]
+        w[_PULL + i] = _spring_N(w, i, ahead_m) + w[_ARM_KEEP + i] * w[_ARM + i]
         # the base, and how fast the slide goes over it
         sag = max(1.0 - w[_SAG_PER_N + i] * math.fabs(w[_FORCE + i]), 0.0)
         delivered = w[_SHARE + i] * sag
@@ -256,8 +261,7 @@ def _approach(w: Floats, dt: float, t_s: float, base_mps: float) -> None:
         w[_V_G + i] = v_r
         # the friction's level where no place and no chance has a say in it
         load_sin, load_cos = w[_LOAD_SIN + i], w[_LOAD_COS + i]
-        load = load_sin + w[_LOAD_SIN_2 + i] * 2.0 * load_sin * load_cos
-        load += w[_LOAD_COS_2 + i] * (1.0 - 2.0 * load_sin * load_sin)
+        load = with_second(load_sin, load_cos, w[_LOAD_SIN_2 + i], w[_LOAD_COS_2 + i])
         direction = w[_FORWARD + i] + (v_r < 0.0) * (w[_BACKWARD + i] - w[_FORWARD + i])
         friction = (1.0 + w[_DRIFT + i] * t_s + w[_SETTLED + i]) * (1.0 + w[_LOAD + i] * load)
         w[_LEVEL + i] = max(friction * (1.0 + direction), 0.01)
@@ -265,7 +269,7 @@ def _approach(w: Floats, dt: float, t_s: float, base_mps: float) -> None:
 
 @kernel
 def _slide(w: Floats, dt: float, z_dt: float, base_mid_mps: float, base_mps2: float) -> None:
-    """One step of contact, slide, base and frame, as `plant.contact` and `plant.core` do it. No call, no branch."""
+    """One step of contact, slide, base and frame, as `plant.contact` and `plant.core` do it."""
     per_s = 1.0 / dt
     for i in range(LANES):
         # the steady friction at this velocity
@@ -319,14 +323,7 @@ def _slide(w: Floats, dt: float, z_dt: float, base_mid_mps: float, base_mps2: fl
         w[_BASE + i] += dt * base_mean_mps
         w[_BASE_V + i] = 2.0 * base_mean_mps - w[_BASE_V + i]
         frame_m, frame_mps = w[_FRAME + i] + dt * w[_FRAME_V + i], w[_FRAME_V + i]
-        slack_m, yield_m, knee_m = w[_SLACK + i], w[_YIELD + i], w[_KNEE + i]
-        extension_m = s_d - frame_m - x
-        e = extension_m - min(max(extension_m, -slack_m), slack_m)
-        e = min(max(e, -yield_m), yield_m)
-        knee_N = w[_KNEE_RATIO + i] * w[_K_D + i] * (e - min(max(e, -knee_m), knee_m))
-        force_N = w[_K_D + i] * e * (1.0 + w[_HARDENING + i] * e * e) + knee_N
-        held_N_per_mps = w[_HELD + i] * w[_H_D + i]
-        force_N += held_N_per_mps * (anchor_mps - v_end)
+        force_N = _spring_N(w, i, s_d - frame_m - x) + w[_HELD + i] * w[_H_D + i] * (anchor_mps - v_end)
         keep = w[_ARM_KEEP + i] * w[_ARM_KEEP + i]
         arm_N = keep * w[_ARM + i] + w[_HELD + i] * w[_RELAXING + i] * (1.0 - keep) * (anchor_mps - v_mid)
         force_N += arm_N
@@ -351,17 +348,17 @@ def _slide(w: Floats, dt: float, z_dt: float, base_mid_mps: float, base_mps2: fl
 @kernel
 def _set_steps(w: Floats, p: Record, i: int, dt: float) -> None:
     """What of a rig depends on the length of a step."""
-    w[_FRAME_LOSS + i] = p.frame_damping_ratio * _TWO_PI * p.frame_Hz * dt
+    w[_FRAME_LOSS + i] = p.frame_damping_ratio * TWO_PI * p.frame_Hz * dt
     w[_FRAME_KEEP + i] = 1.0 / (1.0 + w[_FRAME_LOSS + i])
     held = 1.0 / (1.0 + w[_FRAME_LOSS + i] + dt * w[_FRAME_2 + i] * w[_FRAME_GIVE + i] * p.h_d)
     w[_FRAME_KEEP_HELD + i] = held - w[_FRAME_KEEP + i]
-    w[_BASE_KEEP + i] = 1.0 / (1.0 + p.base_damping_ratio * _TWO_PI * p.base_Hz * dt)
+    w[_BASE_KEEP + i] = 1.0 / (1.0 + p.base_damping_ratio * TWO_PI * p.base_Hz * dt)
     give = 0.5 * dt * p.base_m_per_N * w[_BASE_2 + i] * w[_BASE_KEEP + i]
     w[_BASE_GIVE + i] = give
     w[_HALF_PER_M + i] = 0.5 * dt / p.m
     w[_LEAST + i] = p.k_t / (1.0 + 1.0 / (dt * p.h_t * (1.0 / p.m + 2.0 * give / dt))) if p.h_t > 0.0 else 0.0
     w[_ARM_KEEP + i] = math.exp(-0.5 * dt / p.relaxation_s) if p.relaxing_Ns_per_m > 0.0 else 1.0
-    load_rad = _TWO_PI * p.load_frequency_Hz * dt
+    load_rad = TWO_PI * p.load_frequency_Hz * dt
     w[_LOAD_SIN_STEP + i], w[_LOAD_COS_STEP + i] = math.sin(load_rad), math.cos(load_rad)
 
 

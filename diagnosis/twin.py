@@ -21,7 +21,7 @@ from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S, SIGNALS
 from diagnosis.side_by_side import LANES, advance_lanes
 from plant.config import RigConfig
-from plant.core import advance, advance_disturbed
+from plant.core import advance_disturbed
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -219,12 +219,8 @@ def _predict(
         p.samples_per_block = samples
         p.steps_per_sample = 1
         p.dt_s = 1e-3 / samples
-        if p.disturbed:
-            advance_disturbed(params, state, drive[block], frequency_Hz[block], amplitude_m[block],
-                              analogue[:, :samples], truth[:, :samples])  # fmt: skip
-        else:
-            advance(params, state, drive[block], frequency_Hz[block], amplitude_m[block],
-                    analogue[:, :samples], truth[:, :samples])  # fmt: skip
+        advance_disturbed(params, state, drive[block], frequency_Hz[block], amplitude_m[block],
+                          analogue[:, :samples], truth[:, :samples])  # fmt: skip
         for row in range(5):
             total = 0.0
             for i in range(samples):
