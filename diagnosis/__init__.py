@@ -9,7 +9,8 @@ Comparison
     reduced                     a run on the 1 ms grid
     commands                    what the rig was told, and the segments in which that does not change
     axis_motion                 the measured motion along which a force-driven model is led
-    twin, side_by_side          one run predicted under the run's own commands; by the plant's equations, eight rigs at once
+    twin                        one run predicted under the run's own commands, by the plant's equations
+    side_by_side, lanes         eight rigs through it at once; one step of them
     sensing                     what sensors make of a prediction: faults, and ordinary lags
     axis_drive                  a force-driven axis: the true input, freed of what its sensor did to it
     noise                       the noise of a run, taken from the run

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.side_by_side import LANES
+from diagnosis.lanes import LANES
 from diagnosis.twin import Effects
 
 Floats = npt.NDArray[np.floating[Any]]

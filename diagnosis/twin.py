@@ -17,9 +17,10 @@ import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from diagnosis.commands import Commands
+from diagnosis.lanes import LANES
 from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S, SIGNALS
-from diagnosis.side_by_side import LANES, advance_lanes
+from diagnosis.side_by_side import advance_lanes
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.records import CHANNELS, TRUTH, build

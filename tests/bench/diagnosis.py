@@ -11,8 +11,8 @@ import numpy as np
 from diagnosis.commands import Commands
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence import load_evidence
+from diagnosis.lanes import LANES
 from diagnosis.making import Case, make_evidence
-from diagnosis.side_by_side import LANES
 from diagnosis.twin import Start, built, predict_many
 from plant.config import RigConfig
 from plant.records import CHANNELS, TRUTH

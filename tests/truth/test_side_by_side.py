@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from diagnosis.commands import Commands
+from diagnosis.lanes import LANES
 from diagnosis.library import trials
 from diagnosis.problem import Problem
 from diagnosis.reduced import SIGNALS
 from diagnosis.sensing import SENSOR_EFFECTS
-from diagnosis.side_by_side import LANES
 from diagnosis.twin import Entry, Roughness, Start, built, predict, predict_many, rig_config
 from plant.core import advance, advance_disturbed
 from plant.effects import EFFECTS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.side_by_side import LANES
+from diagnosis.lanes import LANES
 from diagnosis.together import together
 
 
