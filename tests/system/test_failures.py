@@ -14,7 +14,7 @@ import pytest
 from mcap.reader import make_reader
 
 from bridge.faults import FAULTS
-from bridge.logfile import read_run, recover
+from bridge.logfile import RunData, read_run, recover
 from tests.system.ports import free_endpoint
 
 COMMAND = [sys.executable, "-m", "cockpit"]
@@ -127,7 +127,13 @@ def test_a_killed_process_ends_the_run_and_costs_at_most_a_quarter_second(
     assert killed_at_ns - newest_ns < 250_000_000
     data = read_run(run.log)
     assert data.damage.closed
-    assert len(data.sensors) == data.sensors["sequence"][-1] + 1
+    assert len(data.sensors) + told_lost(data, "sensors") == data.sensors["sequence"][-1] + 1
+
+
+def told_lost(data: RunData, topic: str) -> int:
+    """Messages of a topic that the recorder says did not come: in real time a busy machine may drop one, never silently."""
+    texts = [event.text for event in data.events if event.code == "GAP"]
+    return sum(int(text.split()[1]) for text in texts if text.startswith(f"/{topic}: "))
 
 
 def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[Run]) -> None:
