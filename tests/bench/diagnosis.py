@@ -7,6 +7,8 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from diagnosis.commands import Commands
 from diagnosis.diagnose import diagnose
@@ -21,13 +23,16 @@ from tests.bench import case as paper
 
 LIMIT_S, FIRST_LIMIT_S, LIMIT_GB = 60.0, 5.0, 1.5
 JOBS = 2
-# nothing, an effect that every run shows, and two, for which a second search is made
+# nothing, an effect that every run shows, and two, for which a second search is made; in the last one the library has
+# no name for what is wrong, and every form of every effect is refitted before that is said
+UNKNOWN = "unknown effect"
 CASES: dict[str, dict[str, dict[str, float | str]]] = {
     "no effect": {},
     "drive-damping": {"drive-damping": {"damping_Ns_per_m": 12.0}},
     "two effects": {"piezo-roll-off": {"corner_Hz": 4000.0}, "friction-drift": {"rate_per_s": 4e-3}},
+    UNKNOWN: {},
 }
-
+KNEE_N, SHARE_ABOVE = 12.0, 0.8
 
 SIDE_BY_SIDE: dict[str, dict[str, dict[str, float | str]]] = {
     "no effect": {},
@@ -39,11 +44,12 @@ SIDE_BY_SIDE_S, REPETITIONS = 2.0, 9
 def bench() -> bool:
     """Print the figures; whether the bars are kept."""
     print(f"\ndiagnosis of 4 runs of 10 s at 20 kHz in {JOBS} processes, compiled")
-    _seconds(CASES["no effect"])  # loads the kernels and starts the processes
+    _seconds("no effect")  # loads the kernels and starts the processes
     kept = True
     for name, effects in CASES.items():
-        first_s, wall_s, said, named = _seconds(effects)
-        within = wall_s <= LIMIT_S and first_s <= FIRST_LIMIT_S and named == set(effects)
+        first_s, wall_s, said = _seconds(name)
+        wanted = "unexplained" if name == UNKNOWN else " ".join(("effect", *sorted(effects))) if effects else "no-gap"
+        within = wall_s <= LIMIT_S and first_s <= FIRST_LIMIT_S and said == wanted
         kept &= within
         print(
             f"  {name:14} {wall_s:5.1f} s, {wall_s / LIMIT_S:.2f} of the limit; first figures {first_s:.1f} s, "
@@ -63,16 +69,28 @@ def bench() -> bool:
     return kept
 
 
-def _seconds(effects: dict[str, dict[str, float | str]]) -> tuple[float, float, str, set[str]]:
-    """Seconds to the first figure and to the end, the verdict, and what was named: a quick wrong answer is none."""
+def _seconds(name: str) -> tuple[float, float, str]:
+    """Seconds to the first figure and to the end, and the verdict with what was named: a quick wrong answer is none."""
     with tempfile.TemporaryDirectory() as folder:
-        make_evidence(Path(folder) / "bench", Case(effects=effects), seed=31)
+        make_evidence(Path(folder) / "bench", Case(effects=CASES[name]), seed=31)
+        if name == UNKNOWN:
+            _compress(Path(folder) / "bench")
         said_at: list[float] = []
         begin = time.perf_counter()
         evidence = load_evidence(Path(folder) / "bench")
         found = diagnose(evidence, lambda _text, _share: said_at.append(time.perf_counter() - begin), JOBS)
-        said = " ".join((found.verdict, *found.effects))
-        return said_at[0], time.perf_counter() - begin, said, set(found.effects)
+        said = " ".join((found.verdict, *sorted(found.effects)))
+        return said_at[0], time.perf_counter() - begin, said
+
+
+def _compress(folder: Path) -> None:
+    """A force amplifier that gives less above a knee, which the library does not have."""
+    for file in folder.glob("*.parquet"):
+        table = pq.read_table(file)
+        force_N = table["drive_force_N"].to_numpy()
+        compressed_N = np.minimum(force_N, KNEE_N + SHARE_ABOVE * (force_N - KNEE_N))
+        column = table.column_names.index("drive_force_N")
+        pq.write_table(table.set_column(column, "drive_force_N", pa.array(compressed_N)), file)
 
 
 def _gain(effects: dict[str, dict[str, float | str]]) -> float:
