@@ -127,7 +127,9 @@ def test_a_killed_process_ends_the_run_and_costs_at_most_a_quarter_second(
     assert killed_at_ns - newest_ns < 250_000_000
     data = read_run(run.log)
     assert data.damage.closed
-    assert len(data.sensors) + told_lost(data, "sensors") == data.sensors["sequence"][-1] + 1
+    lost = told_lost(data, "sensors")
+    assert lost < 250  # of 1 ms each
+    assert len(data.sensors) + lost == data.sensors["sequence"][-1] + 1
 
 
 def told_lost(data: RunData, topic: str) -> int:

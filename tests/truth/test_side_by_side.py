@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.commands import Commands
-from diagnosis.lanes import LANES
+from diagnosis.lanes import LANES, gone
 from diagnosis.library import trials
 from diagnosis.problem import Problem
 from diagnosis.reduced import SIGNALS
@@ -67,6 +67,12 @@ def alone(config, commands, start):
         out[:5, block] = analogue[:, :samples].mean(axis=1)
         out[5:, block] = [math.sqrt(analogue[row, :samples].var()) for row in (1, 2)]
     return dict(zip(SIGNALS, out, strict=True))
+
+
+def test_the_exponential_of_additions_and_multiplications():
+    a = np.concatenate([np.linspace(0.0, 3.0, 3001), np.geomspace(1e-12, 690.0, 3001)])
+    found = np.array([gone(one) for one in a])
+    np.testing.assert_allclose(found, np.expm1(-a), rtol=3e-16, atol=3e-16)
 
 
 def worst(found, expected) -> float:
