@@ -59,14 +59,13 @@ def _find(name: str, kind: str) -> Path:
     given = Path(name)
     if given.suffix == ".toml":
         return given
-    known = deploy_folder() / kind / f"{name}.toml"
-    if not known.is_file():
-        names = ", ".join(sorted(path.stem for path in known.parent.glob("*.toml")))
+    known = {path.stem: path for path in sorted((deploy_folder() / kind).glob("*.toml"))}
+    if name not in known:
         raise Fault(
             "CONFIG",
-            f"{name}: no such {kind.removesuffix('s')}; known: {names}; or give the path of a .toml file",
+            f"{name}: no such {kind.removesuffix('s')}; known: {', '.join(known)}; or give the path of a .toml file",
         )
-    return known
+    return known[name]
 
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:

@@ -131,7 +131,8 @@ def check_channel_names(channels: dict[str, Any]) -> None:
 def read_manifest(folder: Path) -> Manifest:
     """Read and check `manifest.toml`. Raises Fault BAD_EVIDENCE, one line a problem."""
     if not folder.is_dir():
-        line = f"{folder}: no such folder; evidence is a folder with {MANIFEST} and one data file a run"
+        what = "no folder" if folder.exists() else "no such folder"
+        line = f"{folder}: {what}; evidence is a folder with {MANIFEST} and one data file a run"
         raise Fault("BAD_EVIDENCE", line)
     path = folder / MANIFEST
     if not path.is_file():

@@ -1,5 +1,6 @@
 """Bad configuration is one clear line: place, value, rule, remedy."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -37,9 +38,10 @@ def test_the_line_names_place_value_rule_and_remedy(settings: list[str], words: 
     assert "\n" not in caught.value.line
 
 
-def test_unknown_scenario_names_the_known_ones() -> None:
-    with pytest.raises(Fault, match=r"nowhere.*paper-c45-c45"):
-        load_scenario("nowhere", [])
+@pytest.mark.parametrize("name", ["nowhere", str(Path(__file__))], ids=["a name", "a file of another kind"])
+def test_unknown_scenario_names_the_known_ones(name: str) -> None:
+    with pytest.raises(Fault, match=rf"{re.escape(name)}: no such scenario; known: .*paper-c45-c45"):
+        load_scenario(name, [])
 
 
 def test_missing_and_broken_files(tmp_path: Path) -> None:

@@ -301,5 +301,7 @@ def test_a_file_that_is_not_what_its_name_says(tmp_path: Path, name: str) -> Non
 def test_no_folder_and_no_manifest(tmp_path: Path) -> None:
     with pytest.raises(Fault, match="no such folder"):
         load_evidence(tmp_path / "absent")
+    with pytest.raises(Fault, match=r"test_evidence\.py: no folder; evidence is"):
+        load_evidence(Path(__file__))
     with pytest.raises(Fault, match=r"manifest.toml: no such file"):
         load_evidence(tmp_path)
