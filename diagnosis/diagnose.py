@@ -22,6 +22,7 @@ from diagnosis.heldout import Closed, HeldOut
 from diagnosis.imitation import imitators
 from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
+from diagnosis.phases_by_run import starts_by_run
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction, is_random
@@ -95,6 +96,9 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
     if verdict.kind == "unexplained" or (verdict.named is not None and verdict.named.chi2 > _DOUBTFUL * expected_chi2):
         progress("nothing explains it well yet: every effect gets a refit", 0.65)
         singles = _with(singles, refitted_rest(fitter, origins, found, tried, jobs))
+        if _varies(retuned, singles, expected_chi2):
+            by_run = starts_by_run(fitter, retuned, tried, jobs)
+            singles = _finished(fitter, _again(fitter, singles, by_run, jobs), expected_chi2, jobs)
         if singles and much_left(singles[0], expected_chi2):
             progress(f"every effect gets a refit beside the best one, {singles[0].form.effects[0]}", 0.7)
             pairs = _finished(fitter, _with(pairs, pairs_with(fitter, singles[0], tried, jobs)), expected_chi2, jobs)
@@ -128,11 +132,16 @@ def _may_scatter(verdict: Verdict, retuned: Fit, singles: list[Fit], pairs: list
         return False
     if hidden_by_noise(retuned, expected_chi2):
         return False
-    waves = [fit.chi2 for fit in singles if fit.form.effects[0] in RANDOM_EFFECTS]
-    if retuned.chi2 - min(waves, default=retuned.chi2) < _STRONGEST_WAVE * (retuned.chi2 - expected_chi2):
+    if not _varies(retuned, singles, expected_chi2):
         return False
     left = min(fit.chi2 for fit in (retuned, *singles, *pairs))
     return verdict.kind == "unexplained" or left > NEVER_WITHOUT_GAP * expected_chi2
+
+
+def _varies(retuned: Fit, singles: list[Fit], expected_chi2: float) -> bool:
+    """Whether a wave of the friction, over time or along the track, takes a share of the gap."""
+    waves = [fit.chi2 for fit in singles if fit.form.effects[0] in RANDOM_EFFECTS]
+    return retuned.chi2 - min(waves, default=math.inf) >= _STRONGEST_WAVE * (retuned.chi2 - expected_chi2)
 
 
 def _refittable(verdict: Verdict) -> bool:

@@ -4,6 +4,7 @@ Scales come from the rig, so that a step of 1 in a coordinate is an effect that 
 """
 
 import math
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,11 +12,19 @@ import numpy.typing as npt
 
 from diagnosis.axis_waves import axis_waves
 from diagnosis.manifest import RigTable
-from diagnosis.phases import PHASE
+from diagnosis.phases import OTHER_PHASE, PHASE
 from diagnosis.problem import Prepared, Problem
 from diagnosis.refit import Axis, Form
 from diagnosis.ringing import ringing_Hz
-from diagnosis.waves import Wave, drive_series, drive_waves, friction_series, friction_waves, waves_apart
+from diagnosis.waves import (
+    Wave,
+    drive_series,
+    drive_waves,
+    friction_series,
+    friction_waves,
+    two_friction_waves,
+    waves_apart,
+)
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -70,8 +79,14 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         waves = drive_waves(runs, over, _WAVES) or friction_waves(runs, problem.scales, over, _WAVES)
         if form == "time":
             waves += waves_apart(drive_series(runs, over) or friction_series(runs, problem.scales, over), runs, _WAVES)
+    if form == "two-waves":
+        if rig.drive == "force":
+            pairs = list(combinations(axis_waves(runs, "position", _AXIS_WAVES), 2))
+        else:
+            pairs = two_friction_waves(runs, problem.scales, _WAVES)
+        return [_two_waves_trial(name, *pair) for pair in pairs]
     if PHASE in scale:
-        return [_wave_trial(name, form, wave) for wave in waves]
+        return [wave_trial(name, form, wave) for wave in waves]
     starts: list[dict[str, float]] = [{}]
     if name == "frame-compliance":
         starts = [{"frequency_Hz": f} for f in (40.0, 90.0, 200.0)]
@@ -103,7 +118,8 @@ def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, floa
     return Trial(Form({name: form}, tuple(axes)), w)
 
 
-def _wave_trial(name: str, form: str, wave: Wave) -> Trial:
+def wave_trial(name: str, form: str, wave: Wave) -> Trial:
+    """A form of one wave, from where the wave is."""
     axes: list[Axis] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name == PHASE:
@@ -118,6 +134,24 @@ def _wave_trial(name: str, form: str, wave: Wave) -> Trial:
     start = {PHASE: wave.phase_rad, "second_sin": wave.second_sin, "second_cos": wave.second_cos} | dict(wave.phases_of)
     w = np.array([start.get(axis.name, 0.0) / axis.scale for axis in axes])
     return Trial(Form({name: form}, tuple(axes)), w)
+
+
+def _two_waves_trial(name: str, first: Wave, other: Wave) -> Trial:
+    rows = {row.name: row for row in EFFECTS[name].forms["two-waves"].parameters}
+
+    def positive(parameter: str, size: float, prior: float) -> Axis:
+        return Axis(name, parameter, size, True, prior, rows[parameter].low, rows[parameter].high)
+
+    ratio = max(first.ratio, 1e-4)
+    axes = (
+        positive("ratio", ratio, 1.5),
+        positive("wavelength_m", first.period, first.spread),
+        Axis(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
+        positive("other_share", max(other.ratio / ratio, 0.05), 1.0),
+        positive("other_wavelength_m", other.period, other.spread),
+        Axis(name, OTHER_PHASE, 1.0, False, 3.0, -20.0, 20.0),
+    )
+    return Trial(Form({name: "two-waves"}, axes), np.array([0.0, 0.0, first.phase_rad, 0.0, 0.0, other.phase_rad]))
 
 
 def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz: float) -> dict[str, _Scale]:

@@ -11,6 +11,7 @@ from zlib import crc32
 import numpy as np
 
 PHASE = "phase_rad"
+OTHER_PHASE = "other_phase_rad"  # of a second wave
 _OF = f"{PHASE} of "
 Table = Mapping[str, float | str]
 
@@ -22,7 +23,7 @@ def phase_of(file: str) -> str:
 
 def is_phase(name: str) -> bool:
     """Whether a parameter is a phase, in whichever run."""
-    return name == PHASE or name.startswith(_OF)
+    return name in {PHASE, OTHER_PHASE} or name.startswith(_OF)
 
 
 def has_own_phases(table: Collection[str]) -> bool:

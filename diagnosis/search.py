@@ -29,6 +29,7 @@ _PROMISING_MUCH = 40.0
 _FULL = 3  # single effects that are refitted to the end,
 _FULL_PAIRS = 2  # and pairs of effects,
 _WORTH_FULL = 0.2  # of the best one's gain, or they are too far behind to matter
+_SIZES = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)  # of an effect's scale
 _FURTHEST = 8.0  # times the starting size that a screening may go
 _FURTHEST_TOLERANCES = 3.0
 _PAIRED = 3  # single effects that get a second one: the strongest of two need not fit best alone,
@@ -44,7 +45,7 @@ class Screened(NamedTuple):
     deviations: Floats
     w: Floats
     chi2: float
-    unmoved: tuple[Floats, Floats]  # deviations and w with the nuisances where they were
+    others: tuple[tuple[Floats, Floats], ...]  # more starts, deviations and w: a refit takes the best of all
 
 
 _Formed = TypeVar("_Formed", Fit, Screened, Trial)
@@ -118,7 +119,7 @@ def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Scree
     deviations = np.clip(moved[:own], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
     chi2 = float(directions.left @ directions.left) - 2.0 * size * along + size * size * power
     unmoved = (base.deviations, np.concatenate([base.w, w]))
-    return Screened(added(base.form, trial.form), deviations, np.concatenate([moved[own:], w]), chi2, unmoved)
+    return Screened(added(base.form, trial.form), deviations, np.concatenate([moved[own:], w]), chi2, (unmoved,))
 
 
 def screened(fitter: Fitter, origins: list[Origin], trials: list[Trial], jobs: int = 1) -> list[list[Screened]]:
@@ -142,6 +143,8 @@ def refitted(fitter: Fitter, origins: list[Origin], found: list[list[Screened]],
         first = trials[:_QUICK]
         promising += _promising_waves(first, base.chi2)
         starts += [one for i, one in enumerate(first) if i < _QUICK_AT_LEAST or one.chi2 < base.chi2 - _PROMISING]
+    if len(origins) > 1:
+        starts += _of_any_size(origins, found[0])
     return _refitted(fitter, origins[0].fit.chi2, starts, promising, jobs, _FULL)
 
 
@@ -225,6 +228,17 @@ def _promising_waves(found: list[Screened], chi2: float) -> list[Screened]:
     return sorted(first.values(), key=lambda start: start.chi2)[:2]
 
 
+def _of_any_size(origins: list[Origin], screened: list[Screened]) -> list[Screened]:
+    """Effects of one number of either sign, to begin at the best of some sizes: screening is linear, and a large one is not."""
+    found: list[Screened] = []
+    for one in best_of_each(screened, by_form=True):
+        if len(one.form.axes) != 1 or one.form.axes[0].logarithmic:
+            continue
+        first, *others = [(origin.fit.deviations, np.array([size])) for origin in origins for size in _SIZES]
+        found.append(Screened(one.form, *first, math.inf, tuple(others)))
+    return found
+
+
 def _refitted(
     fitter: Fitter, chi2: float, starts: list[Screened], promising: list[Screened], jobs: int, most: int
 ) -> list[Fit]:
@@ -274,7 +288,7 @@ def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> lis
 
 def _quick(fitter: Fitter, one: Screened) -> Work[Fit]:
     # where nuisances move far, not all is linear: a slow force sensor went to 5061 from there and to 341 from where they were
-    return fitter.quick(one.form, ((one.deviations, one.w), one.unmoved))
+    return fitter.quick(one.form, ((one.deviations, one.w), *one.others))
 
 
 def refits(fitter: Fitter, starts: Sequence[Start], jobs: int) -> list[Fit]:

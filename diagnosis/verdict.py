@@ -69,6 +69,7 @@ class Model(NamedTuple):
 
     fit: Fit
     evidence: float  # log, against the refitted rig without effects
+    scatters: bool = False  # friction varies at random in it
 
 
 class Verdict(NamedTuple):
@@ -121,16 +122,18 @@ def judge(
 
     """
 
-    def scattered(noise: float) -> list[tuple[Fit, Scattered]]:
-        """What lies under a random effect, and both."""
-        return [
-            (fit, effect.on(fit, noise))
-            for effect in random
-            for fit in (base, *[one for one in singles if effect.effect not in one.form.effects][:_UNDER_RANDOM])
-        ]
+    def scattered(noise: float) -> list[tuple[Fit, str, Scattered]]:
+        """What lies under a random effect, the effect, and both."""
+        found: list[tuple[Fit, str, Scattered]] = []
+        for effect in random:
+            others = [one for one in singles if effect.effect not in one.form.effects][:_UNDER_RANDOM]
+            # a track is more than the two waves of its form: what they leave was named as a load beside it
+            own = [one for one in singles[:_UNDER_RANDOM] if effect.effect in one.form.effects]
+            found += [(fit, effect.effect, effect.on(fit, noise)) for fit in (base, *others, *own)]
+        return found
 
     closest = scattered(JITTER)
-    fits = [base, *singles, *pairs, *(one.fit for _, one in closest)]
+    fits = [base, *singles, *pairs, *(one.fit for *_, one in closest)]
     scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> Model:
@@ -140,13 +143,18 @@ def judge(
 
     alone = [model(fit) for fit in singles]
     doubles = [model(fit) for fit in pairs]
-    for (under, both), (_, close) in zip(scattered(scale * JITTER), closest, strict=True):
+    for (under, effect, both), (*_, close) in zip(scattered(scale * JITTER), closest, strict=True):
         if close.fit.chi2 > NEVER_WITHOUT_GAP * expected_chi2:
             continue  # so free a path leaves no more if it is the cause; a plug that came loose left 4.5 times the expected
         if under is base:
-            alone.append(Model(both.fit, both.gained))
+            alone.append(Model(both.fit, both.gained, scatters=True))
+        elif effect in under.form.effects:
+            if both.gained > 0.0:
+                alone = [one for one in alone if one.fit is not under]
+                wave = under._replace(chi2=both.fit.chi2)
+                alone.append(Model(wave, model(under).evidence + both.gained, scatters=True))
         else:
-            doubles.append(Model(both.fit, model(under).evidence + both.gained))
+            doubles.append(Model(both.fit, model(under).evidence + both.gained, scatters=True))
     ranked = sorted(alone, key=lambda one: -one.evidence)
     double = max(doubles, key=lambda one: one.evidence, default=None)
     if double is not None and ranked:
@@ -166,7 +174,7 @@ def judge(
     credited = 1.0 if hidden_by_noise(base, expected_chi2) else _CLOSED_BY_UNKNOWN
     unknown = 0.5 * credited * beyond / (scale * JITTER) - _COST_OF_UNKNOWN
     # a random path pays for its freedom, and what nobody wrote down would pay as much for closing what it closes
-    if best is not None and is_random(best.fit.form):
+    if best is not None and best.scatters:
         unknown -= 0.5 * (base.chi2 - best.fit.chi2) / (scale * JITTER) - best.evidence
     if against_none > 0.0:
         scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
@@ -184,7 +192,7 @@ def judge(
         scores["unexplained"] = scores[top] + _COST_OF_UNKNOWN
         top = "unexplained"
     leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
-    mistaken = _mistaken(leaders, best is not None and is_random(best.fit.form))
+    mistaken = _mistaken(leaders, best is not None and best.scatters)
     probabilities = _with_mistakes(_softmax(scores), leaders, mistaken)
     if best is None or top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)

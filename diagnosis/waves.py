@@ -4,7 +4,7 @@ Only starting points for a refit come from here, never a verdict.
 """
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import combinations, pairwise
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ Floats = npt.NDArray[np.floating[Any]]
 _GRID = 1500
 _LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
 _LOBE = 10  # grid points within which peaks are one
+_TWO_WAVES = 3  # pairs of waves that are tried
 _STEEPEST = 0.8  # of a second harmonic, relative to the first
 
 
@@ -50,6 +51,31 @@ class Series(NamedTuple):
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
     """The strongest waves of the friction over `position` [m] or `time` [s], two in each of `most` ranges of periods."""
     return _strongest(friction_series(runs, scales, over), most)
+
+
+def two_friction_waves(runs: list[Prepared], scales: Scales, most: int) -> list[tuple[Wave, Wave]]:
+    """The two waves of the friction along the track that take most together, of the strongest of each range of periods."""
+    series = friction_series(runs, scales, "position")
+    together = [_both(series, *two) for two in combinations(_strongest(series, most), 2)]
+    together.sort(key=lambda one: -one[0])
+    return [two for _, two in together[:_TWO_WAVES]]
+
+
+def _both(series: list[Series], first: Wave, second: Wave) -> tuple[float, tuple[Wave, Wave]]:
+    """What two waves take of the sum of squares together, and both as they are then."""
+    columns: list[Floats] = []
+    for one in series:
+        turns = [2.0 * np.pi * one.at / wave.period for wave in (first, second)]
+        own = np.column_stack([part(angle) for angle in turns for part in (np.sin, np.cos)])
+        columns.append(own - own.mean(axis=0))
+    stacked, value = np.concatenate(columns), np.concatenate([one.value for one in series])
+    shares = np.linalg.lstsq(stacked, value)[0]
+    found = [
+        wave_of(wave.period, own)._replace(spread=wave.spread)
+        for wave, own in zip((first, second), (shares[:2], shares[2:]), strict=True)
+    ]
+    found.sort(key=lambda wave: -wave.ratio)
+    return float(value @ (stacked @ shares)), (found[0], found[1])
 
 
 def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Series]:
@@ -136,7 +162,8 @@ def _strongest(series: list[Series], most: int, harmonics: int = 1, apart: bool 
     if span <= 0.0 or spacing <= 0.0:
         return []
     reach = max(float(one.at.max()) for one in series) - min(float(one.at.min()) for one in series)
-    periods = np.geomspace(max(0.3 * spacing, span / 100.0), 2.0 * span, _GRID)
+    # what turns less than once is a drift
+    periods = np.geomspace(max(0.3 * spacing, span / 100.0), min(2.0 * span, reach), _GRID)
     power, shares = fitted(series, periods, harmonics)
     if apart:
         runs = dict.fromkeys(one.run for one in series)

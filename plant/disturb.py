@@ -46,7 +46,11 @@ def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos
     if p.position_ratio != 0.0:
         if p.position_seed < 0.0:
             angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
-            result *= 1.0 + p.position_ratio * wave(angle_rad, p.position_sin_2, p.position_cos_2)
+            along = wave(angle_rad, p.position_sin_2, p.position_cos_2)
+            if p.position_other_share != 0.0:
+                other_rad = TWO_PI * x / p.position_other_wavelength_m + p.position_other_phase_rad
+                along += p.position_other_share * math.sin(other_rad)
+            result *= 1.0 + p.position_ratio * along
         else:
             result *= 1.0 + p.position_ratio * smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)
     if p.load_ratio != 0.0:

@@ -103,6 +103,14 @@ EFFECTS: Final[dict[str, Effect]] = {
                 "friction times 1 + ratio w(2 pi x / wavelength_m + phase)",
                 (_ratio(0.03, 0.0, 0.9), Parameter("wavelength_m", 1e-5, 1.0, 4e-3), *_SHAPE),
             ),
+            "two-waves": Form(
+                "as wave without its harmonic, and sin(2 pi x / other_wavelength_m + other_phase) beside it, of other_share",
+                (
+                    *(_ratio(0.03, 0.0, 0.9), Parameter("wavelength_m", 1e-5, 1.0, 4e-3), _SHAPE[0]),
+                    *(Parameter("other_share", 0.0, 3.0, 0.5), Parameter("other_wavelength_m", 1e-5, 1.0, 1e-3)),
+                    Parameter("other_phase_rad", -_TAU, _TAU, 0.0),
+                ),
+            ),
             "random": Form(
                 "friction times 1 + ratio n(x), n smooth noise of unit rms, a new value every wavelength_m / 2",
                 (_ratio(0.03, 0.0, 0.9), Parameter("wavelength_m", 1e-5, 1.0, 4e-3), Parameter("seed", 0, 1e6, 0)),

@@ -2,9 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from diagnosis.evidence import Evidence, load_evidence
+from diagnosis.gap import floor_of, replicates
 from diagnosis.making import Case, make_evidence
-from diagnosis.problem import Prepared, prepare
+from diagnosis.nuisance import Nuisances
+from diagnosis.problem import Prepared, Problem, prepare
+from diagnosis.refit import Fitter
+from diagnosis.twin import Roughness
 
 
 def prepared(folder: Path, protocol: str, effects=None, seed: int = 1) -> tuple[Evidence, list[Prepared]]:
@@ -12,3 +18,12 @@ def prepared(folder: Path, protocol: str, effects=None, seed: int = 1) -> tuple[
     make_evidence(folder, Case(protocol, effects=effects or {}, drawn=False), seed)
     evidence = load_evidence(folder)
     return evidence, prepare(evidence)
+
+
+def fitter_of(evidence: Evidence, runs: list[Prepared]) -> Fitter:
+    """Of the fitted runs, under the floor of the rig as described."""
+    problem, nuisances = Problem(evidence.rig, [run for run in runs if not run.holdout]), Nuisances(evidence.rig)
+    point = nuisances.point(np.zeros(len(nuisances)), {})
+    return Fitter(
+        problem, floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 12, 1)), nuisances
+    )

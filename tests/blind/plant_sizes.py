@@ -49,6 +49,11 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
     ),
     "position-dependent-friction": (
         Sizes("wave", "ratio", 0.004, 0.08, log={"wavelength_m": (5e-4, 5e-3)}, even={"phase_rad": TURN}),
+        Sizes(
+            *("two-waves", "ratio", 0.004, 0.08),
+            log={"wavelength_m": (1.5e-3, 5e-3), "other_wavelength_m": (5e-4, 1.5e-3)},
+            even={"phase_rad": TURN, "other_share": (0.4, 1.0), "other_phase_rad": TURN},
+        ),
         Sizes("random", "ratio", 0.004, 0.08, log={"wavelength_m": (5e-4, 5e-3)}, even={"seed": (1.0, 1e5)}),
     ),
     "direction-dependent-friction": (

@@ -39,6 +39,15 @@ def test_friction_along_the_track_is_a_sine_with_its_second_harmonic():
     assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 + 0.1 * wave), rel=4e-4)
 
 
+def test_friction_along_the_track_may_be_two_waves():
+    other = {"other_share": 0.6, "other_wavelength_m": 7e-4, "other_phase_rad": -1.1}
+    values = {"form": "two-waves", "ratio": 0.1, "wavelength_m": 2e-3, "phase_rad": 0.7, **other}
+    result = towed({"position-dependent-friction": values}, FAST_MPS, 1.0)
+    x_m = result.true_position_m
+    wave = np.sin(TAU * x_m / 2e-3 + 0.7) + 0.6 * np.sin(TAU * x_m / 7e-4 - 1.1)
+    assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 + 0.1 * wave), rel=6e-4)
+
+
 @pytest.mark.parametrize(
     ("form", "forward", "backward"),
     [("backward", 1.0, 1.2), ("both", 1.1, 0.9), ("kinetic", 1.0, 1.2)],

@@ -1,29 +1,22 @@
-"""The search for a second effect beside a fit that is done."""
+"""The search: a second effect beside a fit that is done, and a large effect that screening passes over."""
 
 import numpy as np
 import pytest
 
-from diagnosis.gap import floor_of, replicates
+from diagnosis.gap import KNEE
 from diagnosis.library import trials
-from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Problem
-from diagnosis.refit import Fitter
-from diagnosis.search import pairs_with
-from diagnosis.twin import Roughness
-from tests.prepared import prepared
+from diagnosis.refit import FAR_KNEE, NOTHING
+from diagnosis.search import Origin, pairs_with, refitted, screened
+from tests.prepared import fitter_of, prepared
 
 EFFECTS = {"coulomb-level": {"ratio": -0.14}, "stribeck-velocity": {"ratio": -0.57}}
 
 
 def test_a_second_effect_is_found_beside_one_that_is_there(tmp_path):
-    evidence, runs = prepared(tmp_path / "two", "ladder", EFFECTS)
-    problem, nuisances = Problem(evidence.rig, [run for run in runs if not run.holdout]), Nuisances(evidence.rig)
-    described = np.zeros(len(nuisances))
-    point = nuisances.point(described, {})
-    floor = floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 12, 1))
-    fitter = Fitter(problem, floor, nuisances)
+    fitter = fitter_of(*prepared(tmp_path / "two", "ladder", EFFECTS))
+    described = np.zeros(len(fitter.nuisances))
     names = {"coulomb-level", "stribeck-velocity", "static-level"}
-    tried = [one for one in trials(problem) if names.intersection(one.form.effects)]
+    tried = [one for one in trials(fitter.problem) if names.intersection(one.form.effects)]
     coulomb = next(one for one in tried if one.form.effects == ("coulomb-level",))
     first = fitter.refit(coulomb.form, described, coulomb.w)
     pairs = pairs_with(fitter, first, tried)
@@ -31,3 +24,31 @@ def test_a_second_effect_is_found_beside_one_that_is_there(tmp_path):
     assert pairs[0].chi2 < 0.5 * first.chi2
     found = {name: table["ratio"] for name, table in pairs[0].effects.items()}
     assert found == {name: pytest.approx(table["ratio"], rel=0.2) for name, table in EFFECTS.items()}
+
+
+def test_a_large_effect_that_screening_puts_last_is_tried_in_several_sizes(tmp_path):
+    """Screening is linear: here it is made to see nothing in the static level, which it has behind eight others."""
+    fitter = fitter_of(*prepared(tmp_path / "static", "ladder", {"static-level": {"ratio": 0.2}}))
+    described = np.zeros(len(fitter.nuisances))
+    tried = trials(fitter.problem)
+    origins = [
+        Origin(fitter.refit(NOTHING, described, described[:0]), KNEE),
+        Origin(fitter.described(described), FAR_KNEE),
+    ]
+    few = {
+        "static-level",
+        "force-sensor-gain",
+        "force-sensor-bias",
+        "force-sensor-drift",
+        "piezo-sag",
+        "drive-stiffness",
+    }
+    few |= {"accelerometer-gain", "direction-dependent-friction"}
+    found = [
+        sorted(some, key=lambda one: one.form.effects == ("static-level",))
+        for some in screened(fitter, origins, [one for one in tried if set(one.form.effects) <= few])
+    ]
+    assert len(found[0]) > 8
+    best = refitted(fitter, origins, found)[0]
+    assert best.form.effects == ("static-level",)
+    assert best.effects["static-level"]["ratio"] == pytest.approx(0.2, rel=0.2)

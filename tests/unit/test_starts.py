@@ -8,7 +8,7 @@ import pytest
 from diagnosis.problem import Problem
 from diagnosis.ringing import ringing_Hz
 from diagnosis.twin import predict, rig_config
-from diagnosis.waves import drive_waves
+from diagnosis.waves import drive_waves, two_friction_waves
 from tests.prepared import prepared
 
 PITCH_M = 1e-3
@@ -49,6 +49,19 @@ def test_a_screw_stands_where_the_drives_own_sensor_says(screw):
 
     assert drive_m(0.5 + 0.5 * math.pi, 0.0) == pytest.approx(drive_m(0.5, 0.25 * PITCH_M), abs=1e-9)
     assert np.ptp(drive_m(0.5, 0.0) - drive_m(0.5, 0.25 * PITCH_M)) > 1e-6
+
+
+def test_two_waves_along_the_track_are_found_together(tmp_path):
+    other = {"other_share": 0.6, "other_wavelength_m": 9e-4, "other_phase_rad": -1.1}
+    track = {"form": "two-waves", "ratio": 0.06, "wavelength_m": 4e-3, "phase_rad": 0.7, **other}
+    evidence, runs = prepared(tmp_path / "track", "ladder", {"position-dependent-friction": track})
+    problem = Problem(evidence.rig, runs)
+    pairs = two_friction_waves(runs, problem.scales, 4)
+    assert any(
+        first.period == pytest.approx(4e-3, rel=0.1) and other.period == pytest.approx(9e-4, rel=0.03)
+        for first, other in pairs
+    )
+    assert all(first.ratio >= other.ratio > 0.0 for first, other in pairs)
 
 
 def test_a_base_that_rings_shows_its_frequency(tmp_path):

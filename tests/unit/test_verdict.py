@@ -101,10 +101,8 @@ def test_no_gap_stays_the_likeliest_where_it_is_the_verdict():
 class Scatter:
     """Stands in for a random effect: what it leaves on top of a fit, and what log evidence that is worth."""
 
-    effect = "normal-load-fluctuation"
-
-    def __init__(self, left, gained, more=0.0):
-        self.left, self.gained, self.more = left, gained, more
+    def __init__(self, left, gained, more=0.0, effect="normal-load-fluctuation"):
+        self.left, self.gained, self.more, self.effect = left, gained, more, effect
 
     def on(self, under, noise):
         form = Form(under.form.forms | {self.effect: "random"}, under.form.axes)
@@ -133,3 +131,18 @@ def test_a_path_is_judged_by_what_it_can_explain_not_by_what_noise_takes_from_it
     verdict = judge(fit(1000.0), [fit(900.0, "coulomb-level")], [], EXPECTED, [scatter])
     assert verdict.named is not None
     assert verdict.named.form.effects == ("normal-load-fluctuation",)
+
+
+def test_what_few_waves_leave_of_a_rough_track_is_no_second_effect():
+    scatters = [Scatter(50.0, 90.0), Scatter(50.0, 80.0, effect="position-dependent-friction")]
+    waves = fit(400.0, "position-dependent-friction")
+    verdict = judge(fit(1000.0), [waves], [], EXPECTED, scatters)
+    assert verdict.named is not None
+    assert verdict.named.form == waves.form  # the waves, not a path of which nobody knows more than its size
+    assert verdict.probabilities["unexplained"] > 0.2  # as where a path is all
+    assert [one.fit.form.effects for one in verdict.ranked].count(
+        ("position-dependent-friction",)
+    ) == 2  # with it, and it alone
+    load = judge(fit(1000.0), [waves], [], EXPECTED, scatters[:1])
+    assert load.named is not None
+    assert len(load.named.form.effects) == 2
