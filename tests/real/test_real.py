@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(not (SLIDER.is_dir() and AXIS.is_dir()), reason=
 
 
 def diagnosed(folder: Path) -> Diagnosis:
-    found = diagnose(load_evidence(folder), lambda *_: None, jobs=1)
+    found = diagnose(load_evidence(folder), lambda *_: None, jobs=2)
     assert lines(found)[0].startswith("verdict")
     return found
 

@@ -109,7 +109,7 @@ def test_nothing_leaks_from_the_held_out_run(short, tmp_path):
     make_evidence(alien, Case(short), seed=99)
     shutil.copytree(own, other)
     shutil.copy(alien / "run-03.parquet", other / "run-03.parquet")
-    one, two = (diagnosis.diagnose.diagnose(load_evidence(folder), quiet) for folder in (own, other))
+    one, two = (diagnosis.diagnose.diagnose(load_evidence(folder), quiet, 2) for folder in (own, other))
     assert one.effects == ("drive-damping",)
     own_fits, other_fits = (
         {fit.effect: (fit.chi2, fit.form, fit.parameters) for fit in found.candidates} for found in (one, two)

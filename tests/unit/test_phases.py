@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from diagnosis.gap import floor_of, replicates
-from diagnosis.library import trials
+from diagnosis.library import trials, wave_trial
 from diagnosis.nuisance import Nuisances
 from diagnosis.phases import has_own_phases, in_run, is_phase, phase_of, without_phases_of
 from diagnosis.problem import Problem
 from diagnosis.refit import Fitter
 from diagnosis.result import Estimate
 from diagnosis.twin import Roughness
+from diagnosis.waves import Wave
 from diagnosis.wording import estimate_in_words
 from tests.prepared import prepared
 
@@ -55,13 +56,9 @@ def test_a_refit_finds_both_phases(problem):
     fitter = Fitter(
         problem, floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 16, 1)), nuisances
     )
-    near = {"ratio": 0.05, "frequency_Hz": 0.91, "phase_rad": 0.6, phase_of(problem.runs[1].file): 2.5}
-    trial = min(apart(problem), key=lambda trial: abs(float(table_of(trial)["frequency_Hz"]) - 0.91))
-    start = [
-        math.log(near[axis.name] / axis.scale) if axis.logarithmic else near.get(axis.name, 0.0) / axis.scale
-        for axis in trial.form.axes
-    ]
-    fit = fitter.further(fitter.refit(trial.form, described, np.array(start)))
+    near = Wave(1.0 / 0.91, 0.05, 0.6, spread=0.06, phases_of={phase_of(problem.runs[1].file): 2.5})
+    trial = wave_trial("normal-load-fluctuation", "sine", near)
+    fit = fitter.further(fitter.refit(trial.form, described, trial.w))
     table = fit.effects["normal-load-fluctuation"]
     assert table["ratio"] == pytest.approx(0.06, rel=0.1)
     later = float(table[phase_of(problem.runs[1].file)]) - float(table["phase_rad"])
