@@ -22,7 +22,7 @@ from diagnosis.workers import each
 Floats = npt.NDArray[np.floating[Any]]
 EFFECT, FORM = "normal-load-fluctuation", "sine"
 _PHASES_RAD = 2.0 * math.pi * np.arange(8) / 8.0
-_RATIOS = (0.007, 0.02, 0.06)
+_RATIOS = (0.007, 0.02, 0.06)  # of the friction: from hardly visible to large
 _MOST = 3  # frequencies that get a refit
 
 

@@ -44,7 +44,7 @@ class Screened(NamedTuple):
     form: Form  # with the effects of the base
     deviations: Floats
     w: Floats
-    chi2: float
+    chi2: float  # infinite where nothing was screened
     others: tuple[tuple[Floats, Floats], ...]  # more starts, deviations and w: a refit takes the best of all
 
 
