@@ -11,7 +11,8 @@ demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
 
 test: check
-	@$(BIN)/pytest
+	@$(BIN)/pytest -m realtime
+	@$(BIN)/pytest -m "not realtime" -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: $(READY)
 	@$(BIN)/ruff check

@@ -19,7 +19,7 @@ from diagnosis.features import Feature, Features, Scales, Signals, settled, spri
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.phases import in_run
-from diagnosis.reduced import BLOCK_S, reduce_run
+from diagnosis.reduced import BLOCK_S, reduce_run, without_vibration
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
 from diagnosis.twin import Effects, Entry, Roughness, Start, predict, predict_many, rig_config
 from plant.config import RigConfig
@@ -195,7 +195,7 @@ class Problem:
     def _features(self, run: Prepared, signals: Signals) -> Features:
         if self.rig.drive == "force":
             return axis_features(signals, run.commands, self.rig)
-        return spring_features(signals, run.commands, self.scales)
+        return spring_features(without_vibration(signals, run.commands.frequency_Hz), run.commands, self.scales)
 
 
 def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:

@@ -19,6 +19,8 @@ SIGNALS = (*MEANS, *SHAKES)
 _SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_mps2"}
 # fewer samples a block than this cannot tell an rms
 _FEWEST_FOR_SHAKE = 8
+_FURTHEST_BLOCKS = 5  # from a block to those that it is averaged with
+_LEAST_APART = 0.3  # cosine of the angle that the vibration turns by in between; above it noise would grow
 
 
 def reduce_run(run: Run) -> tuple[float, dict[str, Floats]]:
@@ -48,3 +50,35 @@ def reduce_run(run: Run) -> tuple[float, dict[str, Floats]]:
                 power[empty] = np.median(power)
                 reduced[name] = np.sqrt(power)
     return start_s, reduced
+
+
+def without_vibration(signals: dict[str, Floats], frequency_Hz: Floats) -> dict[str, Floats]:
+    """The signals with accelerations whose means keep nothing of a vibration; what they lose belongs to the shake.
+
+    A block holds 4.5 periods of 4.5 kHz: its mean keeps up to 7 % of the amplitude, of either sign, by the phase of the exciter,
+    which no log tells. Every block is averaged with those so many blocks off that the vibration is turned by most of half a
+    turn, with the weights that leave nothing at its frequency and a constant as it is.
+
+    Args:
+        signals: [blocks] each, measured or predicted.
+        frequency_Hz: of the vibration, [blocks]; 0 where there is none, and there nothing changes.
+
+    """
+    shaken = np.flatnonzero(frequency_Hz)
+    values_Hz, which = np.unique(frequency_Hz[shaken], return_inverse=True)
+    turned = np.cos(2.0 * np.pi * BLOCK_S * np.outer(values_Hz, np.arange(1, _FURTHEST_BLOCKS + 1)))
+    cosine = turned.min(axis=1, initial=1.0)[which]
+    apart = (turned.argmin(axis=1) + 1)[which]
+    own, cosine, apart = (values[cosine < _LEAST_APART] for values in (shaken, cosine, apart))
+    before, after = np.maximum(own - apart, 0), np.minimum(own + apart, len(frequency_Hz) - 1)
+    result = dict(signals)
+    for shake, source in _SHAKEN.items():
+        if source in signals:
+            mean = signals[source]
+            steady = (mean[before] - 2.0 * cosine * mean[own] + mean[after]) / (2.0 - 2.0 * cosine)
+            result[source] = mean.copy()
+            result[source][own] = steady
+            if shake in signals:
+                result[shake] = signals[shake].copy()
+                result[shake][own] = np.hypot(signals[shake][own], mean[own] - steady)
+    return result

@@ -14,6 +14,8 @@ from cockpit.onboard import run_onboard
 from cockpit.scenario import load_scenario
 from tests.system.ports import free_endpoint
 
+pytestmark = pytest.mark.realtime
+
 TABLES = ("sensors", "applied", "command", "trace", "state")
 
 

@@ -22,6 +22,8 @@ from controller.replay import replay
 from plant.node import PlantNode
 from tests.system.ports import free_endpoint
 
+pytestmark = pytest.mark.realtime
+
 COMMAND = [sys.executable, "-m", "cockpit"]
 
 

@@ -17,6 +17,8 @@ from bridge.logfile import read_run
 from bridge.topics import TOPICS
 from tests.system.ports import free_endpoint
 
+pytestmark = pytest.mark.realtime
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "bridge" / "PROTOCOL.md").read_text()
 FOREIGN_PLANT = ROOT / "tests" / "system" / "foreign_plant.py"

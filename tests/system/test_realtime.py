@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from bridge import stickslip_pb2 as wire
 from bridge.logfile import read_run
@@ -13,6 +14,8 @@ from bridge.topics import OPERATOR, STATE
 from bridge.zenoh_link import Bus, BusConfig
 from controller.codes import BLOCK
 from tests.system.ports import free_endpoint
+
+pytestmark = pytest.mark.realtime
 
 COMMAND = [sys.executable, "-m", "cockpit"]
 

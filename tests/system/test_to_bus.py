@@ -6,11 +6,15 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from bridge import stickslip_pb2 as wire
 from bridge.topics import PLANT_EVENT, SENSORS
 from bridge.zenoh_link import Bus, BusConfig, Inbox
 from tests.golden.bless import FOLDER
 from tests.system.ports import free_endpoint
+
+pytestmark = pytest.mark.realtime
 
 
 def test_pause_and_go_on() -> None:
