@@ -18,6 +18,7 @@ from diagnosis.features import Scales, Signals
 Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 21  # blocks
 _FEWEST = 500  # blocks of a piece
+_FEWEST_STILL = 100  # of an acceleration: better short than with what a vibration leaves in it
 _SLOW_SHARE = 3e-4  # of the static friction: 5 mN on the paper's rig, the drift of a strain gauge within 10 s
 _SLOW_WAVES = 6
 _POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks
@@ -68,7 +69,7 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
             shake[name] = float(np.median(calm))
             spread = values - uniform_filter1d(values, _WINDOW)
             pieces[name] = spread[quiet]
-        elif name.endswith("accel_mps2") and still.sum() >= _FEWEST:
+        elif name.endswith("accel_mps2") and still.sum() >= _FEWEST_STILL:
             pieces[name] = values[still]
         else:
             rest = values - uniform_filter1d(values, _WINDOW)

@@ -287,7 +287,7 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
         scales = scales_of(rig)
         commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
     start = _start(rig, signals, commands, start_s)
-    noisy = signals
+    noisy = without_vibration(signals, commands.frequency_Hz)
     if commands.motion is not None and "mass_position_m" in signals:
         led = predict(rig_config(rig, {}, {}, None), True, commands, start)
         noisy = signals | {"mass_position_m": signals["mass_position_m"] - led["mass_position_m"]}

@@ -198,20 +198,25 @@ def _varies(p: Record) -> bool:
 
 
 @kernel
+def extension_m(p: Record, force_N: float) -> float:
+    """Of the drive's spring, where it has this force."""
+    found_m = 0.0
+    step_m = _FURTHEST * force_N / p.k_d + math.copysign(0.5 * p.gap_m, force_N)
+    for _ in range(_HALVINGS):
+        step_m *= 0.5
+        if math.fabs(spring_N(p, found_m + step_m)) < math.fabs(force_N):
+            found_m += step_m
+    return found_m
+
+
+@kernel
 def _enter(w: Floats, params: npt.NDArray[Any], drive_mps: float, force_N: Floats, age_s: Floats) -> None:
     """Put every slide where its spring has a force [LANES], stuck where the age [LANES] is a number."""
     for i in range(LANES):
         p: Record = params[i]
-        held_N = force_N[i] - w[at.ARM + i]
-        extension_m = 0.0
-        step_m = _FURTHEST * held_N / p.k_d + math.copysign(0.5 * p.gap_m, held_N)
-        for _ in range(_HALVINGS):
-            step_m *= 0.5
-            if math.fabs(spring_N(p, extension_m + step_m)) < math.fabs(held_N):
-                extension_m += step_m
         w[at.FRAME + i], w[at.FRAME_V + i] = force_N[i] * p.frame_m_per_N, 0.0
         w[at.BASE + i], w[at.BASE_V + i] = force_N[i] * p.base_m_per_N, 0.0
-        w[at.X + i] = w[at.S_D + i] - w[at.FRAME + i] - extension_m
+        w[at.X + i] = w[at.S_D + i] - w[at.FRAME + i] - extension_m(p, force_N[i] - w[at.ARM + i])
         w[at.Z + i] = min(max(force_N[i], -p.F_s), p.F_s) / p.k_t
         if math.isnan(age_s[i]):
             w[at.V + i] = w[at.V_R + i] = drive_mps

@@ -20,7 +20,7 @@ from diagnosis.commands import Commands
 from diagnosis.lanes import LANES
 from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S, SIGNALS
-from diagnosis.side_by_side import advance_lanes
+from diagnosis.side_by_side import advance_lanes, extension_m
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.records import CHANNELS, TRUTH, build
@@ -191,7 +191,7 @@ def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
     s.z = held_N / p.k_t
     s.age_s = start.age_s
     if not force_driven:
-        s.s_d = start.position_m + held_N / p.k_d + math.copysign(0.5 * p.gap_m, held_N)
+        s.s_d = start.position_m + extension_m(p, held_N)
         s.drive_N = held_N
         s.frame_m = held_N * p.frame_m_per_N
         s.base_m = held_N * p.base_m_per_N

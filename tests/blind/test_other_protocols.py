@@ -1,0 +1,44 @@
+"""Rigs without a gap under protocols that are not the blind check's: what a model cannot know must not count as one."""
+
+from pathlib import Path
+
+import pytest
+
+from diagnosis.evidence import load_evidence
+from diagnosis.problem import Problem, prepare
+from diagnosis.retuning import retuned_rig
+from diagnosis.verdict import NEVER_WITHOUT_GAP
+from tests.blind.generator import Case, make
+from tests.blind.generator.runs import Plan
+
+HELD_OUT = Plan(drive=((0.0, 0.8e-3),), holdout=True, duration_s=5.0)
+PROTOCOLS = {
+    # 4.5 periods of 4.5 kHz in a block of 1 ms, of a phase that no log tells: chi2 208, expected 80
+    "slips under half a period": (
+        Plan(drive=((0.0, 3e-3), (1.7, -3e-3)), duration_s=3.4),
+        Plan(drive=((0.0, 0.9e-3),), vibration=((1.0, 3000.0), (1.8, 1200.0), (2.6, 4500.0)), duration_s=3.4),
+        HELD_OUT,
+    ),
+    # a drive that takes 50 ms to its speed, and no slip before the vibration: 174, expected 62
+    "a slow climb from rest": (
+        Plan(drive=((0.0, 0.8e-3),), duration_s=8.0),
+        Plan(drive=((0.0, 0.17e-3),), vibration=((1.6, 802.0), (3.73, 2299.0), (5.87, 4250.0)), duration_s=8.0),
+        HELD_OUT,
+    ),
+    # hardly a block without vibration and slips to take the accelerometers' noise from: 227, expected 99
+    "shaken nearly throughout": (
+        Plan(drive=((0.0, 1.5e-3),), duration_s=8.0),
+        Plan(drive=((0.0, 0.5e-3),), duration_s=8.0),
+        Plan(drive=((0.0, 2e-3),), vibration=((1.6, 513.0),), duration_s=8.0),
+        HELD_OUT,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_a_rig_inside_its_tolerances_is_no_gap(name: str, tmp_path: Path) -> None:
+    make(tmp_path, Case(effects=(), backbone="lugre", tolerances=1.0, leave_out=(), roughness=1.0), 14, PROTOCOLS[name])
+    evidence = load_evidence(tmp_path)
+    fitted = [run for run in prepare(evidence) if not run.holdout]
+    retuned = retuned_rig(evidence, Problem(evidence.rig, fitted), lambda *_: None)
+    assert retuned.fit.chi2 < NEVER_WITHOUT_GAP * retuned.expected_chi2
