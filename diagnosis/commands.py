@@ -1,7 +1,8 @@
 """What the rig was told: drive and vibration on the 1 ms grid, and the segments in which neither changes.
 
 The drive is taken as even between changes of speed: an uneven drive is a gap, not an input. Where the manifest gives no
-velocity, it is read from the drive position as pieces of constant velocity.
+velocity, it is read from the drive position as pieces of constant velocity. Where a drive takes its time from one to the next,
+it goes as it was measured.
 """
 
 from itertools import pairwise
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import savgol_filter
 
 from diagnosis.axis_motion import Motion, motion_of
 from diagnosis.evidence import Run
@@ -20,6 +22,12 @@ _WINDOW = 100  # blocks: 0.1 s, over which a velocity is read from a position wi
 # A change of speed is one when it is larger than this share of the faster speed; a ripple of a screw stays below.
 _SMALLEST_CHANGE = 0.35
 _SHORTEST_S = 0.3
+_SHORTEST_WINDOWS = 3
+# What a window may be off the velocity of its piece, of the change that the piece begins or ends with
+_ON_THE_WAY = 0.1
+_QUICK = 2  # windows that are off for a change that is taken as a step: the settling covers half of it
+_LONGEST_RAMP = 20  # windows
+_RATE_WINDOW = 41  # blocks that a velocity is read from on the way: noise of 1 um is 13 um/s
 # Blocks after a change of command, or the start of a run: 0.1 s, in which a drive or a piezo may still get there. A drive
 # that took 50 ms to 0.17 mm/s left the force 0.05 N lower for all of a slow climb, 8 floors.
 _SETTLING = 100
@@ -74,7 +82,7 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
         motion = motion_of(reduced, len(run.t_s) / blocks, rig)
         return Commands(drive, frequency_Hz, amplitude_m, (Segment(0, blocks, 0.0, 0.0, 0.0),), motion)
     if run.drive_velocity_mps is not None:
-        drive = np.full(blocks, run.drive_velocity_mps)
+        drive = _stated(run.drive_velocity_mps, blocks, reduced.get("drive_position_m"))
     else:
         drive = _pieces(reduced["drive_position_m"])
     change = (np.diff(drive) != 0.0) | (np.diff(frequency_Hz) != 0.0) | (np.diff(amplitude_m) != 0.0)
@@ -93,6 +101,18 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
     return Commands(drive, frequency_Hz, amplitude_m, segments)
 
 
+def _stated(velocity_mps: float, blocks: int, position_m: Floats | None) -> Floats:
+    """The stated velocity a block, but where the drive starts and stops as it was measured."""
+    drive = np.full(blocks, velocity_mps)
+    if position_m is not None:
+        measured = _pieces(position_m)
+        arrived = np.flatnonzero(np.abs(measured - velocity_mps) <= _ON_THE_WAY * abs(velocity_mps))
+        if len(arrived):
+            on_the_way = np.r_[: arrived[0], arrived[-1] + 1 : blocks]
+            drive[on_the_way] = measured[on_the_way]
+    return drive
+
+
 def _pieces(position_m: Floats) -> Floats:
     """Velocity [m/s] a block: constant between changes of speed."""
     blocks = len(position_m)
@@ -101,28 +121,57 @@ def _pieces(position_m: Floats) -> Floats:
     windows = blocks // _WINDOW
     velocity = np.array([_slope(position_m[i * _WINDOW : (i + 1) * _WINDOW]) for i in range(windows)])
     edges = [0, *_changes(velocity, 0, windows, float(np.abs(velocity).max())), windows]
-    knots = [0]
-    lines: list[tuple[float, float]] = []
-    for first, last in pairwise(edges):
+    pieces = [piece for piece in pairwise(edges) if not _is_ramp(velocity[slice(*piece)])] or [(0, windows)]
+    speeds = [0.0, *(float(np.median(velocity[slice(*piece)])) for piece in pieces), 0.0]
+    measured = np.asarray(savgol_filter(position_m, _RATE_WINDOW, 2, deriv=1, delta=BLOCK_S))
+    result = measured.copy()
+    done, lines = 0, list[tuple[float, float]]()
+    for number, (first, last) in enumerate(pieces):
+        before, own, after = speeds[number : number + 3]
         # the outer windows of a piece may hold the change itself
-        inner = slice((first + (first > 0)) * _WINDOW, (last - 1) * _WINDOW if last < windows else blocks)
-        at = np.arange(blocks)[inner]
-        slope, offset = np.polyfit(at, position_m[inner], 1)
-        if lines:
+        begin = first + max(_off(velocity[first:last], own, before, first == 0), int(first > 0))
+        end = last - max(_off(velocity[first:last][::-1], own, after, last == windows), int(last < windows))
+        inner = slice(begin * _WINDOW, end * _WINDOW if end < windows else blocks)
+        slope, offset = np.polyfit(np.arange(blocks)[inner], position_m[inner], 1)
+        since = inner.start
+        if lines and begin - done <= _QUICK:
             before_slope, before_offset = lines[-1]
             crossing = (offset - before_offset) / (before_slope - slope)
-            knots.append(round(float(np.clip(crossing, (first - 1) * _WINDOW, (first + 1) * _WINDOW))))
+            since = round(float(np.clip(crossing, (first - 1) * _WINDOW, (first + 1) * _WINDOW)))
+            result[done * _WINDOW : since] = before_slope / BLOCK_S
+        result[since : inner.stop] = slope / BLOCK_S
         lines.append((float(slope), float(offset)))
-    knots.append(blocks)
-    result = np.empty(blocks)
-    for (slope, _), first, last in zip(lines, knots[:-1], knots[1:], strict=True):
-        result[first:last] = slope / BLOCK_S
+        done = end
     return result
+
+
+def _off(velocity: Floats, own: float, other: float, at_the_end: bool) -> int:
+    """Windows from the first one on in which a piece is not at its velocity yet.
+
+    At an end of the run, where nothing says what was before, a drive that starts or stops is below half of it.
+    """
+    if at_the_end and own * velocity[0] >= 0.5 * own * own:
+        return 0
+    on_the_way = np.abs(velocity - own) > _ON_THE_WAY * abs(own - other)
+    most = len(velocity) - _SHORTEST_WINDOWS
+    return min(int(np.argmin(on_the_way)), max(most, 0))
+
+
+def _is_ramp(velocity: Floats) -> bool:
+    """Whether a piece is a change of speed itself."""
+    if len(velocity) > _LONGEST_RAMP:
+        return False
+    time = np.linspace(-0.5, 0.5, len(velocity))
+    rise = float(time @ velocity) / float(time @ time)
+    if abs(rise) < _SMALLEST_CHANGE * float(np.abs(velocity).max()):
+        return False
+    about = velocity - velocity.mean()
+    return rise * rise * float(time @ time) > 0.8 * float(about @ about)
 
 
 def _changes(velocity: Floats, first: int, last: int, fastest: float) -> list[int]:
     """Binary segmentation: windows at which the mean velocity changes for good."""
-    shortest = 3
+    shortest = _SHORTEST_WINDOWS
     if last - first < 2 * shortest:
         return []
     best, best_gain = 0, 0.0

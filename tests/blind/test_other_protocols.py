@@ -8,8 +8,8 @@ from diagnosis.evidence import load_evidence
 from diagnosis.problem import Problem, prepare
 from diagnosis.retuning import retuned_rig
 from diagnosis.verdict import NEVER_WITHOUT_GAP
-from tests.blind.generator import Case, make
-from tests.blind.generator.runs import Plan
+from tests.blind.generator import Case, make, runs
+from tests.blind.generator.runs import PROTOCOL, Plan
 
 HELD_OUT = Plan(drive=((0.0, 0.8e-3),), holdout=True, duration_s=5.0)
 PROTOCOLS = {
@@ -35,10 +35,20 @@ PROTOCOLS = {
 }
 
 
-@pytest.mark.parametrize("name", PROTOCOLS)
-def test_a_rig_inside_its_tolerances_is_no_gap(name: str, tmp_path: Path) -> None:
-    make(tmp_path, Case(effects=(), backbone="lugre", tolerances=1.0, leave_out=(), roughness=1.0), 14, PROTOCOLS[name])
-    evidence = load_evidence(tmp_path)
+def assert_no_gap(folder: Path, protocol: tuple[Plan, ...]) -> None:
+    make(folder, Case(effects=(), backbone="lugre", tolerances=1.0, leave_out=(), roughness=1.0), 14, protocol)
+    evidence = load_evidence(folder)
     fitted = [run for run in prepare(evidence) if not run.holdout]
     retuned = retuned_rig(evidence, Problem(evidence.rig, fitted), lambda *_: None)
     assert retuned.fit.chi2 < NEVER_WITHOUT_GAP * retuned.expected_chi2
+
+
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_a_rig_inside_its_tolerances_is_no_gap(name: str, tmp_path: Path) -> None:
+    assert_no_gap(tmp_path, PROTOCOLS[name])
+
+
+def test_a_drive_that_takes_its_time_is_no_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """0.3 s from one speed to the next, read as steps: chi2 510, expected 118."""
+    monkeypatch.setattr(runs, "DRIVE_RAMP_S", 0.3)
+    assert_no_gap(tmp_path, PROTOCOL)
