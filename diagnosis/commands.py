@@ -114,7 +114,7 @@ def _stated(velocity_mps: float, blocks: int, position_m: Floats | None) -> Floa
 
 
 def _pieces(position_m: Floats) -> Floats:
-    """Velocity [m/s] a block: constant between changes of speed."""
+    """Velocity [m/s] a block: constant between changes of speed, and as measured where one takes its time."""
     blocks = len(position_m)
     if blocks < 4 * _WINDOW:
         return np.full(blocks, _slope(position_m))
