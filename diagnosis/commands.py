@@ -123,8 +123,7 @@ def _pieces(position_m: Floats) -> Floats:
     edges = [0, *_changes(velocity, 0, windows, float(np.abs(velocity).max())), windows]
     pieces = [piece for piece in pairwise(edges) if not _is_ramp(velocity[slice(*piece)])] or [(0, windows)]
     speeds = [0.0, *(float(np.median(velocity[slice(*piece)])) for piece in pieces), 0.0]
-    measured = np.asarray(savgol_filter(position_m, _RATE_WINDOW, 2, deriv=1, delta=BLOCK_S))
-    result = measured.copy()
+    result = np.asarray(savgol_filter(position_m, _RATE_WINDOW, 2, deriv=1, delta=BLOCK_S))
     done, lines = 0, list[tuple[float, float]]()
     for number, (first, last) in enumerate(pieces):
         before, own, after = speeds[number : number + 3]
