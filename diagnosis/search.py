@@ -162,7 +162,8 @@ def refitted_rest(
     fits = _refitted(fitter, origins[0].fit.chi2, passed_over, [], jobs, _FULL)
     described = origins[-1].fit.deviations
     as_tried = best_of_each([trial for trial in trials if not _is_wave(trial.form)], by_form=True)
-    fits += refits(fitter, [(trial.form, described, trial.w) for trial in as_tried], jobs)
+    base_chi2 = origins[0].fit.chi2
+    fits += each_beside(jobs, _trying, fitter, [((trial.form, described, trial.w), base_chi2) for trial in as_tried])
     return best_of_each(sorted(fits, key=lambda fit: fit.chi2))
 
 
@@ -298,6 +299,11 @@ def refits(fitter: Fitter, starts: Sequence[Start], jobs: int) -> list[Fit]:
 
 def _refitting(fitter: Fitter, start: Start) -> Work[Fit]:
     return fitter.refitting(*start)
+
+
+def _trying(fitter: Fitter, work: tuple[Start, float]) -> Work[Fit]:
+    start, base_chi2 = work
+    return fitter.trying(*start, base_chi2)
 
 
 def each_beside(jobs: int, work: Callable[[Fitter, T], Work[Fit]], fitter: Fitter, items: Sequence[T]) -> list[Fit]:

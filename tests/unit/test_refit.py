@@ -7,18 +7,23 @@ from diagnosis.gap import floor_of, replicates
 from diagnosis.library import trials
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
-from diagnosis.refit import Fitter
+from diagnosis.refit import NOTHING, Fitter
+from diagnosis.together import together
 from diagnosis.twin import Roughness
-from tests.prepared import prepared
+from tests.prepared import fitter_of, prepared
 
 
-@pytest.fixture
-def fitter(tmp_path):
-    evidence, runs = prepared(tmp_path / "one", "ladder", {"static-level": {"ratio": -0.1}})
+def fitter_of_one_run(folder, effects):
+    evidence, runs = prepared(folder, "ladder", effects)
     problem, nuisances = Problem(evidence.rig, runs[:1]), Nuisances(evidence.rig)
     point = nuisances.point(np.zeros(len(nuisances)), {})
     floor = floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 12, 1))
     return Fitter(problem, floor, nuisances)
+
+
+@pytest.fixture
+def fitter(tmp_path):
+    return fitter_of_one_run(tmp_path / "one", {"static-level": {"ratio": -0.1}})
 
 
 def start_of(fitter, name):
@@ -46,3 +51,32 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
     assert not np.isfinite(impossible).any()
     even = fitter.far_chi2(sliding.form, (described, rough), fitter.predicted(described, sliding.form.tables(rough)))
     assert fitter.far_chi2(yielding.form, (described, weightless), impossible) > even > 1e3
+
+
+def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
+    fitter = fitter_of(*prepared(tmp_path / "damped", "ladder", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
+    described = np.zeros(len(fitter.nuisances))
+    base = fitter.refit(NOTHING, described, described[:0]).chi2
+
+    def tried_and_refitted(name):
+        start = start_of(fitter, name)
+        at = (start.form, described, start.w)
+        return [predictions_and_fit(fitter, work) for work in (fitter.trying(*at, base), fitter.refitting(*at))]
+
+    (tried, _), (refitted, _) = tried_and_refitted("accelerometer-gain")
+    assert tried < 0.6 * refitted
+    (_, tried), (_, refitted) = tried_and_refitted("drive-damping")
+    assert tried.chi2 < 0.5 * base
+    assert tried.chi2 == pytest.approx(refitted.chi2, rel=0.05)
+
+
+def predictions_and_fit(fitter, work):
+    """How many predictions a fit takes, and the fit."""
+    asked = []
+
+    def predicted(points):
+        asked.extend(points)
+        return fitter.predicted_many(points)
+
+    (fit,) = together(predicted, [work])
+    return len(asked), fit

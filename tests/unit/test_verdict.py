@@ -35,6 +35,13 @@ def test_a_gap_that_nothing_takes_is_unexplained():
     assert judge(fit(4000.0), [fit(3900.0, "coulomb-level")], [], EXPECTED).kind == "unexplained"
 
 
+@pytest.mark.parametrize(
+    ("base", "left", "kind"), [(400.0, 75.0, "effect"), (400.0, 120.0, "unexplained"), (4000.0, 145.0, "effect")]
+)
+def test_what_leaves_more_than_a_right_effect_would_is_unexplained(base, left, kind):
+    assert judge(fit(base), [fit(left, "coulomb-level")], [], EXPECTED).kind == kind
+
+
 def test_what_the_runs_kept_aside_refute_is_unexplained():
     named = fit(50.0, "coulomb-level")
     verdict = judge(fit(400.0), [named], [], EXPECTED, refuted=True)
@@ -45,7 +52,7 @@ def test_what_the_runs_kept_aside_refute_is_unexplained():
 
 @pytest.mark.parametrize(("expected", "kind"), [(40.0, "effect"), (50.0, "unexplained")])
 def test_where_noise_hides_the_slips_an_effect_must_leave_nothing(expected, kind):
-    assert judge(fit(1000.0), [fit(250.0, "coulomb-level")], [], expected).kind == kind
+    assert judge(fit(1000.0), [fit(90.0, "coulomb-level")], [], expected).kind == kind
     assert judge(fit(1000.0), [fit(50.0, "coulomb-level")], [], expected).kind == "effect"
 
 
@@ -53,7 +60,7 @@ def test_where_noise_hides_the_slips_an_effect_must_leave_nothing(expected, kind
     ("base", "single", "double", "named"),
     [
         (1000.0, 400.0, 50.0, 2),  # the second closes what the first leaves
-        (1000.0, 400.0, 350.0, 1),  # it closes little of it
+        (1000.0, 90.0, 80.0, 1),  # it closes little of it
         (20000.0, 59.0, 45.0, 1),  # nothing was left
         (20000.0, 300.0, 50.0, 2),  # a gap was left and is closed, although it is small beside what both close
         (20000.0, 600.0, 200.0, 1),  # neither does: the rest is what the first one's formula does not fit
