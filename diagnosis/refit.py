@@ -229,7 +229,7 @@ class Fitter:
         fit = yield from self._judging(fit)
         if _NO_LESS * base_chi2 < fit.chi2 < _ASTRAY * base_chi2:
             return fit
-        return (yield from self.refitting(form, fit.deviations, fit.w))
+        return (yield from self.fitting(form, fit.deviations, fit.w, _NEAR))
 
     def further(self, fit: Fit) -> Fit:
         """A fit refitted again as long as that gains."""
