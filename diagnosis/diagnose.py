@@ -101,8 +101,10 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
             singles = _finished(fitter, _again(fitter, singles, by_run, jobs), expected_chi2, jobs)
         if singles and much_left(singles[0], expected_chi2):
             progress(f"every effect gets a refit beside the best one, {singles[0].form.effects[0]}", 0.7)
+            best_before = pairs[0].chi2 if pairs else math.inf
             pairs = _finished(fitter, _with(pairs, pairs_with(fitter, singles[0], tried, jobs)), expected_chi2, jobs)
-            singles = _again(fitter, singles, _alone(pairs), jobs)
+            if pairs and pairs[0].chi2 < best_before:
+                singles = _again(fitter, singles, _alone(pairs), jobs)
         verdict = judge(retuned, singles, pairs, expected_chi2)
     random: list[RandomFriction] = []
     if _may_scatter(verdict, retuned, singles, pairs, expected_chi2):
