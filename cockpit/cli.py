@@ -217,7 +217,12 @@ def reproduce(
 @app.command("map")
 def stability(
     rig: Annotated[str, typer.Option(help="Name of a rig in deploy/rigs, or a .toml file.")] = DEFAULT_SCENARIO,
-    settings: Settings = [],  # noqa: B006
+    settings: Annotated[
+        list[str],
+        typer.Option(
+            "--set", help="Change one value of the rig: key=value, e.g. contact.static_force_N=18. Repeatable."
+        ),
+    ] = [],  # noqa: B006
     out: Annotated[Path, typer.Option(help="The picture, a PNG file.")] = Path("runs/map.png"),
     as_json: Json = False,
 ) -> None:
@@ -313,13 +318,21 @@ def replay_command(
 
 
 @app.command()
-def explain(code: Annotated[str, typer.Argument(help="For example ENDPOINT_BUSY.")]) -> None:
-    """Say what a fault code means and what to do."""
-    kind = FAULTS.get(code.upper())
-    if kind is None:
+def explain(
+    code: Annotated[
+        str, typer.Argument(help="For example ENDPOINT_BUSY, or an exit status; all of them if left out.")
+    ] = "",
+) -> None:
+    """Say what a fault code or an exit status means and what to do."""
+    if not code:
+        for kind in sorted(FAULTS.values(), key=lambda kind: kind.exit_status):
+            print(f"{kind.exit_status:>3}  {kind.code}")
+        return
+    kinds = [kind for kind in FAULTS.values() if code.upper() in {kind.code, str(kind.exit_status)}]
+    if not kinds:
         print(f"stickslip: {code}: unknown code; known: {', '.join(FAULTS)}", file=sys.stderr)
         sys.exit(2)
-    print(f"{kind.code} (exit status {kind.exit_status})\n{kind.help}")
+    print("\n\n".join(f"{kind.code} (exit status {kind.exit_status})\n{kind.help}" for kind in kinds))
 
 
 @app.command()

@@ -17,24 +17,34 @@ _SHOWN_CANDIDATES = 3
 
 
 def in_words(diagnosis: "Diagnosis") -> list[str]:
-    """The verdict first, then the leading candidates, the gap, and what to measure next."""
+    """The verdict first, then the leading candidates, the gap, what to measure next, and what is wrong with the data."""
     gap, after = diagnosis.gap, diagnosis.next_experiment
     lines = [wording.headline(diagnosis), *diagnosis.summary]
     for label, one in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
         sizes = "; ".join(wording.estimate_in_words(*item) for item in one.parameters.items())
         lines.append(f"{label:<10} {one.effect:<28} {wording.percent(one.probability):>8}   {sizes}".rstrip())
-    shrinkage = "" if gap.shrinkage is None else f"; {wording.percent(gap.shrinkage)} of the gap closed"
-    lines.append(
-        f"gap        {wording.times(gap.nominal)} as described, {wording.times(gap.retuned)} retuned, "
-        f"{wording.times(gap.with_effect)} with the best explanation; perfect is {wording.times(gap.floor)}{shrinkage}"
-    )
-    return [*lines, f"next       {after.what} {after.why}"]
+    if gap.runs:
+        numbers = [f"{wording.times(gap.nominal)} as described", f"{wording.times(gap.retuned)} retuned"]
+        if diagnosis.effects:
+            numbers.append(f"{wording.times(gap.with_effect)} with {' and '.join(diagnosis.effects)}")
+        shrinkage = "" if gap.shrinkage is None else f"; {wording.percent(gap.shrinkage)} of the gap closed"
+        lines.append(f"gap        {', '.join(numbers)}; perfect is {wording.times(gap.floor)}{shrinkage}")
+    lines.append(f"next       {after.what} {after.why}")
+    files: dict[tuple[str, str], list[str]] = {}
+    for finding in diagnosis.findings:
+        file, _, column = finding.where.partition(": ")
+        files.setdefault((column, finding.text), []).append(file)
+    data = [f"{', '.join(where)}: {f'{column}: ' if column else ''}{text}" for (column, text), where in files.items()]
+    return [*lines, *(f"{'' if i else 'data':<10} {line}" for i, line in enumerate(data))]
 
 
 def in_a_line(outcome: "Outcome") -> str:
     """What became of one folder among many."""
     if outcome.diagnosis is not None:
-        return f"{outcome.source.name}: {wording.headline(outcome.diagnosis)}"
+        # the run that was kept aside unasked is no fault of the data
+        doubts = sum(finding.kind != "holdout" for finding in outcome.diagnosis.findings)
+        told = f"; {doubts} findings about its data, see --json" if doubts else ""
+        return f"{outcome.source.name}: {wording.headline(outcome.diagnosis)}{told}"
     code, line = outcome.fault or ("", "")
     return f"{outcome.source.name}: {code}: {line}"
 

@@ -13,6 +13,7 @@ Comparison
     side_by_side, lanes         eight rigs through it at once; one step of them
     sensing                     what sensors make of a prediction: faults, and ordinary lags
     axis_drive                  a force-driven axis: the true input, freed of what its sensor did to it
+    entries                     the force and the state with which every segment of the model begins
     noise                       the noise of a run, taken from the run
     cycles                      slips, breakaways and re-sticks of a force record
     features, axis_features     a run in numbers that do not depend on when it slips; the same for a force-driven axis
@@ -22,11 +23,13 @@ Fit
     nuisance                    what may differ without being a gap, in units of its tolerance
     library                     every effect in every formula, with coordinates and starts
     waves, axis_waves           periods at which a wave may be looked for
-    phases                      a wave over time that begins in another phase in every run
+    ringing                     frequencies at which a structure that rings may be looked for
+    phases, phases_by_run       a wave over time that begins in another phase in every run; where its refit starts
     retuning                    the rig without effects, refitted: what all evidence is measured against
     refit                       Gauss-Newton over nuisances and the parameters of an effect
     together                    many fits at once, whose predictions go side by side
     random_friction             friction without a path that could be followed: judged by what it scatters
+    workers                     the same work on many items, in as many processes as one wants
     search                      from all trials to the few that are refitted in full
 Verdict
     diagnose                    the whole way, in order

@@ -10,7 +10,7 @@ from diagnosis.evidence import Evidence
 from diagnosis.phases import without_phases_of
 from diagnosis.report import write_whole
 from diagnosis.result import Diagnosis
-from diagnosis.wording import percent
+from diagnosis.wording import headline
 from plant.config import RigConfig
 
 # of the evidence's rig table -> of a rig file
@@ -77,11 +77,9 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
 
 
 def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
-    probability = {one.effect: one.probability for one in diagnosis.candidates}
     lines = [f"Written by `stickslip diagnose` from the evidence {_word(evidence.folder.name)}."]
     if diagnosis.effects:
-        named = ", ".join(f"{name} (probability {percent(probability[name])})" for name in diagnosis.effects)
-        lines.append(f"Verdict: effect: {named}.")
+        lines.append(f"Verdict: {headline(diagnosis)}.")
     else:
         lines.append("Verdict: no gap: the rig as described, refitted inside its tolerances.")
     gap = diagnosis.gap

@@ -129,7 +129,7 @@ def _whole_cycle(version: Version, slips: Slips) -> Curve:
     """Every cycle stretched to the mean period, so that the slips at its ends stay sharp, and averaged."""
     values = version.signals["drive_force_N"]
     periods = np.diff(slips.middles)
-    share = np.concatenate([np.linspace(-0.12, 1.12, _POINTS)])
+    share = np.linspace(-0.12, 1.12, _POINTS)
     blocks = np.arange(len(values), dtype=np.float64)
     cycles = [
         np.interp(middle + share * period, blocks, values)

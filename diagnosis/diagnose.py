@@ -115,7 +115,8 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit, jobs)
         checked = judge(without, [again], [], expected_chi2)
         if checked.named is None:
-            retuned, singles, verdict = without, [again], checked
+            others = [fit for fit in singles if fit.form.effects != again.form.effects]
+            retuned, singles, verdict = without, [again, *others], checked
     best = verdict.named or retuned
     unseen = [run for run in runs if run.holdout]
     held_out: HeldOut | None = None

@@ -3,6 +3,7 @@
 What cannot be used is left out and reported as a finding; where nothing usable remains, a Fault says so.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,16 +15,21 @@ from bridge.tables import read_table
 from diagnosis.evidence_checks import Columns, checked
 from diagnosis.findings import Finding
 from diagnosis.log_evidence import columns_of_log
-from diagnosis.manifest import STANDARD, ChannelMap, Manifest, RigTable, RunTable, read_manifest
+from diagnosis.manifest import MANIFEST, STANDARD, ChannelMap, Manifest, RigTable, RunTable, read_manifest
 
 Floats = npt.NDArray[np.float64]
-# what each column tells that no other one does
-_COST = {
+SHAKE_RATE_HZ = 8000.0  # a slower accelerometer has too few samples a millisecond to tell how strongly it vibrates
+# what each column tells that no other one does, by kind of drive
+_COST_SPRING = {
     "drive_force_N": "slips are seen in the acceleration only, and no force level or drive stiffness can be judged",
     "mass_accel_mps2": "mass, normal-load fluctuation and the fast part of a slip are judged from the force alone",
     "base_accel_mps2": "what the piezo really delivers, and a base that gives way, cannot be seen",
     "mass_position_m": "position-dependent friction and frame compliance are judged from the drive position only",
     "drive_position_m": "the drive counts as perfectly even: no speed ripple can be seen",
+}
+_COST_FORCE = {
+    "mass_accel_mps2": "the acceleration is taken from the position, twice differentiated",
+    "mass_position_m": "the motion is taken from the acceleration: nothing that goes with place or a slow drift can be judged",
 }
 
 
@@ -33,7 +39,9 @@ class Run(NamedTuple):
     file: str
     t_s: Floats
     columns: dict[str, Floats]  # by standard name, without t_s; only the usable ones
-    clipped: dict[str, npt.NDArray[np.bool_]]  # by standard name: samples at a limit that the sensor could not pass
+    clipped: dict[
+        str, tuple[float, float]
+    ]  # by standard name: limits that the sensor could not pass, infinite where none showed
     drive_velocity_mps: float | None
     holdout: bool
 
@@ -45,26 +53,29 @@ class Evidence(NamedTuple):
     rig: RigTable
     runs: tuple[Run, ...]
     findings: tuple[Finding, ...]
-    chosen_holdout: str | None  # file of the run that was chosen because the manifest marks none
 
 
 def load_evidence(folder: Path) -> Evidence:
     """Read and check an evidence folder. Raises Fault BAD_EVIDENCE: file, key or column, row, expectation, remedy."""
     manifest = read_manifest(folder)
     runs: list[Run] = []
-    findings: list[Finding] = []
+    findings = [
+        Finding(
+            "tolerance", f"{MANIFEST}: rig.tolerance.{name}", "is relative, and 0 is described: counts as known exactly"
+        )
+        for name, share in manifest.rig.tolerance.items()
+        if share > 0.0 and manifest.rig.values()[name] == 0.0
+    ]
     for table in manifest.run:
         run, found = _run(folder, manifest, table)
         runs.append(run)
         findings += found
-    chosen = None
     if len(runs) > 1 and not any(run.holdout for run in runs):
         # the last one, so that adding nothing but a run never changes an earlier choice silently
-        chosen = runs[-1].file
         runs[-1] = runs[-1]._replace(holdout=True)
         text = "no run is marked holdout: this one is kept for judging; mark one to choose for yourself"
-        findings.append(Finding("holdout", chosen, text))
-    return Evidence(folder, manifest.rig, tuple(runs), tuple(findings), chosen)
+        findings.append(Finding("holdout", runs[-1].file, text))
+    return Evidence(folder, manifest.rig, tuple(runs), tuple(findings))
 
 
 def _run(folder: Path, manifest: Manifest, table: RunTable) -> tuple[Run, list[Finding]]:
@@ -89,21 +100,45 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
         raise refuse(f'has {has}: with drive = "force" must have mass_accel_mps2 or mass_position_m; map one')
     if rig.drive == "spring" and "drive_position_m" not in usable and table.drive_velocity_mps is None:
         raise refuse("drive_velocity_mps: missing in [[run]]; without the column drive_position_m it is needed")
-    wanted = _COST if rig.drive == "spring" else {key: _COST[key] for key in ("mass_accel_mps2", "mass_position_m")}
+    wanted = _COST_SPRING if rig.drive == "spring" else _COST_FORCE
     findings += [
         Finding("missing", f"{table.file}: {name}", f"not there: {cost}")
         for name, cost in wanted.items()
         if name not in usable
     ]
     t_s = usable.pop("t_s")
+    findings += [Finding(kind, f"{table.file}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
     return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout), findings
 
 
+def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
+    """Kind, column and text of what cannot be known about the vibration."""
+    told = [name for name in ("vibration_frequency_Hz", "vibration_amplitude_m") if name in columns]
+    if len(told) == 1:
+        yield (
+            "missing",
+            told[0],
+            "stands alone: frequency and amplitude are needed, the run counts as one without vibration",
+        )
+    rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
+    if len(told) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
+        for name in ("mass_accel_mps2", "base_accel_mps2"):
+            if name in columns:
+                yield (
+                    "rate",
+                    name,
+                    f"{rate_Hz:.4g} Hz, below {SHAKE_RATE_HZ:g} Hz: how strongly it vibrates is not compared",
+                )
+
+
 def read_columns(path: Path, channels: dict[str, ChannelMap]) -> Columns:
-    """The standard columns of a data file, mapped and in SI units, unchecked. Raises Fault BAD_EVIDENCE."""
+    """The standard columns of a data file, mapped and in SI units, unchecked. Raises Fault BAD_EVIDENCE.
+
+    A run log has the standard columns; one of them that `channels` maps is scaled like any other.
+    """
     try:
         if path.suffix == ".mcap":
-            return columns_of_log(path)
+            return {name: _scaled(values, channels.get(name), name) for name, values in columns_of_log(path).items()}
         table = read_table(path)
         found: Columns = {}
         for name in STANDARD:
@@ -116,3 +151,8 @@ def read_columns(path: Path, channels: dict[str, ChannelMap]) -> Columns:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
         raise Fault("BAD_EVIDENCE", line) from None
     return found
+
+
+def _scaled(values: Floats, channel: ChannelMap | None, name: str) -> Floats:
+    """A column of a run log; a map that names another column is that of the folder's other files."""
+    return values if channel is None or channel.column != name else values * channel.scale + channel.offset

@@ -1,5 +1,6 @@
 """Which samples and columns of a run can be used, and what is wrong with the others."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -12,7 +13,7 @@ from diagnosis.signal_checks import look
 
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
-Clipped = dict[str, npt.NDArray[np.bool_]]
+Clipped = dict[str, tuple[float, float]]
 Note = Callable[[str, str, str], None]  # kind, column, text
 
 _FEWEST_ROWS = 16
@@ -21,6 +22,10 @@ _LARGEST_BAD_SHARE = 0.1
 _SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m")
 _GAP_STEPS = 10.0  # times the usual step
 _VELOCITY_TOLERANCE = 0.1  # of the stated drive velocity against the drive position's slope
+_FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
+_FASTEST = 300.0  # times the Stribeck velocity: faster than that nothing sticks
+_FEWEST_IN_A_SLIP = 3.0  # samples
+_SLOWEST_S = 0.05  # between samples, where nothing slips: with a force drive
 # Largest values that can be right; a factor of 1000, as between mm and m, shows in at least one of them on a bench rig.
 _LARGEST = {
     "mass_accel_mps2": 1e5,
@@ -35,7 +40,7 @@ _FORCE_FACTOR = 300.0
 
 
 def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, Clipped, list[Finding]]:
-    """Usable columns, where they are clipped, and the findings. Raises Fault BAD_EVIDENCE when no time is left."""
+    """Usable columns, the limits where they are clipped, and the findings. Raises Fault BAD_EVIDENCE when no time is left."""
     findings: list[Finding] = []
     file = table.file
 
@@ -51,7 +56,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
                 "not-finite", name, f"{bad.sum()} of {len(bad)} samples are no finite number; not used", int(bad.sum())
             )
             del usable[name]
-    usable = _good_rows(usable, file, findings)
+    usable, rows = _good_rows(usable, file, findings)
     t_s = usable["t_s"]
     step_s = np.diff(t_s)
     usual_s = float(np.median(step_s))
@@ -60,13 +65,12 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         at = gaps[0]
         text = f"{len(gaps)} gaps in time, first at {t_s[at]:.6g} s: {step_s[at]:.3g} s without a sample"
         note("time-gap", "t_s", text, len(gaps))
-    if usual_s > 0.05:
-        note("units", "t_s", f"a sample every {usual_s:g} s: too slow to see a slip; is the column in ms?")
+    _check_rate(usual_s, rig, file)
     clipped: Clipped = {}
     for name in [name for name in usable if name != "t_s"]:
         values = usable[name]
         seen = look(values, dwells=name.endswith("_m"))
-        wrong = _wrong_unit(name, values, rig)
+        wrong = _wrong_unit(name, values, rig) or _too_far(name, values, t_s, rig, table)
         if wrong:
             note("units", name, f"{wrong}; not used; set channels.{name}.scale")
             del usable[name]
@@ -76,15 +80,36 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
             if name in _SENSORS:
                 del usable[name]
         elif (seen.clipped_high or seen.clipped_low) and name in (*_SENSORS, "drive_position_m"):
-            mask = np.zeros(len(values), np.bool_)
             for times, limit in ((seen.clipped_high, seen.highest), (seen.clipped_low, seen.lowest)):
                 if times:
-                    mask |= values == limit
-                    row = int(np.flatnonzero(values == limit)[0]) + 1
-                    note("clipped", name, f"{times} samples at {limit:g}, first row {row}; these are not fitted", times)
-            clipped[name] = mask
-    _compare_velocity(usable, table, note)
+                    row = int(rows[np.flatnonzero(values == limit)[0]]) + 1
+                    note("clipped", name, f"{times} samples at {limit:g}, first row {row}; so are the model's", times)
+            clipped[name] = (
+                seen.lowest if seen.clipped_low else -math.inf,
+                seen.highest if seen.clipped_high else math.inf,
+            )
+    _compare_velocity(usable, rig, table, note)
+    if rig.drive == "spring" and "drive_force_N" in usable and _pulls_back(usable, table):
+        text = "pulls against the drive's motion: a positive force pulls towards larger positions; not used; change the sign of"
+        note("sign", "drive_force_N", f"{text} channels.drive_force_N.scale")
+        del usable["drive_force_N"]
     return usable, clipped, findings
+
+
+def _check_rate(step_s: float, rig: RigTable, file: str) -> None:
+    longest_s, why = _SLOWEST_S, ""
+    if rig.drive_stiffness_N_per_m is not None:
+        slip_s = math.pi * math.sqrt(rig.mass_kg / rig.drive_stiffness_N_per_m)
+        longest_s, why = (
+            slip_s / _FEWEST_IN_A_SLIP,
+            f", a third of a slip, pi sqrt(mass / drive stiffness) = {slip_s:.3g} s",
+        )
+    if step_s > longest_s:
+        line = (
+            f"{file}: t_s: a sample every {step_s:g} s: must be {longest_s:.3g} s at most{why}; is the column in ms? Then set "
+            "channels.t_s.scale = 0.001; or record faster"
+        )
+        raise Fault("BAD_EVIDENCE", line)
 
 
 def _check_shape(columns: Columns, file: str) -> None:
@@ -103,16 +128,17 @@ def _check_shape(columns: Columns, file: str) -> None:
             raise Fault("BAD_EVIDENCE", line)
 
 
-def _good_rows(columns: Columns, file: str, findings: list[Finding]) -> Columns:
-    """Only rows that are finite throughout and later than every row before."""
+def _good_rows(columns: Columns, file: str, findings: list[Finding]) -> tuple[Columns, npt.NDArray[np.int64]]:
+    """Only rows that are finite throughout and later than every row before, and which those are."""
     t_s = columns["t_s"]
     rows = len(t_s)
     good = np.ones(rows, np.bool_)
+    found: list[Finding] = []
     for name, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             text = f"{len(bad)} samples are no finite number, first row {bad[0] + 1}; these rows are not used"
-            findings.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
+            found.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
             good[bad] = False
     latest_s = np.maximum.accumulate(np.where(np.isfinite(t_s), t_s, -np.inf))
     repeated = np.zeros(rows, np.bool_)
@@ -124,17 +150,23 @@ def _good_rows(columns: Columns, file: str, findings: list[Finding]) -> Columns:
             f"{len(back)} rows are not later than the one before, first row {at + 1}: {t_s[at]:.9g} s after "
             f"{latest_s[at - 1]:.9g} s; these rows are not used"
         )
-        findings.append(Finding("time", f"{file}: t_s", text, len(back)))
+        found.append(Finding("time", f"{file}: t_s", text, len(back)))
         good[back] = False
     lost = rows - int(good.sum())
-    if lost > _LARGEST_BAD_SHARE * rows or int(good.sum()) < _FEWEST_ROWS:
-        worst = findings[-1]
+    if lost > _LARGEST_BAD_SHARE * rows or rows - lost < _FEWEST_ROWS:
+        worst = max(found, key=lambda one: one.times)
+        few = (
+            f"{_FEWEST_ROWS} rows must be left"
+            if rows - lost < _FEWEST_ROWS
+            else f"must be below {100 * _LARGEST_BAD_SHARE:g} %"
+        )
         line = (
-            f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: must be below "
-            f"{100 * _LARGEST_BAD_SHARE:g} %; repair the file, or cut it where the trouble begins"
+            f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: {few}; repair the file, or cut it where "
+            "the trouble begins"
         )
         raise Fault("BAD_EVIDENCE", line)
-    return {name: values[good] for name, values in columns.items()} if lost else columns
+    findings += found
+    return ({name: values[good] for name, values in columns.items()} if lost else columns), np.flatnonzero(good)
 
 
 def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
@@ -153,12 +185,41 @@ def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
     return ""
 
 
-def _compare_velocity(columns: Columns, table: RunTable, note: Note) -> None:
-    stated_mps = table.drive_velocity_mps
-    if stated_mps is None or "drive_position_m" not in columns or stated_mps == 0.0:
+def _too_far(name: str, values: Floats, t_s: Floats, rig: RigTable, table: RunTable) -> str:
+    """Why a position cannot be in metres where the drive's velocity is known; empty when it can."""
+    if rig.drive_stiffness_N_per_m is None or not table.drive_velocity_mps or not name.endswith("position_m"):
+        return ""
+    drive_m = abs(table.drive_velocity_mps) * float(t_s[-1] - t_s[0])
+    furthest_m = _FURTHEST * (drive_m + rig.static_force_N / rig.drive_stiffness_N_per_m)
+    travel_m = float(np.ptp(values))
+    if travel_m <= furthest_m:
+        return ""
+    return f"travels {travel_m:.3g}: the drive moves by {drive_m:.3g} m in this time, the unit cannot be right"
+
+
+def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
+    if rig.drive == "force":
         return
-    t_s, position_m = columns["t_s"], columns["drive_position_m"]
-    measured_mps = float(position_m[-1] - position_m[0]) / float(t_s[-1] - t_s[0])
-    if abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps):
-        text = f"moves at {measured_mps:.4g} m/s on average, drive_velocity_mps says {stated_mps:.4g}: check units and time"
-        note("units", "drive_position_m", text)
+    stated_mps, measured_mps = table.drive_velocity_mps, None
+    if "drive_position_m" in columns:
+        t_s, position_m = columns["t_s"], columns["drive_position_m"]
+        measured_mps = float(position_m[-1] - position_m[0]) / float(t_s[-1] - t_s[0])
+        if stated_mps and abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps):
+            text = (
+                f"moves at {measured_mps:.4g} m/s on average, drive_velocity_mps says {stated_mps:.4g}: check units and time; "
+                "where the drive changes its speed leave drive_velocity_mps out"
+            )
+            note("units", "drive_position_m", text)
+    where = "drive_position_m" if stated_mps is None else "drive_velocity_mps"
+    fastest_mps = abs((measured_mps if stated_mps is None else stated_mps) or 0.0)
+    if fastest_mps > _FASTEST * rig.stribeck_velocity_mps:
+        times = fastest_mps / rig.stribeck_velocity_mps
+        note("units", where, f"{fastest_mps:.3g} m/s, {times:.3g} times rig.stribeck_velocity_mps: is it in mm?")
+
+
+def _pulls_back(columns: Columns, table: RunTable) -> bool:
+    """Whether the drive takes work out of what it drags: friction lets no drive do that."""
+    force_N = columns["drive_force_N"]
+    if "drive_position_m" in columns:
+        return float(force_N[1:] @ np.diff(columns["drive_position_m"])) < 0.0
+    return float(force_N.mean()) * (table.drive_velocity_mps or 0.0) < 0.0

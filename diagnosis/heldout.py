@@ -54,8 +54,8 @@ class HeldOut:
             wider = self._floor_at(best, best.effects, roughness, self.floor)
             self._wider = self.floor._replace(bias=wider.bias, scatter=wider.scatter, level=wider.level)
         described = np.zeros(len(nuisances))
-        self.nominal = self._gap(cell_squares(self.floor, self.differences(described, NOTHING, np.zeros(0))))
-        self._retuned = cell_squares(self.floor, self.differences(retuned.deviations, retuned.form, retuned.w))
+        self.nominal = self._gap(self._squares(NOTHING, [(described, np.zeros(0))])[0])
+        (self._retuned,) = self._squares(retuned.form, [(retuned.deviations, retuned.w)])
         self._chi2_retuned = self._chi2(retuned)
         self.retuned = self._gap(self._retuned)
 
@@ -71,9 +71,7 @@ class HeldOut:
         at = np.concatenate([fit.deviations, fit.w])
         moved = [at, *(at + spread @ random.normal(size=len(at)) for _ in range(_DRAWS))]
         own = len(fit.deviations)
-        drawn = [
-            cell_squares(self.floor, z) for z in self._differences(fit.form, [(one[:own], one[own:]) for one in moved])
-        ]
+        drawn = self._squares(fit.form, [(one[:own], one[own:]) for one in moved])
         return self._closed(drawn[0], drawn)
 
     def refutes(self, fit: Fit, expected_chi2: float) -> bool:
@@ -88,7 +86,7 @@ class HeldOut:
 
     def closed_by_differences(self, z: Floats) -> Closed:
         """The same for differences from elsewhere [compared]."""
-        here = cell_squares(self.floor, z)
+        here = self._in_floors(self.floor, z)
         return self._closed(here, [here])
 
     def _closed(self, here: Floats, drawn: list[Floats]) -> Closed:
@@ -117,20 +115,31 @@ class HeldOut:
 
     def differences(self, deviations: Floats, form: Form, w: Floats) -> Floats:
         """Measured less predicted in floors [compared]."""
-        return self._differences(form, [(deviations, w)])[0]
+        return self._differences(self._floor_for(form, w), form, [(deviations, w)])[0]
 
-    def _differences(self, form: Form, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
-        tables = [form.tables(w) for _, w in at]
-        floor = self.floor if all(_follows(table) for table in tables[0].values()) else self._wider
-        points = [self._nuisances.point(deviations, table) for (deviations, _), table in zip(at, tables, strict=True)]
+    def _squares(self, form: Form, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
+        """What every cell holds, in floors squared [cells]; 1 on average under a model that is right."""
+        floor = self._floor_for(form, at[0][1])
+        return [self._in_floors(floor, z) for z in self._differences(floor, form, at)]
+
+    def _floor_for(self, form: Form, w: Floats) -> Floor:
+        return self.floor if all(_follows(table) for table in form.tables(w).values()) else self._wider
+
+    def _differences(self, floor: Floor, form: Form, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
+        points = [self._nuisances.point(deviations, form.tables(w)) for deviations, w in at]
         return [differences(floor, self.problem, predicted) for predicted in self.problem.predicted_many(points)]
 
     def differences_of(self, predicted: Floats) -> Floats:
         """The same for a prediction [features] from elsewhere."""
         return differences(self.floor, self.problem, predicted)
 
-    def _gap(self, squares: Floats) -> float:
-        return float(np.sqrt(squares.mean())) / self.floor.level
+    @staticmethod
+    def _in_floors(floor: Floor, z: Floats) -> Floats:
+        return cell_squares(floor, z) / floor.level**2
+
+    @staticmethod
+    def _gap(squares: Floats) -> float:
+        return float(np.sqrt(squares.mean()))
 
 
 def _follows(table: Table) -> bool:
@@ -144,4 +153,5 @@ def foretells(form: Form) -> bool:
     What varies at random takes another path there. A wave over time, a load that turns, may be in any phase when a run begins:
     one of 10 detection limits, named, with 0.467 for 0.487 Hz, closed 22 % of chi2.
     """
-    return not is_random(form) and not {PHASE, "frequency_Hz"} <= {axis.name for axis in form.axes}
+    waves = [{axis.name for axis in form.axes if axis.effect == name} for name in form.effects]
+    return not is_random(form) and not any({PHASE, "frequency_Hz"} <= own for own in waves)

@@ -92,10 +92,17 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
     columns = _columns(table, wanted, map_path.name)
     try:
         if out.suffix == ".mcap":
+            _check_free(out)
             return _to_log(path, columns, out)
         return _to_folder(path, columns, wanted, map_path.name, out)
     except OSError as error:
         raise Fault("LOG_WRITE", f"{out}: {error.strerror or error}; choose another --out") from None
+
+
+def _check_free(out: Path) -> None:
+    """Nothing is overwritten: it may be the measured file itself."""
+    if out.exists():
+        raise Fault("CONFIG", f"{out}: is there already; nothing was written; choose another --out")
 
 
 def _columns(table: Table, wanted: ImportMap, map_name: str) -> Columns:
@@ -161,6 +168,7 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
             line = f"{out / run.file}: is already a run of this folder; rename {path.name} or choose another --out"
             raise Fault("BAD_EVIDENCE", line)
         runs = [*before.run, run]
+    _check_free(out / run.file)
     findings = examine(columns, rig, run)[1]
     findings += [
         Finding("assumed", f"{MANIFEST}: rig.{name}", f"not in {map_name}: taken as {getattr(rig, name):.6g}")
@@ -189,7 +197,9 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
     t_s = columns["t_s"]
     if len(t_s) < _BLOCK_SAMPLES or not np.isfinite(t_s).all() or (np.diff(t_s) <= 0).any():
         row = (
-            int(np.flatnonzero(~(np.diff(t_s, prepend=-np.inf) > 0))[0]) + 1 if len(t_s) >= _BLOCK_SAMPLES else len(t_s)
+            int(np.flatnonzero(~(np.isfinite(t_s) & (np.diff(t_s, prepend=-np.inf) > 0)))[0]) + 1
+            if len(t_s) >= _BLOCK_SAMPLES
+            else len(t_s)
         )
         line = (
             f"{path.name}: t_s: row {row}: must be later than the row before, in {_BLOCK_SAMPLES} rows at least; "

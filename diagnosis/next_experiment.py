@@ -53,7 +53,7 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
     if problem.rig.drive == "force":
         return Experiment(advice(names, "force"), f"Of what was tried, {both} explain these runs best.", None)
     # how far the two are apart in the present runs, with everything fitted
-    present = float(np.linalg.norm(first.residual - second.residual)) if _same_floor(first, second) else math.nan
+    present = float(np.linalg.norm(first.residual - second.residual))
     best = _best(problem, nuisances, first, second)
     if best is None or best.separation < _SEPARATES or best.feature is None:
         most = (
@@ -95,10 +95,6 @@ def _best(problem: Problem, nuisances: Nuisances, first: Fit, second: Fit) -> _L
     left.sort(key=lambda look: -look.separation)
     judged += [_judged(problem, nuisances, look.plan, first, second) for look in left[: max(_JUDGED - len(judged), 0)]]
     return max(judged, key=lambda look: look.separation, default=None)
-
-
-def _same_floor(first: Fit, second: Fit) -> bool:
-    return len(first.residual) == len(second.residual)
 
 
 def _name(fit: Fit) -> str:

@@ -210,6 +210,8 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
         return gaussian_filter1d(signals["drive_force_N"], smooth) - rig.mass_kg * accel_mps2
 
     over = motion(rig, run)
+    if "velocity_mps" not in over:  # an axis with an accelerometer alone
+        return None
     velocity_mps = over["velocity_mps"]
     values = relation(run.signals) - friction_law(rig, velocity_mps)
     # at rest a contact bears any force below its static friction; close to rest the bristle decides and not the curve

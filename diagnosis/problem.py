@@ -292,11 +292,7 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
         led = predict(rig_config(rig, {}, {}, None), True, commands, start)
         noisy = signals | {"mass_position_m": signals["mass_position_m"] - led["mass_position_m"]}
     noise = noise_of(noisy, commands, scales_of(rig))
-    clipped = {
-        name: (float(run.columns[name].min()), float(run.columns[name].max()))
-        for name in run.clipped
-        if name in signals
-    }
+    clipped = {name: limits for name, limits in run.clipped.items() if name in signals}
     entries = entries_of(signals, commands, scales_of(rig))
     return Prepared(run.file, run.holdout, signals, commands, start, entries, before_s, noise, clipped)
 

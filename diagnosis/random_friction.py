@@ -14,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
+from diagnosis.axis_features import friction_share
 from diagnosis.commands import Commands
 from diagnosis.gap import whitened
+from diagnosis.problem import Problem
 from diagnosis.reduced import BLOCK_S
 from diagnosis.refit import Axis, Fit, Fitter, Form
 from diagnosis.waves import friction_series
@@ -70,8 +72,7 @@ class RandomFriction:
     def __init__(self, effect: str, fitter: Fitter, base: Fit) -> None:
         self.effect = effect
         problem, over = fitter.problem, _OVER[effect]
-        series = friction_series(problem.runs, problem.scales, over)
-        ratio = max(float(np.std(np.concatenate([one.value for one in series]))) if series else 0.0, _LEAST_RATIO)
+        ratio = max(_scatter(problem, over), _LEAST_RATIO)
         if over == "time":
             longest_s = max(len(run.commands.drive) for run in problem.runs) * BLOCK_S
             lengths = [{"frequency_Hz": turns / longest_s} for turns in _TURNS[over]]
@@ -134,6 +135,19 @@ class RandomFriction:
 def is_random(form: Form) -> bool:
     """Whether a form has an effect whose path no prediction knows."""
     return RANDOM in form.forms.values()
+
+
+def _scatter(problem: Problem, over: str) -> float:
+    """Of the friction, relative: of breakaways and levels, on an axis of what speed and inertia leave of the force."""
+    if problem.rig.drive == "force":
+        shares: list[Floats] = []
+        for run in problem.runs:
+            assert run.commands.motion is not None, "a force drive has a motion"  # noqa: S101
+            share, valid = friction_share(run.signals["drive_force_N"], run.commands.motion)
+            shares.append(share[valid])
+    else:
+        shares = [one.value for one in friction_series(problem.runs, problem.scales, over)]
+    return float(np.std(np.concatenate(shares))) if shares else 0.0
 
 
 def _way_m(commands: Commands) -> float:

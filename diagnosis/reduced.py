@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.evidence import Run
+from diagnosis.evidence import SHAKE_RATE_HZ, Run
 
 Floats = npt.NDArray[np.floating[Any]]
 BLOCK_S = 1e-3
@@ -17,8 +17,6 @@ MEANS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m
 SHAKES = ("mass_shake_mps2", "base_shake_mps2")  # rms within a block, about the block's mean
 SIGNALS = (*MEANS, *SHAKES)
 _SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_mps2"}
-# fewer samples a block than this cannot tell an rms
-_FEWEST_FOR_SHAKE = 8
 _FURTHEST_BLOCKS = 5  # from a block to those that it is averaged with
 _LEAST_APART = 0.3  # cosine of the angle that the vibration turns by in between; above it noise would grow
 
@@ -42,7 +40,7 @@ def reduce_run(run: Run) -> tuple[float, dict[str, Floats]]:
                 mean[empty] = np.interp(empty, filled, mean[filled])
             reduced[name] = mean
     per_block = len(run.t_s) / max(len(filled), 1)
-    if per_block >= _FEWEST_FOR_SHAKE:
+    if per_block >= SHAKE_RATE_HZ * BLOCK_S:
         for name, source in _SHAKEN.items():
             if source in reduced:
                 about = run.columns[source] - reduced[source][index]

@@ -169,12 +169,8 @@ class Fitter:
         z *= slope / self.floor.scatter[self.floor.compared]
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
-    def retuned(self, deviations: Floats) -> Fit:
-        """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
-        return together(self.predicted_many, [self.retuning(deviations)])[0]
-
     def retuning(self, deviations: Floats) -> Work[Fit]:
-        """As `retuned`, beside others."""
+        """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
         fit = yield from self.refitting(NOTHING, deviations, np.zeros(0))
         fit = yield from self.fitting(NOTHING, fit.deviations, fit.w, _RETUNE)
         (here,) = yield [(fit.deviations, {})]

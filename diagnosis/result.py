@@ -1,5 +1,6 @@
 """What a diagnosis says, and its JSON form (`diagnosis/1`, fixed by the evidence contract)."""
 
+from pathlib import PurePath
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -117,7 +118,10 @@ class Diagnosis(NamedTuple):
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The JSON object of the contract, with `summary`, `rig` and `findings` besides; without the pictures."""
+    """The JSON object of the contract, with `summary`, `rig` and `findings` besides; without the pictures.
+
+    A run goes by its file's name without the suffix, as in the contract.
+    """
     return {
         "format": FORMAT,
         "verdict": diagnosis.verdict,
@@ -125,10 +129,13 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "summary": list(diagnosis.summary),
         "candidates": [_candidate(candidate) for candidate in diagnosis.candidates],
         "not_distinguishable": [list(group) for group in diagnosis.not_distinguishable],
-        "where": [{**cell._asdict(), "band_Hz": list(cell.band_Hz)} for cell in diagnosis.where],
+        "where": [
+            {**cell._asdict(), "band_Hz": list(cell.band_Hz), "run": PurePath(cell.run).stem}
+            for cell in diagnosis.where
+        ],
         "gap": {
             **diagnosis.gap._asdict(),
-            "runs": list(diagnosis.gap.runs),
+            "runs": [PurePath(run).stem for run in diagnosis.gap.runs],
             "interval_90": _listed(diagnosis.gap.interval_90),
             "compared": [{**one._asdict(), "interval_90": _listed(one.interval_90)} for one in diagnosis.gap.compared],
         },

@@ -72,7 +72,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 f"{percent(gap.shrinkage)} of what could be closed{between}."
             )
     else:
-        sentences.append("No run was kept aside: how far the gap closes on new data is not known.")
+        why = f"In {', '.join(gap.runs)}, kept aside, nothing can be compared" if gap.runs else "No run was kept aside"
+        sentences.append(f"{why}: how far the gap closes on new data is not known.")
     if diagnosis.verdict != "no-gap" or diagnosis.next_experiment.gain is not None:
         sentences.append(f"Next: {diagnosis.next_experiment.what}")
     return tuple(sentences)

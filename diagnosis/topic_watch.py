@@ -23,11 +23,9 @@ class TopicWatch:
         self.messages = 0
         self.last_t_ns = 0
         self.first_number = 0
-        self.missing = 0
-        self.gaps = 0
         self.restarts = 0
-        self._first_gap = ""
         self._missing_numbers: set[int] = set()
+        self._gaps_for_good: list[range] = []  # before a restart, or too large to remember every number of
         self._highest = -1
         self._duplicates: list[int] = []
         self._late: list[int] = []
@@ -66,20 +64,20 @@ class TopicWatch:
     def _odd_number(self, number: int, before: int) -> None:
         self._highest = max(self._highest, before)
         if number > self._highest + 1:
-            self.gaps += 1
-            self.missing += number - self._highest - 1
-            self._first_gap = self._first_gap or f"first {self._highest + 1} to {number - 1}"
-            if len(self._missing_numbers) + number - self._highest < _REMEMBERED_NUMBERS:
-                self._missing_numbers.update(range(self._highest + 1, number))
+            gap = range(self._highest + 1, number)
+            if len(self._missing_numbers) + len(gap) < _REMEMBERED_NUMBERS:
+                self._missing_numbers.update(gap)
+            else:
+                self._gaps_for_good.append(gap)
             self._highest = number
         elif number == 0 and before > 0:
             self.restarts += 1
             self._restarted_at.append(before)
+            self._gaps_for_good += _ranges(self._missing_numbers)
             self._missing_numbers.clear()
             self._highest = 0
         elif number in self._missing_numbers:
             self._missing_numbers.remove(number)
-            self.missing -= 1
             self._late.append(number)
         elif number <= self._highest:
             self._duplicates.append(number)
@@ -100,9 +98,10 @@ class TopicWatch:
                 f"numbers start again at 0 after {ends}: {self.restarts + 1} runs in one file",
                 self.restarts,
             )
-        if self.missing > 0:
-            text = f"{self.missing} messages missing in {self.gaps} gaps, {self._first_gap}"
-            add("gap", text, self.missing)
+        gaps = [*self._gaps_for_good, *_ranges(self._missing_numbers)]
+        if gaps:
+            missing = sum(len(gap) for gap in gaps)
+            add("gap", f"{missing} messages missing in {len(gaps)} gaps, first {gaps[0][0]} to {gaps[0][-1]}", missing)
         if self.topic == "sensors" and self.first_number > 0:
             add("gap", f"begins with block {self.first_number}: those before were not recorded", self.first_number)
         if self._duplicates:
@@ -122,3 +121,13 @@ class TopicWatch:
             text = f"log_time goes back at {len(self._arrived_before)} places, first {number}: by {-step_ns / 1e6:g} ms"
             add("log-time-back", text, len(self._arrived_before))
         return found
+
+
+def _ranges(numbers: set[int]) -> list[range]:
+    """Numbers as stretches without a hole, in order."""
+    ordered = np.array(sorted(numbers), np.int64)
+    return [
+        range(int(own[0]), int(own[-1]) + 1)
+        for own in np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
+        if len(own)
+    ]

@@ -2,6 +2,7 @@
 
 sealing         a set of cases, the hashes of its answers, the key apart, and whether the set was opened
 running         every case diagnosed, without the key
+opening         hashes checked, answers opened, all methods scored
 outcomes        one case opened: its answer beside what the tool said
 intervals       rates with Wilson's interval, means and ratios with the bootstrap's
 calibration     whether 80 % means 80 %

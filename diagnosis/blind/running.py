@@ -6,6 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from bridge.faults import Fault
 from diagnosis import many
 from diagnosis.blind.sealing import RESULTS, read_set
 from diagnosis.many import Outcome, Source
@@ -46,6 +47,16 @@ def _as_json(outcome: Outcome) -> dict[str, Any]:
 
 
 def results(folder: Path, cases: list[str]) -> dict[str, dict[str, Any]]:
-    """The results that are there, by case."""
+    """The results that are there, by case. Raises Fault BAD_SET."""
     found = {name: result_file(folder, name) for name in cases}
-    return {name: json.loads(path.read_text(encoding="utf-8")) for name, path in found.items() if path.is_file()}
+    return {name: _read(path) for name, path in found.items() if path.is_file()}
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        result = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        result = str(error)
+    if not isinstance(result, dict) or "format" not in result:
+        raise Fault("BAD_SET", f"{path}: is no result of a diagnosis; delete it and run `stickslip blind run` again")
+    return result

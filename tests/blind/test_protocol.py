@@ -266,6 +266,16 @@ def test_a_set_is_scored_once(done):
     assert json.loads((done / "set" / "opened.json").read_text()) == opened
 
 
+def test_a_damaged_result_is_told_before_opening(done):
+    name = sorted(answers(done))[3]
+    path = done / "set" / "results" / f"{name}.json"
+    path.write_text(path.read_text()[:50])
+    result = score(done)
+    assert result.exit_code == FAULTS["BAD_SET"].exit_status
+    assert f"{path}: is no result of a diagnosis; delete it" in result.stderr
+    assert not (done / "set" / "opened.json").exists()
+
+
 def test_missing_results_stay_sealed(done):
     name = sorted(answers(done))[3]
     (done / "set" / "results" / f"{name}.json").unlink()

@@ -75,7 +75,7 @@ def test_the_command_names_the_effect_in_the_form_of_the_contract(command):
 def test_the_gap_is_judged_on_the_held_out_run_only(command):
     _, found, _ = command
     gap = found["gap"]
-    assert gap["runs"] == ["run-04.parquet"]
+    assert gap["runs"] == ["run-04"]
     assert gap["with_effect"] < gap["retuned"] < gap["nominal"]
     closed = (gap["retuned"] - gap["with_effect"]) / (gap["retuned"] - gap["floor"])
     if gap["shrinkage"] is not None:

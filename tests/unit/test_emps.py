@@ -12,6 +12,7 @@ from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare
 from diagnosis.refit import FAR_KNEE, Fitter
 from diagnosis.search import Origin, refitted, screened
+from diagnosis.together import together
 from diagnosis.twin import Roughness
 from tests.real.evidences import AXIS, MISSING, axis
 
@@ -29,7 +30,7 @@ def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> Non
         return floor_of(problem, point, replicates(problem, point, Roughness(0.003, 2e-4, 0), 12, 1))
 
     fitter, judge = Fitter(fitted, floor(fitted), nuisances), floor(held_out)
-    retuned = fitter.retuned(np.zeros(len(nuisances)))
+    retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(nuisances)))])[0]
     described = fitter.described(np.zeros(len(nuisances)))
     offsets = [trial for trial in trials(fitted) if "force-sensor-bias" in trial.form.forms]
     origins = [Origin(retuned, KNEE), Origin(described, FAR_KNEE)]

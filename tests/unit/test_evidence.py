@@ -1,5 +1,6 @@
 """The evidence folder: every error names its place, every doubt is a finding, and what is doubtful is not used."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,8 @@ import pytest
 import scipy.io
 
 from bridge.faults import Fault
-from diagnosis.evidence import Evidence, load_evidence
+from diagnosis.evidence import Evidence, load_evidence, read_columns
+from diagnosis.manifest import ChannelMap
 from tests.logs import doctored, short_log
 from tests.made_up import RIG
 
@@ -208,8 +210,29 @@ def hole_in_time(data: Columns) -> None:
     data["t_s"][1000:] += 0.5
 
 
-def wrong_speed(data: Columns) -> None:
+def drive_in_mm(data: Columns) -> None:
     data["drive_position_m"] *= 1000.0
+
+
+def mass_in_mm(data: Columns) -> None:
+    data["mass_position_m"] = data["drive_position_m"] * 1000.0
+
+
+def twice_as_fast(data: Columns) -> None:
+    data["drive_position_m"] *= 2.0
+
+
+def force_the_other_way(data: Columns) -> None:
+    data["drive_force_N"] *= -1.0
+
+
+def half_a_vibration(data: Columns) -> None:
+    data["vibration_frequency_Hz"] = np.full(4000, 2000.0)
+
+
+def slow_accelerometer(data: Columns) -> None:
+    half_a_vibration(data)
+    data["vibration_amplitude_m"] = np.full(4000, 2e-8)
 
 
 @pytest.mark.parametrize(
@@ -221,7 +244,17 @@ def wrong_speed(data: Columns) -> None:
         (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
         (clipped_force, "clipped", "drive_force_N: ", "", 4000),
         (hole_in_time, "time-gap", "t_s: 1 gaps in time, first at 0.4995 s: 0.5", "", 4000),
-        (wrong_speed, "units", "moves at 0.5 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
+        (
+            drive_in_mm,
+            "units",
+            "drive_position_m: travels 1: the drive moves by 0.001 m in this time",
+            "drive_position_m",
+            4000,
+        ),
+        (mass_in_mm, "units", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
+        (twice_as_fast, "units", "moves at 0.001 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
+        (force_the_other_way, "sign", "drive_force_N: pulls against the drive's motion", "drive_force_N", 4000),
+        (slow_accelerometer, "rate", "mass_accel_mps2: 2000 Hz, below 8000 Hz: how strongly it vibrates", "", 4000),
     ],
 )
 def test_doubts_are_told_and_not_used(
@@ -237,6 +270,65 @@ def test_doubts_are_told_and_not_used(
     assert (np.diff(run.t_s) > 0).all()
     assert all(np.isfinite(values).all() and len(values) == rows for values in run.columns.values())
     assert ("drive_force_N" in run.clipped) == (kind == "clipped")
+
+
+def test_only_the_end_that_a_sensor_reached_limits_the_model(tmp_path: Path) -> None:
+    """Rows that are left out before count: the file's own row is told."""
+    data = columns()
+    repeated_time(data)
+    clipped_force(data)
+    evidence = load_evidence(folder(tmp_path, data))
+    assert evidence.runs[0].clipped == {"drive_force_N": (-math.inf, 16.0)}
+    first = int(np.flatnonzero(data["drive_force_N"] == 16.0)[0]) + 1
+    assert first > 101
+    assert f"first row {first};" in kinds(evidence)["clipped"]
+
+
+def test_half_a_vibration_is_none_and_told(tmp_path: Path) -> None:
+    data = columns()
+    half_a_vibration(data)
+    findings = load_evidence(folder(tmp_path, data)).findings
+    (told,) = [one for one in findings if "vibration" in one.where]
+    assert told.in_words().split()[:3] == ["missing", "run-01.parquet:", "vibration_frequency_Hz:"]
+
+
+def test_a_speed_without_a_drive_position_may_be_in_mm(tmp_path: Path) -> None:
+    data = columns()
+    del data["drive_position_m"]
+    manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "drive_velocity_mps = 0.5")
+    assert (
+        "0.5 m/s, 1e+03 times rig.stribeck_velocity_mps"
+        in kinds(load_evidence(folder(tmp_path, data, manifest)))["units"]
+    )
+
+
+def test_time_in_ms_is_refused(tmp_path: Path) -> None:
+    """51.2 kHz in ms is a sample every 20 ms, and a slip of this rig lasts 36."""
+    data = columns()
+    data["t_s"] = np.arange(4000) / 51.2
+    with pytest.raises(
+        Fault, match=r"t_s: a sample every 0.0195.* must be 0.0119 s at most.* channels.t_s.scale = 0.001"
+    ):
+        load_evidence(folder(tmp_path, data))
+
+
+def test_a_tolerance_of_nothing_is_told(tmp_path: Path) -> None:
+    manifest = MANIFEST.replace("mass_kg = 0.005", "drive_damping_Ns_per_m = 0.1")
+    assert (
+        "rig.tolerance.drive_damping_Ns_per_m: is relative"
+        in kinds(load_evidence(folder(tmp_path, columns(), manifest)))["tolerance"]
+    )
+
+
+def test_a_channel_map_scales_a_run_log_too(tmp_path: Path) -> None:
+    log = tmp_path / "run.mcap"
+    log.write_bytes(short_log())
+    plain = read_columns(log, {})
+    doubled = ChannelMap(column="drive_force_N", scale=2.0, offset=1.0)
+    other = ChannelMap(column="a", scale=9.0)  # of the folder's other files
+    scaled = read_columns(log, {"drive_force_N": doubled, "mass_accel_mps2": other})
+    assert (scaled["drive_force_N"] == 2.0 * plain["drive_force_N"] + 1.0).all()
+    assert (scaled["mass_accel_mps2"] == plain["mass_accel_mps2"]).all()
 
 
 def test_channels_are_mapped_and_scaled(tmp_path: Path) -> None:
@@ -263,7 +355,8 @@ def test_every_format_gives_the_same(tmp_path: Path) -> None:
     evidence = load_evidence(tmp_path)
     for run in evidence.runs:
         assert (run.columns["drive_force_N"] == data["drive_force_N"]).all(), run.file
-    assert evidence.chosen_holdout == "d.parquet"
+    assert [run.holdout for run in evidence.runs] == [False, False, False, True]
+    assert kinds(evidence)["holdout"].startswith("d.parquet")
     assert [run.holdout for run in evidence.runs] == [False, False, False, True]
     assert "d.parquet" in kinds(evidence)["holdout"]
 

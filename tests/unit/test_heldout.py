@@ -2,8 +2,10 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from diagnosis.gap import Floor
 from diagnosis.heldout import HeldOut, foretells
 from diagnosis.refit import Axis, Form
 
@@ -22,6 +24,29 @@ FORETELLS = [
     (form("drive-speed-ripple", "time", "frequency_Hz", *WAVE), False),
     (form("position-dependent-friction", "random", "ratio", "wavelength_m"), False),
 ]
+
+
+def both(first: Form, second: Form) -> Form:
+    return Form(first.forms | second.forms, (*first.axes, *second.axes))
+
+
+def test_the_axes_of_two_effects_are_not_one_wave():
+    """A wave along the track has a phase and a base a frequency: neither turns over time."""
+    track, base, load = FORETELLS[1][0], FORETELLS[3][0], FORETELLS[4][0]
+    assert foretells(both(track, base))
+    assert not foretells(both(load, base))
+
+
+def test_what_goes_by_a_wider_floor_is_measured_by_that_floor():
+    """A cell as its own replicates are, at a level of 2 there and 1 here, is 1 floor off with either."""
+    ones = np.ones(1)
+    narrow = Floor(0 * ones, ones < 0, ones, ones > 0, np.eye(1), (("force", "stick", (0.0, 20.0), "a"),), 1.0)
+    held_out = HeldOut.__new__(HeldOut)
+    held_out.floor, held_out._wider = narrow, narrow._replace(level=2.0)
+    held_out._differences = lambda floor, _form, at: [np.array([floor.level])] * len(at)  # pyright: ignore[reportAttributeAccessIssue]
+    plain, random = FORETELLS[0][0], FORETELLS[6][0]
+    (exactly,) = held_out._squares(plain, [(ones, np.zeros(1))])
+    assert held_out._squares(random, [(ones, np.zeros(2))])[0] == pytest.approx(exactly, rel=0.1)
 
 
 @pytest.mark.parametrize(("effect", "does"), FORETELLS)

@@ -200,6 +200,33 @@ def test_a_log_needs_a_clock_that_goes_forward(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("made*"))
 
 
+def test_a_log_needs_a_clock_that_ends(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    data = raw()
+    data["time"][-1] = np.inf
+    write_raw(source, data)
+    with pytest.raises(Fault, match=rf"measured\.csv: t_s: row {ROWS}"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
+
+
+def test_what_was_measured_is_never_overwritten(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".parquet")
+    before = source.read_bytes()
+    with pytest.raises(Fault, match=r"measured\.parquet: is there already"):
+        import_file(source, channel_map, tmp_path)
+    assert source.read_bytes() == before
+    import_file(source, channel_map, tmp_path / "made.mcap")
+    with pytest.raises(Fault, match=r"made\.mcap: is there already"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
+
+
+def test_a_file_may_have_any_name(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    odd = source.rename(tmp_path / "Läufe \U0001f600.csv")
+    import_file(odd, channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].file == "Läufe \U0001f600.parquet"
+
+
 def test_the_command(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".mat")
     arguments = ["import", str(source), "--map", str(channel_map), "--out", str(tmp_path / "evidence"), "--json"]

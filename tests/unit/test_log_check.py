@@ -109,6 +109,15 @@ def test_what_was_done_is_found(tmp_path: Path, change: Callable[[Tables], None]
     assert kind in {finding["kind"] for finding in json.loads(result.stdout)["findings"]}
 
 
+def test_a_late_message_closes_its_gap(tmp_path: Path) -> None:
+    def change(tables: Tables) -> None:
+        tables["sensors"] = tables["sensors"][[*range(2), 3, 2, 4, *range(6, 400)]]
+
+    found = kinds(doctored(tmp_path, change))
+    assert "/sensors: 1 messages missing in 1 gaps, first 5 to 5" in found["gap"]
+    assert "order" in found
+
+
 def test_a_cut_log(tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
     path.write_bytes(short_log()[:-4000])

@@ -63,6 +63,13 @@ def test_a_force_drive_has_its_friction(tmp_path):
     assert levels(evidence, runs)["friction"] > 6.0
 
 
+def test_an_axis_with_an_accelerometer_alone_has_no_relation(tmp_path):
+    evidence, runs = prepared(tmp_path, "force")
+    signals = {"drive_force_N": runs[0].signals["drive_force_N"]}
+    signals["mass_accel_mps2"] = runs[0].commands.motion.accel_mps2
+    assert parity_residuals(evidence.rig, runs[0]._replace(signals=signals)) == ()
+
+
 def test_the_friction_law_is_the_steady_one(clean):
     rig = clean[0].rig
     fast = np.array([-0.1, 0.1])

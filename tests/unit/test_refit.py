@@ -32,7 +32,7 @@ def start_of(fitter, name):
 
 def test_a_level_takes_over_what_its_number_was_moved_by(fitter):
     """From where the rig was retuned for want of the effect: the number at its bound, the effect nothing."""
-    retuned = fitter.retuned(np.zeros(len(fitter.nuisances)))
+    retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(fitter.nuisances)))])[0]
     static = fitter.nuisances.names.index("static_force_N")
     assert retuned.deviations[static] == pytest.approx(-3.3)
     trial = start_of(fitter, "static-level")
