@@ -23,7 +23,7 @@ _SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_positio
 _GAP_STEPS = 10.0  # times the usual step
 _VELOCITY_TOLERANCE = 0.1  # of the stated drive velocity against the drive position's slope
 _FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
-_FASTEST = 300.0  # times the Stribeck velocity: faster than that nothing sticks
+_FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
 _FEWEST_IN_A_SLIP = 3.0  # samples
 _SLOWEST_S = 0.05  # between samples, where nothing slips: with a force drive
 # Largest values that can be right; a factor of 1000, as between mm and m, shows in at least one of them on a bench rig.
@@ -89,7 +89,11 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
                 seen.highest if seen.clipped_high else math.inf,
             )
     _compare_velocity(usable, rig, table, note)
-    if rig.drive == "spring" and "drive_force_N" in usable and _pulls_back(usable, table):
+    if (
+        rig.drive_stiffness_N_per_m
+        and "drive_force_N" in usable
+        and _pulls_back(usable, table, rig.drive_stiffness_N_per_m)
+    ):
         text = "pulls against the drive's motion: a positive force pulls towards larger positions; not used; change the sign of"
         note("sign", "drive_force_N", f"{text} channels.drive_force_N.scale")
         del usable["drive_force_N"]
@@ -217,9 +221,11 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
         note("units", where, f"{fastest_mps:.3g} m/s, {times:.3g} times rig.stribeck_velocity_mps: is it in mm?")
 
 
-def _pulls_back(columns: Columns, table: RunTable) -> bool:
-    """Whether the drive takes work out of what it drags: friction lets no drive do that."""
-    force_N = columns["drive_force_N"]
+def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> bool:
+    """Whether the drive takes more work out of what it drags than a loaded spring can hold: friction gives none back."""
+    force_N, t_s = columns["drive_force_N"], columns["t_s"]
     if "drive_position_m" in columns:
-        return float(force_N[1:] @ np.diff(columns["drive_position_m"])) < 0.0
-    return float(force_N.mean()) * (table.drive_velocity_mps or 0.0) < 0.0
+        work_J = float(force_N[1:] @ np.diff(columns["drive_position_m"]))
+    else:
+        work_J = float(force_N.mean()) * (table.drive_velocity_mps or 0.0) * float(t_s[-1] - t_s[0])
+    return work_J < -0.5 * float(np.abs(force_N).max()) ** 2 / stiffness_N_per_m

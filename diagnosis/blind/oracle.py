@@ -34,9 +34,8 @@ def oracle(folder: Path, cases: list[Opened], jobs: int, progress: Progress) -> 
     found: Oracle = {}
     todo: list[Opened] = []
     for case in cases:
-        if (
-            case.answer["verdict"] != "effect" or case.verdict == "fault"
-        ):  # what cannot be diagnosed has no oracle either
+        # what ended in a fault would end in it here too
+        if case.answer["verdict"] != "effect" or case.verdict == "fault":
             continue
         path = folder / KEPT / f"{case.name}.json"
         if path.is_file():
