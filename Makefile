@@ -12,7 +12,7 @@ demo: $(READY)
 
 test: check
 	@$(BIN)/pytest -m realtime
-	@$(BIN)/pytest -m "not realtime" -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	@OMP_NUM_THREADS=1 $(BIN)/pytest -m "not realtime" -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: $(READY)
 	@$(BIN)/ruff check

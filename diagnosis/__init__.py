@@ -10,7 +10,7 @@ Comparison
     commands                    what the rig was told, and the segments in which that does not change
     axis_motion                 the measured motion along which a force-driven model is led
     twin                        one run predicted under the run's own commands, by the plant's equations
-    side_by_side, lanes         eight rigs through it at once; one step of them
+    side_by_side, lanes         four rigs through it at once; one step of them
     sensing                     what sensors make of a prediction: faults, and ordinary lags
     axis_drive                  a force-driven axis: the true input, freed of what its sensor did to it
     entries                     the force and the state with which every segment of the model begins

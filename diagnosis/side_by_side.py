@@ -1,4 +1,4 @@
-"""Eight rigs through one run in the time of two to four (`make bench`): a refit asks for one run of many slightly different rigs.
+"""Four rigs through one run in the time of two or three (`make bench`): a refit asks for one run of many slightly different rigs.
 
 They get the same commands in the same steps, so that `lanes` does each step for all of them at once. What its loops cannot
 hold, a sine of the place or a power of an age, has loops of its own here, which run only where a rig has such an effect.

@@ -11,13 +11,14 @@ from diagnosis.twin import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
 R = TypeVar("R")
+AT_ONCE = 2 * LANES  # works; with fewer, more of the lanes go empty
 At = tuple[Floats, Effects]  # deviations of the nuisances, and effects
 # a calculation that yields points, is sent the features predicted there, and returns what it found
 Work = Generator[Sequence[At], list[Floats], R]
 
 
 def together(predicted: Callable[[Sequence[At]], list[Floats]], works: Sequence[Work[R]]) -> list[R]:
-    """What every work returns, in their order; as many at a time as rigs go side by side."""
+    """What every work returns, in their order; `AT_ONCE` of them at a time."""
     results: dict[int, R] = {}
     waiting: dict[int, Work[R]] = {}
     wanted: dict[int, Sequence[At]] = {}
@@ -31,7 +32,7 @@ def together(predicted: Callable[[Sequence[At]], list[Floats]], works: Sequence[
             del waiting[number]
 
     while len(results) < len(works):
-        while len(waiting) < LANES and (begun := next(coming, None)):
+        while len(waiting) < AT_ONCE and (begun := next(coming, None)):
             number, work = begun
             waiting[number] = work
             on(number, None)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.lanes import LANES
-from diagnosis.together import together
+from diagnosis.together import AT_ONCE, together
 
 
 def halving(start: float, turns: int):
@@ -32,7 +31,7 @@ def test_each_gets_its_own_answers_in_the_order_of_the_works():
     halves = Halves()
     found = together(halves, [halving(64.0 + number, count) for number, count in enumerate(turns)])
     assert found == [(64.0 + number) / 2.0**count for number, count in enumerate(turns)]
-    assert max(halves.asked) == 2 * LANES
+    assert max(halves.asked) == 2 * AT_ONCE
     assert sum(halves.asked) == 2 * sum(turns)
 
 
