@@ -11,7 +11,7 @@ from diagnosis.twin import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
 R = TypeVar("R")
-AT_ONCE = 2 * LANES  # works; with fewer, more of the lanes go empty
+AT_ONCE = 2 * LANES  # works: many ask for one point at a time
 At = tuple[Floats, Effects]  # deviations of the nuisances, and effects
 # a calculation that yields points, is sent the features predicted there, and returns what it found
 Work = Generator[Sequence[At], list[Floats], R]
