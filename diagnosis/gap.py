@@ -16,6 +16,7 @@ a few floors and a logarithm beyond: a drive that ripples by 500 floors of a las
 ripples by 50, and must not hide everything else.
 """
 
+from collections.abc import Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -73,22 +74,33 @@ def slope_of_compress(z: Floats, knee: float = KNEE) -> Floats:
     return 1.0 / np.sqrt(1.0 + (z / knee) ** 2)
 
 
-def replicates(problem: Problem, point: Point, roughness: Roughness, count: int, seed: int, jobs: int = 1) -> Floats:
-    """Runs of one model on other surfaces with other noise, [count, features]; the same ones in any number of processes."""
+def replicates(
+    problem: Problem,
+    point: Point,
+    roughness: Roughness,
+    count: int,
+    seed: int,
+    jobs: int = 1,
+    perhaps: Sequence[Point] = (),
+) -> Floats:
+    """Runs of one model on other surfaces with other noise, [count, features]; the same ones in any number of processes.
+
+    `perhaps` are points that will be asked for next.
+    """
     shares = np.array_split(np.arange(count), jobs)
-    drawn = each(jobs, _drawn, problem, [(point, roughness, seed, share.tolist()) for share in shares])
+    drawn = each(jobs, _drawn, problem, [(point, roughness, seed, share.tolist(), perhaps) for share in shares])
     return np.array(list(chain.from_iterable(drawn)))
 
 
-def _drawn(problem: Problem, share: tuple[Point, Roughness, int, list[int]]) -> list[Floats]:
-    point, roughness, seed, numbers = share
+def _drawn(problem: Problem, share: tuple[Point, Roughness, int, list[int], Sequence[Point]]) -> list[Floats]:
+    point, roughness, seed, numbers, perhaps = share
     draws: list[Draw] = []
     for number in numbers:
         random = np.random.default_rng([seed, number])
         length_m = float(roughness.length_m * np.exp(random.uniform(-1.0, 1.0)))
         surface = Roughness(roughness.ratio, length_m, int(random.integers(1_000_000)))
         draws.append(Draw(random, surface))
-    return problem.predicted_many([point] * len(draws), draws)
+    return problem.predicted_many([point] * len(draws), draws, perhaps)
 
 
 def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None = None) -> Floor:

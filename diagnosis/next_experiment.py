@@ -15,7 +15,7 @@ from diagnosis.experiments import Plan, as_run, plans
 from diagnosis.features import Feature
 from diagnosis.gap import Floor, compress, floor_of, replicates, slope_of_compress
 from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Problem
+from diagnosis.problem import Point, Problem
 from diagnosis.refit import Fit
 from diagnosis.result import Experiment
 from diagnosis.twin import Roughness
@@ -104,21 +104,20 @@ def _name(fit: Fit) -> str:
 class _Imagined:
     """One experiment as if it had been measured under the first explanation, with its floor."""
 
-    def __init__(self, problem: Problem, nuisances: Nuisances, plan: Plan, fit: Fit, count: int) -> None:
+    def __init__(self, problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit, count: int) -> None:
         self._nuisances = nuisances
-        point = nuisances.point(fit.deviations, fit.effects)
-        self.problem = Problem(problem.rig, [as_run(problem, plan, point)])
-        self.floor: Floor = floor_of(self.problem, point, replicates(self.problem, point, _ROUGHNESS, count, 3))
-
-    def predicted(self, fit: Fit, deviations: Floats, w: Floats) -> Floats:
-        """Expected features, in floors [compared]."""
-        features = self.problem.predicted(self._nuisances.point(deviations, fit.form.tables(w)))
-        return (self.floor.expected(features) / self.floor.scatter)[self.floor.compared]
-
-    def apart(self, first: Fit, second: Fit) -> Floats:
+        here, there = (nuisances.point(fit.deviations, fit.effects) for fit in (first, second))
+        self.problem = Problem(problem.rig, [as_run(problem, plan, here)])
+        drawn = replicates(self.problem, here, _ROUGHNESS, count, 3, perhaps=(here, there))
+        self.floor: Floor = floor_of(self.problem, here, drawn)
+        expected, other = self._expected([here, there])
+        self.apart = np.where(np.isfinite(other - expected), other - expected, _MISSING)
         """How far the second explanation is from the first, in floors [compared]."""
-        z = self.predicted(second, second.deviations, second.w) - self.predicted(first, first.deviations, first.w)
-        return np.where(np.isfinite(z), z, _MISSING)
+
+    def _expected(self, points: list[Point]) -> list[Floats]:
+        """Expected features, in floors [compared] each."""
+        found = self.problem.predicted_many(points)
+        return [(self.floor.expected(one) / self.floor.scatter)[self.floor.compared] for one in found]
 
     def columns(self, fit: Fit, which: npt.NDArray[np.int64]) -> Floats:
         """How the expectation changes with each coordinate, in floors, [compared, which].
@@ -128,29 +127,26 @@ class _Imagined:
 
         """
         own = len(fit.deviations)
-        here = self.predicted(fit, fit.deviations, fit.w)
-        columns: list[Floats] = []
-        for i in which.tolist():
-            ahead = np.concatenate([fit.deviations, fit.w])
-            size = _STEP if i < own else _STEP_OF_EFFECT
-            step = -size if ahead[i] > 0.0 else size
-            ahead[i] += step
-            change = (self.predicted(fit, ahead[:own], ahead[own:]) - here) / step
-            columns.append(np.where(np.isfinite(change), change, 0.0))
+        at = np.concatenate([fit.deviations, fit.w])
+        steps = [(_STEP if i < own else _STEP_OF_EFFECT) * (-1.0 if at[i] > 0.0 else 1.0) for i in which.tolist()]
+        ahead = [at, *(at + step * (np.arange(len(at)) == i) for i, step in zip(which.tolist(), steps, strict=True))]
+        here, *there = self._expected([self._nuisances.point(one[:own], fit.form.tables(one[own:])) for one in ahead])
+        columns = [(one - here) / step for one, step in zip(there, steps, strict=True)]
+        columns = [np.where(np.isfinite(column), column, 0.0) for column in columns]
         return np.column_stack(columns) if columns else np.zeros((len(here), 0))
 
 
 def _first_look(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit) -> _Look | None:
     """An upper bound: nothing is imitated."""
-    imagined = _Imagined(problem, nuisances, plan, first, _FEW)
+    imagined = _Imagined(problem, nuisances, plan, first, second, _FEW)
     if not imagined.floor.compared.any():
         return None
-    return _Look(plan, float(np.linalg.norm(compress(imagined.apart(first, second)))), None)
+    return _Look(plan, float(np.linalg.norm(compress(imagined.apart))), None)
 
 
 def _judged(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit) -> _Look:
-    imagined = _Imagined(problem, nuisances, plan, first, _SOME)
-    z = imagined.apart(first, second)
+    imagined = _Imagined(problem, nuisances, plan, first, second, _SOME)
+    z = imagined.apart
     whitening = imagined.floor.whitening
     slope = slope_of_compress(z)
     apart = whitening @ compress(z)

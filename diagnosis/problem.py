@@ -16,6 +16,7 @@ from diagnosis.commands import Commands, commands_of
 from diagnosis.entries import entries_of, misread
 from diagnosis.evidence import Evidence, Run
 from diagnosis.features import Feature, Features, Scales, Signals, settled, spring_features
+from diagnosis.lanes import LANES
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.phases import in_run
@@ -29,7 +30,7 @@ Floats = npt.NDArray[np.floating[Any]]
 _PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
 # of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
 _SCALE_SPREAD = 0.004
-_KEPT = 32  # simulated runs, of 0.6 MB each
+_KEPT = 64  # simulated runs, of 0.6 MB each
 _DIVERGED = 1e100  # SI units, of a feature: its square must still be a number
 _SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
 
@@ -101,12 +102,22 @@ class Problem:
         """Features of the model, [features]; NaN where no rig is like that."""
         return self.predicted_many([point])[0]
 
-    def predicted_many(self, points: Sequence[Point], draws: Sequence[Draw] = ()) -> list[Floats]:
-        """As `predicted` of every point, in less time than one after the other; with draws those of rough and noisy runs."""
+    def predicted_many(
+        self, points: Sequence[Point], draws: Sequence[Draw] = (), perhaps: Sequence[Point] = ()
+    ) -> list[Floats]:
+        """As `predicted` of every point, in less time than one after the other.
+
+        Args:
+            points: where.
+            draws: of each point what is random about it; without draws nothing is.
+            perhaps: points that may be asked for next, to be simulated where that costs nothing.
+
+        """
         parts: list[list[float]] = [[] for _ in points]
         with np.errstate(over="ignore", invalid="ignore"):  # where a far start of a refit makes the model diverge
             for run in self.runs:
-                for part, signals in zip(parts, self._signals(run, points, draws or [None] * len(points)), strict=True):
+                found = self._signals(run, points, draws or [None] * len(points), perhaps)
+                for part, signals in zip(parts, found, strict=True):
                     part.extend([math.nan] if signals is None else self._features(run, signals).values)
         result: list[Floats] = []
         for part in parts:
@@ -121,12 +132,14 @@ class Problem:
             raise ValueError(f"no rig is like that: {point}")
         return found
 
-    def _signals(self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None]) -> list[Signals | None]:
+    def _signals(
+        self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None], perhaps: Sequence[Point] = ()
+    ) -> list[Signals | None]:
         """Of every point; None where no rig is like that."""
         asked = [_asked(run, point, draw) for point, draw in zip(points, draws, strict=True)]
         if self.rig.drive == "force":
             return [self._led(run, one) for one in asked]
-        raws = self._raw(run, run.commands, asked)
+        raws = self._raw(run, run.commands, asked, perhaps=perhaps)
         return [None if raw is None else _shown(run, one, raw) for one, raw in zip(asked, raws, strict=True)]
 
     def _led(self, run: Prepared, one: _Asked) -> Signals | None:
@@ -154,32 +167,36 @@ class Problem:
         return result
 
     def _raw(
-        self, run: Prepared, commands: Commands, asked: Sequence[_Asked], inputs: object = None
+        self,
+        run: Prepared,
+        commands: Commands,
+        asked: Sequence[_Asked],
+        inputs: object = None,
+        perhaps: Sequence[Point] = (),
     ) -> list[Signals | None]:
         """Simulated signals; what was drawn is nobody's else, the rest may be there already."""
-        keys = [
-            number
-            if one.draw is not None
-            else (
-                run.file,
-                one.start.force_N,
-                one.entries,
-                inputs,
-                _hashable({"rig": one.point.values}),
-                _hashable(one.effects),
-            )
-            for number, one in enumerate(asked)
-        ]
+        keys = [number if one.draw is not None else _key(run, one, inputs) for number, one in enumerate(asked)]
         found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
         todo = {key: one for key, one in zip(keys, asked, strict=True) if key not in found}
-        found |= zip(todo, self._simulate(commands, list(todo.values())), strict=True)
+        spare: dict[object, _Asked] = {}
+        if len(todo) % LANES:
+            soon = [_asked(run, point, None) for point in perhaps]
+            known = todo.keys() | found.keys() | self._simulated.keys()
+            spare = {key: one for one in soon if (key := _key(run, one, inputs)) not in known}
+        simulated = self._simulate(commands, [*todo.values(), *spare.values()], len(todo))
+        for key, signals in zip([*todo, *spare], simulated, strict=True):
+            if key in todo:
+                found[key] = signals
+            elif signals is not None:
+                self._simulated[key] = signals
         # at the end again: where all trials start from is asked for again and again
         self._simulated |= {key: found[key] for key, one in zip(keys, asked, strict=True) if one.draw is None}
         for key in list(self._simulated)[:-_KEPT]:
             del self._simulated[key]
         return [found[key] for key in keys]
 
-    def _simulate(self, commands: Commands, asked: Sequence[_Asked]) -> list[Signals | None]:
+    def _simulate(self, commands: Commands, asked: Sequence[_Asked], wanted: int) -> list[Signals | None]:
+        """The signals of the first `wanted`, None where no rig is like that; of the others where there was a lane for them."""
         configs: dict[int, RigConfig] = {}
         for number, one in enumerate(asked):
             with suppress(ValidationError):
@@ -188,7 +205,8 @@ class Problem:
                 )
         starts = [asked[number].start for number in configs]
         entries = [asked[number].entries for number in configs]
-        found = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries)
+        possible = sum(number < wanted for number in configs)
+        found = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries, possible)
         by_number = dict(zip(configs, found, strict=True))
         return [by_number.get(number) for number in range(len(asked))]
 
@@ -238,6 +256,12 @@ def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
     for name, (low, high) in run.clipped.items():
         result[name] = np.clip(result[name], low, high)
     return result
+
+
+def _key(run: Prepared, one: _Asked, inputs: object) -> object:
+    """What decides how a run of the model goes of which nothing is drawn."""
+    rig = _hashable({"rig": one.point.values})
+    return run.file, one.start.force_N, one.entries, inputs, rig, _hashable(one.effects)
 
 
 def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:

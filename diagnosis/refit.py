@@ -15,7 +15,7 @@ from diagnosis.gap import KNEE, Floor, differences, whitened
 from diagnosis.nuisance import Nuisances
 from diagnosis.phases import is_phase
 from diagnosis.problem import Problem
-from diagnosis.together import At, Work, together
+from diagnosis.together import At, Question, Work, together
 from diagnosis.twin import Effects
 from plant.effects import EFFECTS
 
@@ -134,6 +134,21 @@ def _prior(form: Form, deviations: Floats) -> Floats:
     return np.concatenate([np.ones(len(deviations)), [1.0 / axis.prior for axis in form.axes]])
 
 
+def _axis_steps(form: Form, w: Floats) -> Floats:
+    """By how much each axis is moved for its derivative."""
+    steps = np.zeros(len(w))
+    for i, axis in enumerate(form.axes):
+        steps[i] = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
+        if axis.prior < _NARROW:  # the period of a wave that passes many times
+            steps[i] = 0.02 * axis.prior
+    return steps
+
+
+def _beside(form: Form, deviations: Floats, w: Floats) -> list[At]:
+    """Where the derivatives of all axes are taken."""
+    return [(deviations, form.tables(ahead)) for ahead in w + np.diag(_axis_steps(form, w))]
+
+
 class Fitter:
     """Fits forms to one problem under one floor."""
 
@@ -155,9 +170,10 @@ class Fitter:
         """Features of the model, free of noise [features]."""
         return self.predicted_many([(deviations, effects)])[0]
 
-    def predicted_many(self, at: Sequence[At]) -> list[Floats]:
-        """As `predicted` of every point, in less time than one after the other."""
-        return self.problem.predicted_many([self.nuisances.point(deviations, effects) for deviations, effects in at])
+    def predicted_many(self, at: Sequence[At], perhaps: Sequence[At] = ()) -> list[Floats]:
+        """As `predicted` of every point, in less time than one after the other; `perhaps` are points that may be next."""
+        points, soon = ([self.nuisances.point(*one) for one in some] for some in (at, perhaps))
+        return self.problem.predicted_many(points, perhaps=soon)
 
     def whitened(self, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
         """Whitened compressed differences [compared], and the derivative of the compression there."""
@@ -173,7 +189,7 @@ class Fitter:
         """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
         fit = yield from self.refitting(NOTHING, deviations, np.zeros(0))
         fit = yield from self.fitting(NOTHING, fit.deviations, fit.w, _RETUNE)
-        (here,) = yield [(fit.deviations, {})]
+        (here,) = yield Question([(fit.deviations, {})])
         self._rates = yield from self._nuisance_rates(fit.deviations, {}, here, _STEPS[0])
         return fit
 
@@ -191,7 +207,7 @@ class Fitter:
 
     def quick(self, form: Form, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
         """A form fitted a little, from the best of some starts, with the chi2 of the gap's own compression."""
-        there = yield [(deviations, form.tables(w)) for deviations, w in starts]
+        there = yield Question([(deviations, form.tables(w)) for deviations, w in starts])
         far = [self.far_chi2(form, *one) for one in zip(starts, there, strict=True)]
         fit = yield from self.fitting(form, *starts[far.index(min(far))], _QUICK)
         return (yield from self._judging(fit))
@@ -201,7 +217,7 @@ class Fitter:
         return together(self.predicted_many, [self._judging(fit)])[0]
 
     def _judging(self, fit: Fit) -> Work[Fit]:
-        (predicted,) = yield [(fit.deviations, fit.effects)]
+        (predicted,) = yield Question([(fit.deviations, fit.effects)])
         residual, _ = self.whitened(predicted)
         chi2 = self._chi2(_prior(fit.form, fit.deviations), residual, np.concatenate([fit.deviations, fit.w]))
         return fit._replace(chi2=chi2, residual=residual)
@@ -213,7 +229,7 @@ class Fitter:
 
     def refitting(self, form: Form, deviations: Floats, w: Floats) -> Work[Fit]:
         """As `refit`, beside others."""
-        (predicted,) = yield [(deviations, form.tables(w))]
+        (predicted,) = yield Question([(deviations, form.tables(w))])
         if np.abs(differences(self.floor, self.problem, predicted)).max() > _FAR_OFF:
             fit = yield from self.fitting(form, deviations, w, _FAR)
             deviations, w = fit.deviations, fit.w
@@ -251,7 +267,7 @@ class Fitter:
         own = len(deviations)
         prior = _prior(form, deviations)
         now = np.concatenate([deviations, w])
-        (here,) = yield [(deviations, form.tables(w))]
+        (here,) = yield Question([(deviations, form.tables(w))], _beside(form, deviations, w))
         residual, slope = self.whitened(here, stage.knee)
         chi2 = self._chi2(prior, residual, now)
         nuisance_rates = self._rates
@@ -269,10 +285,12 @@ class Fitter:
             normal = columns.T @ columns + np.diag(prior**2)
             change = np.linalg.solve(normal, columns.T @ residual - prior**2 * now)
             gain = 0.0
-            for share in _SHARES:
-                ahead = now + share * change
-                ahead[:own] = np.clip(ahead[:own], -self._most, self._most)
-                (there,) = yield [(ahead[:own], form.tables(ahead[own:]))]
+            tried = [self._held(now + share * change) for share in _SHARES]
+            points = [(ahead[:own], form.tables(ahead[own:])) for ahead in tried]
+            for number, ahead in enumerate(tried):
+                (there,) = yield Question(
+                    [points[number]], [*_beside(form, ahead[:own], ahead[own:]), *points[number + 1 :]]
+                )
                 new_residual, new_slope = self.whitened(there, stage.knee)
                 new_chi2 = self._chi2(prior, new_residual, ahead)
                 if new_chi2 < chi2:
@@ -299,6 +317,11 @@ class Fitter:
                 rates[:, i] = column * growth * (1.0 + axis.value(w)) / axis.scale
         return rates
 
+    def _held(self, at: Floats) -> Floats:
+        """Nuisances and axes with the nuisances within their bounds."""
+        own = len(self._most)
+        return np.concatenate([np.clip(at[:own], -self._most, self._most), at[own:]])
+
     @staticmethod
     def _chi2(prior: Floats, residual: Floats, at: Floats) -> float:
         held = prior * at
@@ -307,17 +330,13 @@ class Fitter:
     def _nuisance_rates(self, deviations: Floats, effects: Effects, here: Floats, size: float) -> Work[Floats]:
         steps = np.where(deviations > 0.0, -size, size)
         ahead = deviations + np.diag(steps)
-        there = yield [(one, effects) for one in ahead]
+        there = yield Question([(one, effects) for one in ahead])
         return np.column_stack([self._rate(here, *one) for one in zip(there, steps.tolist(), strict=True)])
 
     def _axis_rates(self, form: Form, deviations: Floats, w: Floats, here: Floats) -> Work[Floats]:
-        steps = np.zeros(len(w))
-        for i, axis in enumerate(form.axes):
-            steps[i] = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
-            if axis.prior < _NARROW:  # the period of a wave that passes many times
-                steps[i] = 0.02 * axis.prior
+        steps = _axis_steps(form, w)
         columns = np.zeros((int(self.floor.compared.sum()), len(w)))
-        there = yield [(deviations, form.tables(ahead)) for ahead in w + np.diag(steps)]
+        there = yield Question(_beside(form, deviations, w))
         for i, one in enumerate(there):
             columns[:, i] = self._rate(here, one, float(steps[i]))
         return columns

@@ -46,7 +46,7 @@ def there_and_back(seconds_a_leg: float = 0.6) -> Commands:
     """Stick-slip, then under vibration, the same backwards, and at rest."""
     blocks = round(1e3 * seconds_a_leg)
     drive = np.repeat([3e-3, 3e-3, -3e-3, -3e-3, 0.0], blocks)
-    frequency_Hz = np.repeat([0.0, 2200.0, 3300.0, 0.0, 0.0], blocks)
+    frequency_Hz = np.repeat([0.0, 2000.0, 3300.0, 0.0, 0.0], blocks)
     amplitude_m = np.repeat([0.0, 2.6e-7, 1.5e-7, 0.0, 0.0], blocks)
     return Commands(drive, frequency_Hz, amplitude_m, (), None)
 

@@ -74,9 +74,9 @@ def predictions_and_fit(fitter, work):
     """How many predictions a fit takes, and the fit."""
     asked = []
 
-    def predicted(points):
+    def predicted(points, perhaps=()):
         asked.extend(points)
-        return fitter.predicted_many(points)
+        return fitter.predicted_many(points, perhaps)
 
     (fit,) = together(predicted, [work])
     return len(asked), fit

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from diagnosis.together import AT_ONCE, together
+from diagnosis.together import AT_ONCE, Question, together
 
 
 def halving(start: float, turns: int):
     """Asks for the half of its number so many times, and beside it for something it does not need."""
     value = start
     for _ in range(turns):
-        half, _ = yield [(np.array([value]), {}), (np.array([1e9]), {})]
+        half, _ = yield Question([(np.array([value]), {}), (np.array([1e9]), {})], [(np.array([0.5 * value]), {})])
         value = float(half[0])
     return value
 
@@ -20,9 +20,11 @@ class Halves:
 
     def __init__(self) -> None:
         self.asked: list[int] = []
+        self.perhaps: list[int] = []
 
-    def __call__(self, points):
+    def __call__(self, points, perhaps=()):
         self.asked.append(len(points))
+        self.perhaps.append(len(perhaps))
         return [0.5 * deviations for deviations, _ in points]
 
 
@@ -33,6 +35,7 @@ def test_each_gets_its_own_answers_in_the_order_of_the_works():
     assert found == [(64.0 + number) / 2.0**count for number, count in enumerate(turns)]
     assert max(halves.asked) == 2 * AT_ONCE
     assert sum(halves.asked) == 2 * sum(turns)
+    assert halves.perhaps == [asked // 2 for asked in halves.asked]
 
 
 def test_no_work_is_no_question():
@@ -43,7 +46,7 @@ def test_no_work_is_no_question():
 
 def test_what_goes_wrong_in_one_is_not_swallowed():
     def wrong():
-        yield [(np.zeros(1), {})]
+        yield Question([(np.zeros(1), {})])
         raise ValueError("no such rig")
 
     with pytest.raises(ValueError, match="no such rig"):
