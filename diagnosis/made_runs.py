@@ -10,7 +10,7 @@ from diagnosis.made_sensors import Chain, measured
 from diagnosis.protocols import AxisPlan, RunPlan
 from plant.config import RigConfig
 from plant.core import advance_disturbed
-from plant.disturb import spring_N
+from plant.disturb import even_m, spring_N
 from plant.records import CHANNELS, TRUTH, build
 from plant.simulate import run_blocks
 
@@ -100,6 +100,7 @@ def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: floa
     s.age_s = random.uniform(1.0, 30.0)
     s.frame_m, s.base_m = force_N * p.frame_m_per_N, force_N * p.base_m_per_N
     s.s_d = position_m + s.frame_m + _extension_m(p, force_N)
+    s.even_m = even_m(p, s.s_d)
     s.drive_N = s.force_f = s.force_lag_1 = s.force_lag_2 = force_N
     s.delay_line[:] = force_N
     s.mass_position_f, s.drive_position_f = s.x, s.s_d

@@ -95,6 +95,7 @@ def advance_lanes(
         ages = ages or p.age_growth_N != 0.0
         varies = varies or _varies(p)
     t_s = state[0].t_s
+    travelled_m = 0.0
     phi = vibrating_s = amplitude_before_m = dt_before = 0.0
     first = True
     entry = 0
@@ -147,7 +148,7 @@ def advance_lanes(
                     p = params[i]
                     turns = p.ripple_frequency_Hz * (t_s + 0.5 * dt)
                     if p.ripple_wavelength_m > 0.0:
-                        turns = w[at.S_D + i] / p.ripple_wavelength_m
+                        turns = (state[i].even_m + travelled_m + 0.5 * dt * drive[block]) / p.ripple_wavelength_m
                     angle_rad = TWO_PI * turns + p.ripple_phase_rad
                     w[at.DRIVE + i] = drive[block] * (
                         1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
@@ -178,6 +179,7 @@ def advance_lanes(
             at.slide(w, dt, z_dt, base_mid_mps, base_mps2)
             z_dt = dt
             t_s += dt
+            travelled_m += dt * drive[block]
 
         if vibrating:
             phi = (phi + omega * dt * samples) % TWO_PI

@@ -24,6 +24,7 @@ from diagnosis.reduced import BLOCK_S, SIGNALS
 from diagnosis.side_by_side import advance_lanes, extension_m
 from plant.config import RigConfig
 from plant.core import advance_disturbed
+from plant.disturb import even_m
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -204,8 +205,9 @@ def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
         s.frame_m = held_N * p.frame_m_per_N
         s.base_m = held_N * p.base_m_per_N
         s.s_d += s.frame_m
+        s.even_m = s.s_d
         if start.drive_m is not None and p.ripple_wavelength_m > 0.0:
-            p.ripple_phase_rad += 2.0 * math.pi * (start.drive_m - s.s_d) / p.ripple_wavelength_m
+            p.ripple_phase_rad += 2.0 * math.pi * (even_m(p, start.drive_m) - s.s_d) / p.ripple_wavelength_m
         s.force_lag_1 = s.force_lag_2 = held_N
         s.delay_line[:] = held_N
 

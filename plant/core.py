@@ -131,7 +131,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             math.cos(load_omega * t_s + p.load_phase_rad),
         )
         load_sin_step, load_cos_step = math.sin(load_omega * dt), math.cos(load_omega * dt)
-        x, v, z, v_r, g, s_d = s.x, s.v, s.z, s.v_r, s.g, s.s_d
+        x, v, z, v_r, g, s_d, even_m = s.x, s.v, s.z, s.v_r, s.g, s.s_d, s.even_m
         force_f, position_f, drive_f = s.force_f, s.mass_position_f, s.drive_position_f
         mass_f, mass_slow_f = s.mass_accel_f, s.mass_accel_slow_f
         base_f, base_slow_f = s.base_accel_f, s.base_accel_slow_f
@@ -163,7 +163,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     if p.ripple_ratio != 0.0:
                         turns = p.ripple_frequency_Hz * (t_s + 0.5 * dt)
                         if p.ripple_wavelength_m > 0.0:
-                            turns = s_d / p.ripple_wavelength_m
+                            turns = (even_m + 0.5 * dt * drive) / p.ripple_wavelength_m
+                            even_m += dt * drive
                         angle_rad = TWO_PI * turns + p.ripple_phase_rad
                         drive_velocity_mps = drive * (
                             1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
@@ -282,7 +283,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
 
         steps = samples * steps_per_sample
         s.steps += steps
-        s.x, s.v, s.z, s.v_r, s.g, s.s_d = x, v, z, v_r, g, s_d
+        s.x, s.v, s.z, s.v_r, s.g, s.s_d, s.even_m = x, v, z, v_r, g, s_d, even_m
         s.amplitude_m = u0
         s.phi = (s.phi + omega * dt * steps) % TWO_PI if vibrating else 0.0
         s.force_f, s.mass_position_f, s.drive_position_f = force_f, position_f, drive_f

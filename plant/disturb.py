@@ -5,6 +5,7 @@ import math
 from bridge.kernel import Record, kernel
 
 TWO_PI = 2.0 * math.pi
+_EVENED = 60  # rounds; each leaves the ripple's share of the error
 LAG_CELL_S = 2e-5  # of the line that remembers the speed: 11 of them in a period at 4.5 kHz
 
 
@@ -35,6 +36,23 @@ def wave(angle_rad: float, second_sin: float, second_cos: float) -> float:
 def with_second(sin: float, cos: float, second_sin: float, second_cos: float) -> float:
     """A sine with its second harmonic, from the sine and the cosine of its angle."""
     return sin + second_sin * 2.0 * sin * cos + second_cos * (1.0 - 2.0 * sin * sin)
+
+
+@kernel
+def even_m(p: Record, drive_m: float) -> float:
+    """Where an even drive would be when one with a screw's lead errors is at `drive_m`.
+
+    The errors are the integral of the velocity's ripple over the even position, without a mean.
+    """
+    found_m = drive_m
+    if p.ripple_wavelength_m > 0.0:
+        per_rad_m = p.ripple_wavelength_m / TWO_PI
+        for _ in range(_EVENED):
+            sin = math.sin(found_m / per_rad_m + p.ripple_phase_rad)
+            cos = math.cos(found_m / per_rad_m + p.ripple_phase_rad)
+            error = p.ripple_cos_2 * sin * cos - cos - 0.5 * p.ripple_sin_2 * (2.0 * cos * cos - 1.0)
+            found_m = drive_m - p.ripple_ratio * per_rad_m * error
+    return found_m
 
 
 @kernel

@@ -194,7 +194,7 @@ EFFECTS: Final[dict[str, Effect]] = {
         "drive",
         {
             "screw": Form(
-                "drive velocity times 1 + ratio w(2 pi s_d / wavelength_m + phase)",
+                "drive velocity times 1 + ratio w(2 pi s_e / wavelength_m + phase): the motor turns evenly",
                 (_ratio(0.05, 0.0, 0.95), Parameter("wavelength_m", 1e-5, 1.0, 1e-3), *_SHAPE),
             ),
             "time": Form(

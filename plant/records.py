@@ -83,7 +83,7 @@ STATE = np.dtype(
     + [
         (name, "f8")
         for name in (
-            *("s_d", "x", "v", "z", "v_r", "g"),
+            *("s_d", "even_m", "x", "v", "z", "v_r", "g"),
             *("amplitude_m", "frequency_Hz", "phi", "commanded_m", "commanded_Hz"),
             *("force_f", "mass_accel_f", "mass_accel_slow_f", "base_accel_f", "base_accel_slow_f"),
             *("mass_position_f", "drive_position_f"),

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from plant.disturb import even_m
+from plant.records import build
 from plant.simulate import simulate
 from tests.effects_rig import BLOCK_S, DISTURBED, HEAVY_KG, NO_FRICTION, NOMINAL, TAU, advance_by, rig, run
 
@@ -133,14 +135,31 @@ def test_ripple_of_a_screw_follows_its_own_angle():
     values = {"form": "screw", "ratio": ratio, "wavelength_m": wavelength_m, "phase_rad": phase}
     result = run(rig({"drive-speed-ripple": values}), np.full(1000, 5e-4))
 
-    def slope(_, s_d):
-        return 5e-4 * (1 + ratio * np.sin(TAU * s_d / wavelength_m + phase))
-
-    expected_m = solve_ivp(slope, (0, 1), [0.0], t_eval=result.t_s, rtol=1e-10, atol=1e-14).y[0]
-    assert result.true_drive_position_m == pytest.approx(expected_m, abs=3e-9)
-    # one turn takes longer than an even one: the mean of 1 / (1 + r sin) is 1 / sqrt(1 - r^2)
+    even_m = 5e-4 * result.t_s
+    lead_error_m = ratio * wavelength_m / TAU * (math.cos(phase) - np.cos(TAU * even_m / wavelength_m + phase))
+    assert result.true_drive_position_m == pytest.approx(even_m + lead_error_m, abs=1e-12)
+    # the motor turns evenly, and a turn is a wavelength
     turn_s = np.interp(wavelength_m, result.true_drive_position_m, result.t_s)
-    assert turn_s == pytest.approx(wavelength_m / 5e-4 / math.sqrt(1 - ratio**2), rel=1e-3)
+    assert turn_s == pytest.approx(wavelength_m / 5e-4, rel=1e-6)
+
+
+def test_where_a_screw_s_even_drive_would_be():
+    wavelength_m = 2e-4
+    values = {
+        "form": "screw",
+        "ratio": 0.4,
+        "wavelength_m": wavelength_m,
+        "phase_rad": 1.0,
+        "second_sin": 0.3,
+        "second_cos": -0.5,
+    }
+    config = rig({"drive-speed-ripple": values})
+    result = run(config, np.full(1000, 5e-4))
+    params, _ = build(config)
+    # the run begins at its even position, not where its lead error would have it
+    error_m = 0.4 * wavelength_m / TAU * (-math.cos(1.0) - 0.15 * math.cos(2.0) - 0.25 * math.sin(2.0))
+    found_m = np.array([even_m(params[0], one + error_m) for one in result.true_drive_position_m])
+    assert found_m == pytest.approx(5e-4 * result.t_s, abs=1e-11)
 
 
 def test_a_drive_that_only_pushes_with_a_force_has_no_damper():
