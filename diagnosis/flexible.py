@@ -22,7 +22,7 @@ _STEP = 0.5  # of a nuisance's tolerance
 def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
     """Differences on the held-out runs in floors [compared] under the blend that was fitted to the others."""
     trials = list({trial.form.effects: trial for trial in reversed(trials)}.values())
-    directions = Directions(base)
+    directions = Directions(base, fitter.most)
     here = fitter.predicted(base.deviations, {})
     _, slope = fitter.whitened(here)
     shown = each(jobs, _shown, fitter, [(base.deviations, trials[i::jobs]) for i in range(jobs)])

@@ -174,6 +174,10 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
     table: dict[tuple[str, str], dict[str, _Scale]] = {
         ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)},
         ("static-friction-ageing", "power"): {"ratio": _Scale(0.04, True, 1.5), "exponent": _Scale(0.3, True, 0.5)},
+        ("static-friction-ageing", "settling"): {
+            "ratio": _Scale(0.05, True, 1.5),
+            "settling_s": _Scale(0.5, True, 1.0),
+        },
         ("frictional-lag", "time"): {"lag_s": _Scale(0.06 * slip_s, True, 1.5)},
         ("frictional-lag", "dead-time"): {
             "delay_s": _Scale(0.03 * slip_s, True, 1.5),

@@ -134,6 +134,29 @@ def _prior(form: Form, deviations: Floats) -> Floats:
     return np.concatenate([np.ones(len(deviations)), [1.0 / axis.prior for axis in form.axes]])
 
 
+def step_within(normal: Floats, gradient: Floats, at: Floats, most: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """The Newton step from `at`, and what is free on it: what stands at its bound stays there if it would go beyond.
+
+    Args:
+        normal: matrix of the normal equations [parameters, parameters].
+        gradient: their right side [parameters].
+        at: where the step begins [parameters]: nuisances, then axes.
+        most: bounds of the nuisances, either way [nuisances].
+
+    """
+    own = len(most)
+    edge = np.zeros(len(at), np.bool_)
+    edge[:own] = np.abs(at[:own]) >= most
+    free = np.ones(len(at), np.bool_)
+    while True:
+        step = np.zeros(len(at))
+        step[free] = np.linalg.solve(normal[free][:, free], gradient[free])
+        beyond = edge & (step * at > 0.0)
+        if not beyond.any():
+            return step, free
+        free &= ~beyond
+
+
 def _axis_steps(form: Form, w: Floats) -> Floats:
     """By how much each axis is moved for its derivative."""
     steps = np.zeros(len(w))
@@ -157,7 +180,8 @@ class Fitter:
         self.floor = floor
         self.nuisances = nuisances
         own = len(nuisances.rig_names)
-        self._most = np.where(np.arange(len(nuisances)) < own, _MOST_TOLERANCES, _MOST_OF_CHAIN)
+        # how far each nuisance may go, either way
+        self.most = np.where(np.arange(len(nuisances)) < own, _MOST_TOLERANCES, _MOST_OF_CHAIN)
         self._rates = np.zeros((int(floor.compared.sum()), len(nuisances)))
 
     def for_problem(self, problem: Problem) -> "Fitter":
@@ -283,9 +307,10 @@ class Fitter:
             if step == stage.steps:
                 break
             normal = columns.T @ columns + np.diag(prior**2)
-            change = np.linalg.solve(normal, columns.T @ residual - prior**2 * now)
+            change, _ = step_within(normal, columns.T @ residual - prior**2 * now, now, self.most)
             gain = 0.0
-            tried = [self._held(now + share * change) for share in _SHARES]
+            most = np.concatenate([self.most, np.full(len(now) - own, np.inf)])
+            tried = [np.clip(now + share * change, -most, most) for share in _SHARES]
             points = [(ahead[:own], form.tables(ahead[own:])) for ahead in tried]
             for number, ahead in enumerate(tried):
                 (there,) = yield Question(
@@ -316,11 +341,6 @@ class Fitter:
                 growth = self.nuisances.growth(name, float(now[i]))
                 rates[:, i] = column * growth * (1.0 + axis.value(w)) / axis.scale
         return rates
-
-    def _held(self, at: Floats) -> Floats:
-        """Nuisances and axes with the nuisances within their bounds."""
-        own = len(self._most)
-        return np.concatenate([np.clip(at[:own], -self._most, self._most), at[own:]])
 
     @staticmethod
     def _chi2(prior: Floats, residual: Floats, at: Floats) -> float:

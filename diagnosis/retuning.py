@@ -90,7 +90,7 @@ def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness, jobs: int) ->
     drawn = replicates(fitter.problem, point, surface, _NEW_REPLICATES, 3, jobs)
     z = between(fitter.floor, fitter.predicted(fit.deviations, {}), drawn)
     z = np.where(np.isfinite(z), z, 0.0)  # what a rig does not show is not compared
-    directions = Directions(fit)
+    directions = Directions(fit, fitter.most)
     left = [directions.freed(fitter.floor.whitening @ compress(row)) for row in z]
     # the median, as a few replicates of a rig at the edge of slipping end elsewhere
     return max(float(np.median([row @ row for row in left])), _LEAST_EXPECTED * len(fit.residual))

@@ -101,6 +101,8 @@ def ageing_N(p: Record, age_s: float) -> float:
     """How much the static friction has grown at this age of the contact."""
     if p.age_exponent > 0.0:
         return p.age_growth_N * age_s**p.age_exponent
+    if p.age_settling_s > 0.0:
+        return p.age_growth_N * (1.0 - math.exp(-age_s / p.age_settling_s))
     return p.age_growth_N * math.log(1.0 + age_s / p.age_scale_s)
 
 

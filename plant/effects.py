@@ -4,7 +4,8 @@ A name means a mechanism; a form is one formula for it. `[effects.NAME]` in a ri
 out) and the form's parameters. Off is bit-identical to the nominal rig: effects that only change a number of the rig are
 folded into it by `plant.records.build`, the others run in a kernel of their own (`plant.core.advance_disturbed`).
 
-Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; lag over time and as a dead time:
+Literature of the formulas: ageing log: Dieterich 1972, rate and state; power: Rabinowicz 1958; settling: Kato, Sato &
+Matsubayashi 1974, with their exponent 1; lag over time and as a dead time:
 Hess & Soom 1990; over a distance: Rabinowicz 1958, of a share: Ruina 1983, two state variables; log and power ageing,
 hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; a mode that takes part by a share: Ewins, Modal
 Testing, 2000.
@@ -70,6 +71,10 @@ EFFECTS: Final[dict[str, Effect]] = {
             "power": Form(
                 "F_s grows by ratio F_s (age / 1 s)^exponent",
                 (_ratio(0.04, 0.0, 1.0), Parameter("exponent", 0.05, 1.0, 0.3)),
+            ),
+            "settling": Form(
+                "F_s grows by ratio F_s (1 - exp(-age / settling_s))",
+                (_ratio(0.05, 0.0, 1.0), Parameter("settling_s", 1e-4, 1e4, 0.5)),
             ),
         },
     ),

@@ -36,6 +36,7 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
         # dwells of 0.25 to 3 s: ln(12) = 2.5 ratios between the shortest and the longest
         Sizes("log", "ratio", 0.004, 0.06, log={"age_scale_s": (0.01, 1.0)}),
         Sizes("power", "ratio", 0.01, 0.12, log={"exponent": (0.1, 0.5)}),
+        Sizes("settling", "ratio", 0.01, 0.12, log={"settling_s": (0.2, 2.0)}),
     ),
     "frictional-lag": (
         Sizes("time", "lag_s", 1e-3, 1e-1),

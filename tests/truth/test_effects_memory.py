@@ -29,12 +29,15 @@ def pulled_after(rest_s, ageing):
 def growth_N(ageing, age_s):
     if ageing["form"] == "log":
         return ageing["ratio"] * CONTACT.static_force_N * math.log(1 + age_s / ageing["age_scale_s"])
+    if ageing["form"] == "settling":
+        return ageing["ratio"] * CONTACT.static_force_N * (1 - math.exp(-age_s / ageing["settling_s"]))
     return ageing["ratio"] * CONTACT.static_force_N * age_s ** ageing["exponent"]
 
 
 FORMS = [
     {"form": "log", "ratio": 0.03, "age_scale_s": 1e-3},
     {"form": "power", "ratio": 0.05, "exponent": 0.3},
+    {"form": "settling", "ratio": 0.1, "settling_s": 0.3},
 ]
 
 
@@ -60,11 +63,16 @@ def test_breakaway_after_a_rest_is_that_of_the_bristle_and_the_age(ageing):
 @pytest.mark.parametrize("ageing", FORMS, ids=lambda ageing: ageing["form"])
 def test_breakaway_grows_with_the_rest_as_the_formula(ageing):
     """The bristle's own reach takes a share of the age that is the same after every rest."""
-    rests_s = (0.3, 1.0, 3.0)
+    rests_s = (0.15, 0.3, 0.6) if ageing["form"] == "settling" else (0.3, 1.0, 3.0)
     peaks_N = [pulled_after(rest_s, ageing)[1].max() - CONTACT.static_force_N for rest_s in rests_s]
     if ageing["form"] == "log":
         step_N = ageing["ratio"] * CONTACT.static_force_N * math.log(3)
         assert np.diff(peaks_N) == pytest.approx([math.log(1 / 0.3) / math.log(3) * step_N, step_N], rel=0.06)
+    elif ageing["form"] == "settling":
+        left = 1.0 - np.array(peaks_N) / (ageing["ratio"] * CONTACT.static_force_N)
+        first_per_s, other_per_s = -np.diff(np.log(left)) / np.diff(rests_s)
+        assert first_per_s == pytest.approx(other_per_s, rel=0.05)
+        assert 0.5 < first_per_s * ageing["settling_s"] < 1.0
     else:
         orders = np.diff(np.log(peaks_N)) / np.diff(np.log(rests_s))
         assert orders == pytest.approx(ageing["exponent"], rel=0.05)

@@ -98,6 +98,10 @@ CASES = {
         {"static-friction-ageing": {"form": "power", "ratio": 0.1, "exponent": 0.4}},
         model(growth_N=lambda age_s: 0.1 * F_S * age_s**0.4),
     ),
+    "static-friction-ageing, settling": (
+        {"static-friction-ageing": {"form": "settling", "ratio": 0.15, "settling_s": 0.5}},
+        model(growth_N=lambda age_s: 0.15 * F_S * (1 - math.exp(-age_s / 0.5))),
+    ),
     "frictional-lag, time": ({"frictional-lag": {"lag_s": 0.003}}, model(lag_s=0.003)),
     "frictional-lag, distance": (
         {"frictional-lag": {"form": "distance", "distance_m": 1e-6, "share": 0.3}},

@@ -5,12 +5,15 @@ import math
 import numpy as np
 import pytest
 
+from diagnosis import twin
 from diagnosis.commands import Commands
 from diagnosis.lanes import LANES, gone
 from diagnosis.library import trials
+from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
 from diagnosis.reduced import SIGNALS
 from diagnosis.sensing import SENSOR_EFFECTS
+from diagnosis.side_by_side import advance_lanes
 from diagnosis.twin import Entry, Roughness, Start, built, predict, predict_many, rig_config
 from plant.core import advance, advance_disturbed
 from plant.effects import EFFECTS
@@ -126,3 +129,20 @@ def test_to_the_last_bit_the_same_in_any_company(ladder, tables):
     for config, found in zip(configs, together, strict=True):
         by_itself = predict(config, False, commands, start, entries)
         assert all(np.array_equal(found[name], by_itself[name]) for name in by_itself)
+
+
+def test_what_may_be_asked_next_is_simulated_where_a_lane_is_free(ladder, monkeypatch):
+    rig, runs = ladder
+    nuisances = Nuisances(rig)
+    now, soon, *later = (nuisances.point(0.1 * number * np.ones(len(nuisances)), {}) for number in range(6))
+    alone = [Problem(rig, runs[:1]).predicted(point) for point in (now, soon)]
+    problem = Problem(rig, runs[:1])
+    calls = []
+    monkeypatch.setattr(twin, "advance_lanes", lambda *given: calls.append(advance_lanes(*given)))
+    found = problem.predicted_many([now], perhaps=[soon, *later])
+    assert len(calls) == 1
+    again = problem.predicted(soon)
+    assert len(calls) == 1
+    problem.predicted(later[-1])  # there was no lane for it
+    assert len(calls) == 2
+    assert np.array_equal([*found, again], alone, equal_nan=True)

@@ -37,7 +37,7 @@ def test_every_name_is_there():
 @pytest.mark.parametrize(
     ("name", "forms"),
     [
-        ("static-friction-ageing", ["log", "power"]),
+        ("static-friction-ageing", ["log", "power", "settling"]),
         ("viscous-friction", ["linear", "quadratic"]),
         ("direction-dependent-friction", ["backward", "both", "kinetic"]),
         ("normal-load-fluctuation", ["sine", "random"]),
@@ -76,7 +76,7 @@ def test_every_form_loads_with_its_defaults_and_at_its_bounds(name: str, tmp_pat
         ("[effects.backlash]\n", ["effects.backlash: unknown effect", "known: ", "drive-backlash"]),
         (
             '[effects.static-friction-ageing]\nform = "cubic"\n',
-            ["effects.static-friction-ageing.form = 'cubic'", "unknown form", '"log", "power"'],
+            ["effects.static-friction-ageing.form = 'cubic'", "unknown form", '"log", "power", "settling"'],
         ),
         ("[effects.static-friction-ageing]\nform = 2.0\n", ["form = 2.0", "unknown form"]),
         ('[effects.drive-backlash]\nform = "wide"\n', ["form = 'wide'", "none; leave it out"]),

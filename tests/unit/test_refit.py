@@ -7,7 +7,7 @@ from diagnosis.gap import floor_of, replicates
 from diagnosis.library import trials
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
-from diagnosis.refit import NOTHING, Fitter
+from diagnosis.refit import NOTHING, Fitter, step_within
 from diagnosis.together import together
 from diagnosis.twin import Roughness
 from tests.prepared import fitter_of, prepared
@@ -80,3 +80,14 @@ def predictions_and_fit(fitter, work):
 
     (fit,) = together(predicted, [work])
     return len(asked), fit
+
+
+def test_what_stands_at_its_bound_stays_there_only_if_it_would_go_beyond():
+    normal = np.array([[2.0, 1.0], [1.0, 2.0]])
+    at, most = np.array([3.3, 0.0]), np.array([3.3])
+    outward, free = step_within(normal, np.array([1.0, 0.2]), at, most)
+    assert outward == pytest.approx([0.0, 0.1])  # the other one goes as if the first were not there
+    assert free.tolist() == [False, True]
+    inward, free = step_within(normal, np.array([-1.0, 0.2]), at, most)
+    assert inward == pytest.approx(np.linalg.solve(normal, [-1.0, 0.2]))
+    assert free.all()

@@ -5,8 +5,8 @@ import pytest
 
 from diagnosis.gap import KNEE
 from diagnosis.library import trials
-from diagnosis.refit import FAR_KNEE, NOTHING
-from diagnosis.search import Origin, pairs_with, refitted, screened
+from diagnosis.refit import FAR_KNEE, NOTHING, Fit
+from diagnosis.search import Directions, Origin, pairs_with, refitted, screened
 from tests.prepared import fitter_of, prepared
 
 EFFECTS = {"coulomb-level": {"ratio": -0.14}, "stribeck-velocity": {"ratio": -0.57}}
@@ -53,3 +53,11 @@ def test_a_large_effect_that_screening_puts_last_is_tried_in_several_sizes(tmp_p
     best = refitted(fitter, origins, found)[0]
     assert best.form.effects == ("static-level",)
     assert best.effects["static-level"]["ratio"] == pytest.approx(0.2, rel=0.2)
+
+
+def test_a_nuisance_at_its_bound_does_not_take_what_an_effect_would():
+    """A difference of 8 along the only nuisance's column, which has gone to its bound of 5."""
+    along = np.array([1.0, 0.0, 0.0])
+    fit = Fit(NOTHING, np.array([5.0]), np.zeros(0), 89.0, 8.0 * along, along[:, None])
+    assert Directions(fit, np.array([5.0])).freed(along)[:3] == pytest.approx(along)
+    assert np.linalg.norm(Directions(fit, np.array([6.0])).freed(along)) == pytest.approx(0.5**0.5)

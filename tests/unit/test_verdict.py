@@ -36,10 +36,22 @@ def test_a_gap_that_nothing_takes_is_unexplained():
 
 
 @pytest.mark.parametrize(
-    ("base", "left", "kind"), [(400.0, 75.0, "effect"), (400.0, 120.0, "unexplained"), (4000.0, 145.0, "effect")]
+    ("base", "left", "kind"),
+    [
+        (400.0, 75.0, "effect"),
+        (400.0, 200.0, "unexplained"),
+        (4000.0, 145.0, "effect"),
+        (4000.0, 500.0, "effect"),  # a tenth of the gap: what another formula of the same effect leaves
+        (4000.0, 1500.0, "unexplained"),
+    ],
 )
 def test_what_leaves_more_than_a_right_effect_would_is_unexplained(base, left, kind):
     assert judge(fit(base), [fit(left, "coulomb-level")], [], EXPECTED).kind == kind
+
+
+def test_two_effects_must_leave_less_than_one():
+    single, double = fit(3000.0, "coulomb-level"), fit(600.0, "coulomb-level", "drive-backlash")
+    assert judge(fit(4000.0), [single], [double], EXPECTED).kind == "unexplained"
 
 
 def test_what_the_runs_kept_aside_refute_is_unexplained():
