@@ -57,3 +57,21 @@ def test_what_says_nothing_of_another_run_is_not_refuted(effect, does):
     )
     assert foretells(effect) is does
     assert HeldOut.refutes(held_out, SimpleNamespace(form=effect), 0.4) is does  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("retuned", "left", "refuted"),
+    [
+        (100.0, 95.0, True),  # of little to be seen hardly anything
+        (100.0, 75.0, False),  # two fifths of it are enough
+        (2000.0, 1000.0, True),  # half of it, and 25 times what a right model leaves
+        (2000.0, 500.0, False),  # much is left, and most is closed
+        (340.0, 172.0, False),  # little is left
+    ],
+)
+def test_what_another_run_does_not_bear_out_is_refuted(retuned, left, refuted):
+    held_out = SimpleNamespace(
+        _chi2_retuned=retuned, _chi2=lambda _fit: left, floor=SimpleNamespace(whitening=range(100))
+    )
+    fit = SimpleNamespace(form=FORETELLS[0][0])
+    assert HeldOut.refutes(held_out, fit, 0.4) is refuted  # pyright: ignore[reportArgumentType]
