@@ -27,7 +27,7 @@ _SMALLEST_GAP = 0.05  # above the floor: less leaves nothing to divide by
 # detection limits, the next 0.36; a tilted track named as bias and wave 0.17, one as a drift -0.5, a seal as a static level -1.5.
 _LEAST_CLOSED = 0.25
 # Where it leaves more than this times the expected there, it must close this share: a seal named as a drift left 18 times the
-# expected and closed 0.49, where it had closed 0.95 of the fitted runs; large effects rightly named left 1 to 3 times.
+# expected and closed 0.49, where it had closed 0.95 of the fitted runs; seven large effects rightly named left 1 to 4 times.
 _MUCH, _LEAST_OF_MUCH = 5.0, 0.6
 _CHANCE = 8.0  # of chi2 that a right one may be worse by, where it shows little: a seal named as ageing was by 16
 
