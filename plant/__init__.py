@@ -15,7 +15,7 @@ and, for what a real rig adds to that:
 
     e      extension of the drive's spring, s_d - q - x [m]      v_lag  v_r as a lagging Stribeck curve sees it [m/s]
     q      displacement of the frame that holds the drive [m]    age    how long the contact has been at rest [s]
-    s_e    where the drive would be without ripple [m]
+    s_e    where the drive would be without ripple, `even_m` [m]
 
 `config` is what a rig file says, `pairs` the friction pairs, `effects` the library of what a real rig does and the nominal
 one does not, `records` the derived numbers and the state. `contact` is one step of friction and slide, `disturb` the formulas

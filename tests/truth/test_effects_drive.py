@@ -143,11 +143,12 @@ def test_ripple_of_a_screw_follows_its_own_angle():
     assert turn_s == pytest.approx(wavelength_m / 5e-4, rel=1e-6)
 
 
-def test_where_a_screw_s_even_drive_would_be():
+@pytest.mark.parametrize("ratio", [0.4, 0.6])  # up to 1.6 and 2.1 times the speed
+def test_where_a_screw_s_even_drive_would_be(ratio):
     wavelength_m = 2e-4
     values = {
         "form": "screw",
-        "ratio": 0.4,
+        "ratio": ratio,
         "wavelength_m": wavelength_m,
         "phase_rad": 1.0,
         "second_sin": 0.3,
@@ -157,7 +158,7 @@ def test_where_a_screw_s_even_drive_would_be():
     result = run(config, np.full(1000, 5e-4))
     params, _ = build(config)
     # the run begins at its even position, not where its lead error would have it
-    error_m = 0.4 * wavelength_m / TAU * (-math.cos(1.0) - 0.15 * math.cos(2.0) - 0.25 * math.sin(2.0))
+    error_m = ratio * wavelength_m / TAU * (-math.cos(1.0) - 0.15 * math.cos(2.0) - 0.25 * math.sin(2.0))
     found_m = np.array([even_m(params[0], one + error_m) for one in result.true_drive_position_m])
     assert found_m == pytest.approx(5e-4 * result.t_s, abs=1e-11)
 
