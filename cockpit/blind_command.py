@@ -58,6 +58,7 @@ def blind_make(
             line = "blind make: the generators of cases are not installed; run it in a checkout of the source tree"
             raise Fault("CONFIG", line) from None
         _end_like_ctrl_c()
+        check_writable("--key", key)
         with writing(), watched() as progress:
             make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
         print(f"{cases} cases    {out}\nkey         {key}\nnext        stickslip blind run {out}")

@@ -31,6 +31,7 @@ class MapResult(NamedTuple):
     removing_vibration_velocity_mps: float | None
     critical_velocity_mps: float | None  # None: steady sliding is unstable at every velocity
     self_sustained_velocity_mps: float | None  # None: stick-slip that has started never dies out
+    left_out: tuple[str, ...]  # effects of the rig that this theory has no place for
     answer: str
 
 
@@ -47,9 +48,13 @@ def stability_map(rig: RigConfig, out: Path) -> MapResult:
         hurwitz_margin,
         self_sustained_velocity_mps,
         stabilising_vibration_mps,
+        with_constant_effects,
     )
     from plant.stability import stability_map as growth_map
 
+    effects, nominal = rig.effects, rig.model_copy(update={"effects": {}})
+    alone = {name: with_constant_effects(rig.model_copy(update={"effects": {name: effects[name]}})) for name in effects}
+    rig = with_constant_effects(rig)
     v_d = max(velocity_mps for _, velocity_mps in rig.drive.profile)
     if v_d == 0.0:
         raise Fault("CONFIG", f"{rig.name}: drive.profile: the drive never moves; give it a velocity above 0")
@@ -66,6 +71,7 @@ def stability_map(rig: RigConfig, out: Path) -> MapResult:
         removing_vibration_velocity_mps=None if smallest_mps is None else max(smallest_mps, floor_mps),
         critical_velocity_mps=critical_velocity_mps(rig),
         self_sustained_velocity_mps=sustained_mps if math.isfinite(sustained_mps) else None,
+        left_out=tuple(name for name, changed in alone.items() if changed == nominal),
         answer="",
     )
     result = numbers._replace(answer=_answer(rig.name, numbers))
@@ -89,6 +95,8 @@ def _answer(name: str, result: MapResult) -> str:
         here += f"a start at rest ends in stick-slip, though steady sliding is stable; {remedy} removes it"
     else:
         here += "no stick-slip, no vibration needed"
+    if result.left_out:
+        here += f".\nNot in this theory, and left out: {', '.join(result.left_out)}"
     if critical is None:
         return f"{here}.\nNo drive velocity is fast enough: the drive has no damping."
     if critical == 0.0:

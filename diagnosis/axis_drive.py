@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from diagnosis.commands import Commands
 from diagnosis.reduced import BLOCK_S
-from diagnosis.sensing import Chain, delayed
+from diagnosis.sensing import Chain, delayed, true_force_N
 from diagnosis.twin import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -23,26 +23,16 @@ def relative(chain: Chain) -> Chain:
     return chain._replace(force_delay_s=chain.force_delay_s - chain.position_delay_s, position_delay_s=0.0)
 
 
-def true_commands(commands: Commands, effects: Effects, chain: Chain, start_s: float) -> Commands:
+def true_commands(commands: Commands, effects: Effects, chain: Chain) -> Commands:
     """The commands with the true force and the true motion; `chain` as from `relative`."""
     motion = commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
     motion = motion._replace(position_m=motion.position_m / chain.position_scale)
-    return commands._replace(drive=_true_force(commands.drive, effects, chain, start_s), motion=motion)
+    return commands._replace(drive=_true_force(commands.drive, effects, chain), motion=motion)
 
 
-def _true_force(force_N: Floats, effects: Effects, chain: Chain, start_s: float) -> Floats:
-    t_s = start_s + (np.arange(len(force_N)) + 0.5) * BLOCK_S
-    if "force-sensor-drift" in effects:
-        table = effects["force-sensor-drift"]
-        if table["form"] == "linear":
-            force_N = force_N - float(table["rate_N_per_s"]) * t_s
-        else:
-            force_N = force_N - float(table["drift_N"]) * (1.0 - np.exp(-t_s / float(table["settling_s"])))
-    if "force-sensor-bias" in effects:
-        force_N = force_N - float(effects["force-sensor-bias"]["bias_N"])
-    if "force-sensor-gain" in effects:
-        force_N = force_N / (1.0 + float(effects["force-sensor-gain"]["ratio"]))
+def _true_force(force_N: Floats, effects: Effects, chain: Chain) -> Floats:
+    force_N = true_force_N(force_N, effects, (np.arange(len(force_N)) + 0.5) * BLOCK_S)
     delay_s = chain.force_delay_s
     if "force-sensor-delay" in effects:
         delay_s += float(effects["force-sensor-delay"]["delay_s"])

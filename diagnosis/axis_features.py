@@ -78,10 +78,21 @@ def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray
     return np.where(valid, np.sign(motion.velocity_mps) * (rest_N - mean) / size_N, 0.0), valid
 
 
+def moving_s(motion: Motion, rig: RigTable) -> float:
+    """How much of a run its features can use."""
+    if float(np.ptp(motion.position_m)) <= _forgotten_m(rig):
+        return 0.0
+    return max(len(motion.position_m) - _EDGE - _first(motion, rig), 0) * BLOCK_S
+
+
+def _forgotten_m(rig: RigTable) -> float:
+    return _FORGOTTEN * rig.static_force_N / rig.contact_stiffness_N_per_m
+
+
 def _first(motion: Motion, rig: RigTable) -> int:
     """Block from which the features count."""
     gone_m = np.abs(motion.position_m - motion.position_m[0])
-    gone = gone_m > _FORGOTTEN * rig.static_force_N / rig.contact_stiffness_N_per_m
+    gone = gone_m > _forgotten_m(rig)
     return max(int(np.argmax(gone)), _EDGE)
 
 

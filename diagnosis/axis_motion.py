@@ -16,7 +16,7 @@ from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S
 
 Floats = npt.NDArray[np.floating[Any]]
-_WINDOW = 31  # blocks, of a cubic: 0.2 um of encoder noise are 4e-6 m/s and 1e-3 m/s^2
+_WINDOW = 31  # blocks, of a cubic: 0.2 um of encoder noise are 1e-5 m/s and 1e-3 m/s^2
 _EVERY = 5  # blocks, where a line through the whole run is sought
 
 

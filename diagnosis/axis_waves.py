@@ -24,7 +24,7 @@ def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
         if motion is None:
             continue
         share, valid = friction_share(run.signals["drive_force_N"], motion)
-        time_s = run.start.t_s + np.arange(len(share)) * BLOCK_S
+        time_s = np.arange(len(share)) * BLOCK_S
         at = motion.position_m if over == "position" else time_s
         series.append(Series(at[valid][::_EVERY], uniform_filter1d(share, _EVERY)[valid][::_EVERY]))
     span = max((float(np.ptp(one.at)) for one in series), default=0.0)

@@ -23,6 +23,8 @@ _WINDOW = 100  # blocks: 0.1 s, over which a velocity is read from a position wi
 _SMALLEST_CHANGE = 0.35
 _SHORTEST_S = 0.3
 _SHORTEST_WINDOWS = 3
+_SLOWEST = 0.01  # of the fastest speed of the run: less is a stop, whose slope is the sensor's noise
+_STILL_M = 1e-9  # and a drive that moves by less in all, or by less than its noise, stands: the rest is rounding
 # What a window may be off the velocity of its piece, of the change that the piece begins or ends with
 _ON_THE_WAY = 0.1
 _QUICK = 2  # windows that are off for a change that is taken as a step: the settling covers half of it
@@ -119,8 +121,12 @@ def _pieces(position_m: Floats) -> Floats:
     if blocks < 4 * _WINDOW:
         return np.full(blocks, _slope(position_m))
     windows = blocks // _WINDOW
+    means_m = position_m[: windows * _WINDOW].reshape(windows, _WINDOW).mean(axis=1)
+    if float(np.ptp(means_m)) < max(float(np.diff(position_m).std()) / 2.0**0.5, _STILL_M):
+        return np.zeros(blocks)
     velocity = np.array([_slope(position_m[i * _WINDOW : (i + 1) * _WINDOW]) for i in range(windows)])
-    edges = [0, *_changes(velocity, 0, windows, float(np.abs(velocity).max())), windows]
+    fastest = float(np.abs(velocity).max())
+    edges = [0, *_changes(velocity, 0, windows, fastest), windows]
     pieces = [piece for piece in pairwise(edges) if not _is_ramp(velocity[slice(*piece)])] or [(0, windows)]
     speeds = [0.0, *(float(np.median(velocity[slice(*piece)])) for piece in pieces), 0.0]
     result = np.asarray(savgol_filter(position_m, _RATE_WINDOW, 2, deriv=1, delta=BLOCK_S))
@@ -132,6 +138,8 @@ def _pieces(position_m: Floats) -> Floats:
         end = last - max(_off(velocity[first:last][::-1], own, after, last == windows), int(last < windows))
         inner = slice(begin * _WINDOW, end * _WINDOW if end < windows else blocks)
         slope, offset = np.polyfit(np.arange(blocks)[inner], position_m[inner], 1)
+        if abs(slope) < _SLOWEST * fastest * BLOCK_S:
+            slope, offset = 0.0, position_m[inner].mean()
         since = inner.start
         if lines and begin - done <= _QUICK:
             before_slope, before_offset = lines[-1]
@@ -185,7 +193,7 @@ def _changes(velocity: Floats, first: int, last: int, fastest: float) -> list[in
     left = float(np.median(velocity[first:best]))
     right = float(np.median(velocity[best:last]))
     # a window on the change itself spoils neither median; a stop counts against the fastest speed of the run
-    if abs(left - right) < max(_SMALLEST_CHANGE * max(abs(left), abs(right)), 0.01 * fastest):
+    if abs(left - right) < max(_SMALLEST_CHANGE * max(abs(left), abs(right)), _SLOWEST * fastest):
         return []
     return [*_changes(velocity, first, best, fastest), best, *_changes(velocity, best, last, fastest)]
 

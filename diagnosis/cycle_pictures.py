@@ -146,7 +146,7 @@ def _over_time(version: Version, name: str, told: Told, zero: float | None) -> C
     whole = len(values) // block * block
     mean = values[:whole].reshape(-1, block).mean(axis=1)
     at = segment.first + (np.arange(len(mean), dtype=np.float64) + 0.5) * block
-    x = told.run.start.t_s + at * BLOCK_S if zero is None else (at - zero) * BLOCK_S * 1e3
+    x = at * BLOCK_S if zero is None else (at - zero) * BLOCK_S * 1e3
     return Curve(version.label, x, mean, version.style)
 
 

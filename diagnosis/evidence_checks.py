@@ -21,6 +21,8 @@ _FEWEST_ROWS = 16
 _LARGEST_BAD_SHARE = 0.1
 _SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m")
 _GAP_STEPS = 10.0  # times the usual step
+# A pause that is longer, or gaps that take a larger share of a run, hide slips that the model would go on to make
+_LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
 _VELOCITY_TOLERANCE = 0.1  # of the stated drive velocity against the drive position's slope
 _FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
 _FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
@@ -64,6 +66,13 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     if len(gaps):
         at = gaps[0]
         text = f"{len(gaps)} gaps in time, first at {t_s[at]:.6g} s: {step_s[at]:.3g} s without a sample"
+        longest_s, share = float(step_s.max()), float(step_s[gaps].sum() / (t_s[-1] - t_s[0]))
+        if longest_s > _LONGEST_GAP_S or share > _LARGEST_GAP_SHARE:
+            line = (
+                f"{file}: t_s: {text}, the longest {longest_s:.3g} s, {100 * share:.2g} % of the run in all: must be "
+                f"{_LONGEST_GAP_S:g} s and {100 * _LARGEST_GAP_SHARE:g} % at most; split the file there into runs of their own"
+            )
+            raise Fault("BAD_EVIDENCE", line)
         note("time-gap", "t_s", text, len(gaps))
     _check_rate(usual_s, rig, file)
     clipped: Clipped = {}

@@ -143,7 +143,10 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
 
 
 def _cycle_m(rig: RigTable, scales: Scales) -> float:
-    """Drive travel of one stick-slip cycle: the force falls by twice the difference of static and sliding friction."""
+    """Drive travel of one stick-slip cycle: the force falls by twice the difference of static and sliding friction.
+
+    At a tenth of the static friction, or a run for cycles of next to nothing would be too short for anything else.
+    """
     return max(2.0 * (rig.static_force_N - rig.coulomb_force_N), 0.1 * rig.static_force_N) / scales.stiffness_N_per_m
 
 

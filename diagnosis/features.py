@@ -36,9 +36,7 @@ _ENOUGH_SLIPS = 0.5  # sum of their weights
 _LEVEL = 0.15  # of the static friction: sliding under a friction wave changes by less
 _TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
 DRIVE_WAVES = 24
-_RESOLVED_M2 = (
-    1e-18  # (1 nm)^2: a commanded position that was logged as measured has no noise but the rounding of its sums
-)
+RESOLVED_M = 1e-9  # a commanded position that was logged as measured has no noise but the rounding of its sums
 
 
 class Feature(NamedTuple):
@@ -169,7 +167,7 @@ def find_slips(cut: Signals, scales: Scales) -> Slips:
         # no force: the slide's velocity, an integral that leaks over two slips, rises and falls once a slip
         keep = math.exp(-BLOCK_S / (2.0 * scales.slip_s))
         falling = -np.asarray(lfilter([BLOCK_S], [1.0, -keep], cut["mass_accel_mps2"]))
-        swing_mps = scales.drop_N / math.sqrt(scales.force_N / 9.81 * scales.stiffness_N_per_m)
+        swing_mps = scales.drop_N * math.pi / (scales.stiffness_N_per_m * scales.slip_s)  # over sqrt(stiffness x mass)
         tops, bottoms = turning_points(falling, max(0.3 * float(np.ptp(falling)), swing_mps))
     tops = tops[: len(bottoms)]
     # what takes ten times as long as a slip is a change of level
@@ -304,13 +302,13 @@ def _vibration(found: Features, number: int, cut: Signals) -> None:
         found.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
         if source == "base_accel_mps2":
             time = np.linspace(-1.0, 1.0, len(shake))
-            found.add(
-                "vibration over time", source, "steady", HIGH, number, float(shake @ time) / (mean * len(shake) / 3.0)
-            )
+            shaken = mean > 0.0  # a sensor that went dead, or an amplifier that tripped, shows nothing to divide by
+            over_time = float(shake @ time) / (mean * len(shake) / 3.0) if shaken else math.nan
+            found.add("vibration over time", source, "steady", HIGH, number, over_time)
             if "drive_force_N" in cut:
                 force = cut["drive_force_N"] - cut["drive_force_N"].mean()
-                slope = float(shake @ force) / (mean * (float(force @ force) + 1e-9))
-                found.add("vibration over force", source, "steady", HIGH, number, slope)
+                over_force = float(shake @ force) / (mean * (float(force @ force) + 1e-9)) if shaken else math.nan
+                found.add("vibration over force", source, "steady", HIGH, number, over_force)
 
 
 def _parity(found: Features, signals: Signals, commands: Commands, scales: Scales) -> None:
@@ -363,7 +361,7 @@ def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
     for wave, value in enumerate(waves.tolist(), start=1):
         found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
     fast = rest_m - uniform_filter1d(rest_m, 100)
-    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + _RESOLVED_M2)
+    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + RESOLVED_M**2)
 
 
 def _without_line(position_m: Floats, segment: Segment) -> Floats:

@@ -3,6 +3,7 @@
 The held-out runs are a problem of their own: the fitter that knows the fitted runs never holds them, so nothing can leak.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -98,7 +99,7 @@ class HeldOut:
 
     def _closed(self, here: Floats, drawn: list[Floats]) -> Closed:
         gap = self._gap(here)
-        if self.retuned - 1.0 < _SMALLEST_GAP:
+        if not self.retuned - 1.0 >= _SMALLEST_GAP:  # no number where nothing can be compared
             return Closed(gap, None, None)
         random = np.random.default_rng(_SEED)
         cells = len(here)
@@ -146,7 +147,7 @@ class HeldOut:
 
     @staticmethod
     def _gap(squares: Floats) -> float:
-        return float(np.sqrt(squares.mean()))
+        return float(np.sqrt(squares.mean())) if len(squares) else math.nan
 
 
 def _follows(table: Table) -> bool:

@@ -219,6 +219,9 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
         findings.append(Finding("cut", path.name, text, left))
     missing = [name for name in CHANNELS if name not in columns]
     findings += [Finding("missing", f"{path.name}: {name}", "not in the source: zeros in the log") for name in missing]
+    commanded = [name for name in columns if name.startswith("vibration")]
+    text = "left out, as the log holds sensors alone: without it the run counts as one without vibration; import it into a folder"
+    findings += [Finding("missing", f"{path.name}: {name}", text) for name in commanded]
     part = out.with_name(out.name + ".part")
     log = RunLog(part, lockstep=True)
     try:

@@ -71,7 +71,7 @@ def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
     """What a residual can be drawn over, by name with unit, [blocks] each; what the channels do not tell is not there."""
     signals = run.signals
     blocks = len(run.commands.drive)
-    over: dict[str, Floats] = {"time_s": run.start.t_s + (np.arange(blocks, dtype=np.float64) + 0.5) * BLOCK_S}
+    over: dict[str, Floats] = {"time_s": (np.arange(blocks, dtype=np.float64) + 0.5) * BLOCK_S}
     spring = rig.drive == "spring"
     brisk = _BRISK * smoothing_blocks(rig)
     drive_m = with_drive_path(run)["drive_position_m"] if spring or "drive_position_m" in signals else None

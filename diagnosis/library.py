@@ -14,6 +14,7 @@ from diagnosis.axis_waves import axis_waves
 from diagnosis.manifest import RigTable
 from diagnosis.phases import OTHER_PHASE, PHASE
 from diagnosis.problem import Prepared, Problem
+from diagnosis.reduced import BLOCK_S
 from diagnosis.refit import Axis, Form
 from diagnosis.ringing import ringing_Hz
 from diagnosis.waves import (
@@ -66,6 +67,12 @@ def trials(problem: Problem) -> list[Trial]:
 def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[Trial]:
     rig, runs = problem.rig, problem.runs
     scale = scales(name, form, rig, runs, highest_Hz)
+    if form == "two-waves":
+        if rig.drive == "force":
+            pairs = list(combinations(axis_waves(runs, "position", _AXIS_WAVES), 2))
+        else:
+            pairs = two_friction_waves(runs, problem.scales, _WAVES)
+        return [_two_waves_trial(name, *pair) for pair in pairs]
     waves: list[Wave] = []
     if rig.drive == "force" and PHASE in scale:
         waves = axis_waves(runs, "position" if "wavelength_m" in scale else "time", _AXIS_WAVES)
@@ -79,12 +86,6 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         waves = drive_waves(runs, over, _WAVES) or friction_waves(runs, problem.scales, over, _WAVES)
         if form == "time":
             waves += waves_apart(drive_series(runs, over) or friction_series(runs, problem.scales, over), runs, _WAVES)
-    if form == "two-waves":
-        if rig.drive == "force":
-            pairs = list(combinations(axis_waves(runs, "position", _AXIS_WAVES), 2))
-        else:
-            pairs = two_friction_waves(runs, problem.scales, _WAVES)
-        return [_two_waves_trial(name, *pair) for pair in pairs]
     if PHASE in scale:
         return [wave_trial(name, form, wave) for wave in waves]
     starts: list[dict[str, float]] = [{}]
@@ -166,7 +167,7 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
         slip_mps = max(20.0 * rig.stribeck_velocity_mps, 0.05)
         critical = static_N / slip_mps
         slip_s = 0.05
-    length_s = max(len(run.commands.drive) for run in runs) * 1e-3
+    length_s = max(len(run.commands.drive) for run in runs) * BLOCK_S
     # wide, so that the rig's number of the same name, which holds a part of it, goes back to where it was
     level = {"ratio": _Scale(0.1, False, 3.0)}
     wave = {"ratio": _Scale(0.02, True, 1.5), "phase_rad": _Scale(1.0, False, 3.0)}

@@ -16,7 +16,7 @@ from diagnosis.findings import Finding
 from diagnosis.signal_checks import Signal, SignalLook
 from diagnosis.topic_watch import TopicWatch
 
-LATE_NS = 1_000_000  # a block answered later than its successor is due
+LATE_NS = 1_000_000  # 1 ms, the usual block: answered later than its successor is due
 # a desktop is late now and then; one block in a hundred is a rig that does not keep up
 LATE_SHARE = 0.01
 _DEAD_S = 1.0  # a sensor with noise does not give one value for so long

@@ -18,12 +18,11 @@ from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Point, Problem
 from diagnosis.refit import Fit
 from diagnosis.result import Experiment
-from diagnosis.twin import Roughness
+from diagnosis.retuning import ROUGHNESS
 from diagnosis.wording import signal_name
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
-_ROUGHNESS = Roughness(0.003, 1.5e-4, 0)
 _FEW, _SOME = 2, 6  # replicates for a first look, and for a judgement
 _DECISIVE = 10.0  # standard deviations: more is not more certain, only longer
 _PROMISING = 1.5  # times that, at first look, where nothing is imitated yet
@@ -108,7 +107,7 @@ class _Imagined:
         self._nuisances = nuisances
         here, there = (nuisances.point(fit.deviations, fit.effects) for fit in (first, second))
         self.problem = Problem(problem.rig, [as_run(problem, plan, here)])
-        drawn = replicates(self.problem, here, _ROUGHNESS, count, 3, perhaps=(here, there))
+        drawn = replicates(self.problem, here, ROUGHNESS, count, 3, perhaps=(here, there))
         self.floor: Floor = floor_of(self.problem, here, drawn)
         expected, other = self._expected([here, there])
         self.apart = np.where(np.isfinite(other - expected), other - expected, _MISSING)
@@ -176,7 +175,6 @@ def _in_words(feature: Feature) -> str:
         return f"how the {feature.regime} force changes along the run"
     words = {
         "period": "the time from slip to slip",
-        "duration": "how long a slip lasts",
         "scatter": f"the scatter of the {feature.regime} force",
         "shape": f"the shape of a slip in the {signal}",
         "ring": f"how the {signal} rings after a slip",

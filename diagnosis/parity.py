@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
-from diagnosis.features import Signals
+from diagnosis.features import RESOLVED_M, Signals
 from diagnosis.kinematics import (
     derivative,
     kept_blocks,
@@ -45,10 +45,8 @@ class Residual(NamedTuple):
     """One relation along a run. Arrays are [points]; every array of `over` belongs to `values`."""
 
     name: str  # spring, curvature, motion, exciter, drive, friction
-    should_be: str  # in words
-    unit: str
-    values: Floats  # 0 where the relation holds
-    noise: float  # one standard deviation [unit]
+    values: Floats  # 0 where the relation holds, in the unit of the relation
+    noise: float  # one standard deviation
     over: dict[str, Floats]  # what could explain it, by name with unit
 
     @property
@@ -75,8 +73,6 @@ def _noise_signals(run: Prepared) -> Signals:
 
 def _made(
     name: str,
-    should_be: str,
-    unit: str,
     rig: RigTable,
     run: Prepared,
     values: Floats,
@@ -90,7 +86,7 @@ def _made(
         kept &= run.commands.frequency_Hz == 0.0
     spread = float(np.sqrt(np.mean(noise[kept] ** 2) + more * more)) if kept.any() else 1.0
     over = {key: column[kept] for key, column in motion(rig, run).items()}
-    return Residual(name, should_be, unit, values[kept], spread, over)
+    return Residual(name, values[kept], spread, over)
 
 
 def _spring(rig: RigTable, run: Prepared) -> Residual | None:
@@ -106,7 +102,7 @@ def _spring(rig: RigTable, run: Prepared) -> Residual | None:
 
     force_N = run.signals["drive_force_N"]
     return _made(
-        "spring", "drive force = stiffness x extension", "N", rig, run, relation(run.signals),
+        "spring", rig, run, relation(run.signals),
         relation(_noise_signals(run)), _SPRING_SHARE * float(np.ptp(force_N)),
     )  # fmt: skip
 
@@ -128,7 +124,7 @@ def _curvature(rig: RigTable, run: Prepared) -> Residual | None:
     noise = _noise_signals(run)
     noise.setdefault("drive_position_m", np.zeros_like(values))
     return _made(
-        "curvature", "second derivative of the drive force = -stiffness x acceleration", "N/s²", rig, run, values,
+        "curvature", rig, run, values,
         relation(noise)[0], _CURVATURE_SHARE * float(bent.std()), without_vibration=True,
     )  # fmt: skip
 
@@ -145,7 +141,7 @@ def _motion(rig: RigTable, run: Prepared) -> Residual | None:
 
     values, accel_mps2 = relation(run.signals)
     return _made(
-        "motion", "acceleration = second derivative of the displacement", "m/s²", rig, run, values,
+        "motion", rig, run, values,
         relation(_noise_signals(run))[0], _MOTION_SHARE * float(accel_mps2.std()), without_vibration=True,
     )  # fmt: skip
 
@@ -162,8 +158,9 @@ def _drive(rig: RigTable, run: Prepared) -> Residual | None:
             # a bow belongs to the displacement sensor
             values[at] = path_m - np.polynomial.Polynomial.fit(at, path_m, 2)(at)
     noise = _noise_signals(run)["drive_position_m"]
-    travel_m = float(np.median(np.abs(run.commands.drive))) * BLOCK_S * 1e3
-    return _made("drive", "the drive moves evenly", "m", rig, run, values, noise, _DRIVE_SHARE * travel_m)
+    travel_m = float(np.median(np.abs(run.commands.drive)))  # in a second
+    # a position that stands still in the log has no noise but the rounding of its sums
+    return _made("drive", rig, run, values, noise, max(_DRIVE_SHARE * travel_m, RESOLVED_M))
 
 
 def _exciter(run: Prepared) -> Residual | None:
@@ -184,14 +181,14 @@ def _exciter(run: Prepared) -> Residual | None:
     share = mean(shaken_mps2) / mean(commanded_mps2 * seen)
     seen_badly = float(np.mean(0.5 * _ROLLED_OFF * (mean(commands.frequency_Hz) / 1e4) ** 2))
     over = {
-        "time_s": mean(run.start.t_s + (np.arange(len(on)) + 0.5) * BLOCK_S),
+        "time_s": mean((np.arange(len(on)) + 0.5) * BLOCK_S),
         "frequency_Hz": mean(commands.frequency_Hz),
     }
     if "drive_force_N" in run.signals:
         over["force_N"] = mean(run.signals["drive_force_N"])
     noise = float(np.mean(still_mps2 / mean(commanded_mps2)))
     spread = float(np.hypot(np.hypot(noise, _EXCITER_SHARE), seen_badly))
-    return Residual("exciter", "the base vibrates as commanded", "", share - 1.0, spread, over)
+    return Residual("exciter", share - 1.0, spread, over)
 
 
 def _friction(rig: RigTable, run: Prepared) -> Residual | None:
@@ -222,12 +219,11 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
     noise = relation(_noise_signals(run))
     spread = float(np.sqrt(np.mean(noise**2) + (_ROUGH_SHARE * rig.coulomb_force_N) ** 2))
     over = {key: column[used] for key, column in over.items()}
-    should_be = "drive force - mass x acceleration = friction law"
-    return Residual("friction", should_be, "N", values[used], spread, over)
+    return Residual("friction", values[used], spread, over)
 
 
 def friction_law(rig: RigTable, velocity_mps: Floats) -> Floats:
-    """The friction force of steady sliding [N], at velocities of any sign."""
+    """The friction force of steady sliding [N] as a manifest has it, without a tail, at velocities of any sign."""
     falling_N = (rig.static_force_N - rig.coulomb_force_N) * np.exp(-((velocity_mps / rig.stribeck_velocity_mps) ** 2))
     viscous_N = rig.viscous_damping_Ns_per_m * velocity_mps
     return np.sign(velocity_mps) * (rig.coulomb_force_N + falling_N) + viscous_N

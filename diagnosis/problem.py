@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from bridge.faults import Fault
 from diagnosis.axis_drive import relative, true_commands
-from diagnosis.axis_features import axis_features
+from diagnosis.axis_features import axis_features, moving_s
 from diagnosis.commands import Commands, commands_of
 from diagnosis.entries import entries_of, misread
 from diagnosis.evidence import Evidence, Run
@@ -20,7 +20,7 @@ from diagnosis.lanes import LANES
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.phases import in_run
-from diagnosis.reduced import BLOCK_S, reduce_run, without_vibration
+from diagnosis.reduced import BLOCK_S, SHAKEN, reduce_run, without_vibration
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
 from diagnosis.twin import Effects, Entry, Roughness, Start, predict, predict_many, rig_config
 from plant.config import RigConfig
@@ -32,6 +32,7 @@ _PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_o
 _SCALE_SPREAD = 0.004
 _KEPT = 64  # simulated runs, of 0.6 MB each
 _DIVERGED = 1e100  # SI units, of a feature: its square must still be a number
+_SHORTEST_MOTION_S = 0.5
 _SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
 
 
@@ -146,7 +147,7 @@ class Problem:
         """As `_signals`, for a force drive: the force that leads the model along the measured motion."""
         effects, draw = one.point.effects, one.draw
         chain = relative(one.point.chain)
-        commands = true_commands(run.commands, effects, chain, run.start.t_s)
+        commands = true_commands(run.commands, effects, chain)
         blocks = len(commands.drive)
         noise: Signals = {}
         if draw is not None:
@@ -160,10 +161,12 @@ class Problem:
         (raw,) = self._raw(run, commands, [one], (chain, _hashable(sensors)))
         if raw is None:
             return None
-        result = sensed(raw, commands.frequency_Hz, effects, chain, run.start.t_s)
+        result = sensed(raw, commands.frequency_Hz, effects, chain)
         result = {name: result[name] for name in run.signals}
         for name, values in noise.items():
             result[name] = result[name] - values if name == "drive_force_N" else result[name] + values
+        for name, (low, high) in run.clipped.items():
+            result[name] = np.clip(result[name], low, high)
         return result
 
     def _raw(
@@ -216,12 +219,14 @@ class Problem:
         return spring_features(without_vibration(signals, run.commands.frequency_Hz), run.commands, self.scales)
 
 
+def _truly(reading_N: float, effects: Effects, t_s: float) -> float:
+    return float(true_force_N(np.array(reading_N), effects, np.array(t_s)))
+
+
 def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
-    t_s = run.start.t_s
-    start = run.start._replace(force_N=true_force_N(run.start.force_N, point.effects, t_s))
+    start = run.start._replace(force_N=_truly(run.start.force_N, point.effects, 0.0))
     entries = tuple(
-        entry._replace(force_N=true_force_N(entry.force_N, point.effects, t_s + entry.block * BLOCK_S))
-        for entry in run.entries
+        entry._replace(force_N=_truly(entry.force_N, point.effects, entry.block * BLOCK_S)) for entry in run.entries
     )
     chain = point.chain
     if draw is not None:
@@ -245,7 +250,7 @@ def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
 
 def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
     """What the sensors make of a simulated run."""
-    result = sensed(raw, run.commands.frequency_Hz, one.point.effects, one.chain, run.start.t_s)
+    result = sensed(raw, run.commands.frequency_Hz, one.point.effects, one.chain)
     result = {name: result[name] for name in run.signals}
     for name in result:
         if name.endswith("shake_mps2"):
@@ -301,7 +306,10 @@ def prepare(evidence: Evidence) -> list[Prepared]:
 
 
 def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
-    start_s, signals = reduce_run(run)
+    signals = reduce_run(run)
+    for shake, source in SHAKEN.items():  # a clipped vibration is not that of a clipped mean
+        if source in run.clipped:
+            signals.pop(shake, None)
     blocks = len(next(iter(signals.values())))
     if blocks * BLOCK_S < 1.0:
         line = f"{run.file}: t_s: {blocks * BLOCK_S:.3g} s long: must be 1 s at least; give a longer run"
@@ -310,7 +318,13 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     if rig.drive == "spring":
         scales = scales_of(rig)
         commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
-    start = _start(rig, signals, commands, start_s)
+    if commands.motion is not None and moving_s(commands.motion, rig) < _SHORTEST_MOTION_S:
+        line = (
+            f"{run.file}: mass_position_m: moves for {moving_s(commands.motion, rig):.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
+            "least, or there is no friction to compare; leave the run out, or check channels.mass_position_m.scale"
+        )
+        raise Fault("BAD_EVIDENCE", line)
+    start = _start(rig, signals, commands)
     noisy = without_vibration(signals, commands.frequency_Hz)
     if commands.motion is not None and "mass_position_m" in signals:
         led = predict(rig_config(rig, {}, {}, None), True, commands, start)
@@ -321,7 +335,7 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     return Prepared(run.file, run.holdout, signals, commands, start, entries, before_s, noise, clipped)
 
 
-def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) -> Start:
+def _start(rig: RigTable, signals: Signals, commands: Commands) -> Start:
     first = slice(0, 10)
     if rig.drive == "force":
         assert commands.motion is not None, "a force drive has a motion"  # noqa: S101
@@ -329,7 +343,7 @@ def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) 
         # the bristle as it is in steady sliding, or as it holds the force at rest
         sliding = abs(velocity_mps) > rig.stribeck_velocity_mps
         force_N = float(signals["drive_force_N"][first].mean())
-        return Start(start_s, np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)
+        return Start(np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)
     force_N = float(signals["drive_force_N"][first].mean()) if "drive_force_N" in signals else 0.7 * rig.coulomb_force_N
     if "mass_position_m" in signals:
         at_m = float(signals["mass_position_m"][first].mean())
@@ -338,4 +352,4 @@ def _start(rig: RigTable, signals: Signals, commands: Commands, start_s: float) 
     else:
         at_m = 0.0
     drive_m = float(signals["drive_position_m"][first].mean()) if "drive_position_m" in signals else None
-    return Start(start_s, force_N, at_m, drive_m=drive_m)
+    return Start(force_N, at_m, drive_m=drive_m)

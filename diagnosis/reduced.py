@@ -16,18 +16,17 @@ BLOCK_S = 1e-3
 MEANS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
 SHAKES = ("mass_shake_mps2", "base_shake_mps2")  # rms within a block, about the block's mean
 SIGNALS = (*MEANS, *SHAKES)
-_SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_mps2"}
+SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_mps2"}
 _FURTHEST_BLOCKS = 5  # from a block to those that it is averaged with
 _LEAST_APART = 0.3  # cosine of the angle that the vibration turns by in between; above it noise would grow
 
 
-def reduce_run(run: Run) -> tuple[float, dict[str, Floats]]:
-    """Start [s] and the signals of a measured run by name, [blocks] each; what it lacks is not there.
+def reduce_run(run: Run) -> dict[str, Floats]:
+    """The signals of a measured run by name, [blocks] each; what it lacks is not there.
 
     A block without a sample, in a gap or between slow samples, is interpolated.
     """
-    start_s = float(run.t_s[0])
-    index = np.floor((run.t_s - start_s) / BLOCK_S + 1e-6).astype(np.int64)
+    index = np.floor((run.t_s - run.t_s[0]) / BLOCK_S + 1e-6).astype(np.int64)
     blocks = int(index[-1]) + 1
     count = np.bincount(index, minlength=blocks)
     empty = np.flatnonzero(count == 0)
@@ -41,13 +40,13 @@ def reduce_run(run: Run) -> tuple[float, dict[str, Floats]]:
             reduced[name] = mean
     per_block = len(run.t_s) / max(len(filled), 1)
     if per_block >= SHAKE_RATE_HZ * BLOCK_S:
-        for name, source in _SHAKEN.items():
+        for name, source in SHAKEN.items():
             if source in reduced:
                 about = run.columns[source] - reduced[source][index]
                 power = np.bincount(index, about * about, blocks) / np.maximum(count, 1)
                 power[empty] = np.median(power)
                 reduced[name] = np.sqrt(power)
-    return start_s, reduced
+    return reduced
 
 
 def without_vibration(signals: dict[str, Floats], frequency_Hz: Floats) -> dict[str, Floats]:
@@ -70,7 +69,7 @@ def without_vibration(signals: dict[str, Floats], frequency_Hz: Floats) -> dict[
     own, cosine, apart = (values[cosine < _LEAST_APART] for values in (shaken, cosine, apart))
     before, after = np.maximum(own - apart, 0), np.minimum(own + apart, len(frequency_Hz) - 1)
     result = dict(signals)
-    for shake, source in _SHAKEN.items():
+    for shake, source in SHAKEN.items():
         if source in signals:
             mean = signals[source]
             steady = (mean[before] - 2.0 * cosine * mean[own] + mean[after]) / (2.0 - 2.0 * cosine)

@@ -101,8 +101,8 @@ _FAR_OFF = 3.0 * KNEE
 # Of what the rig without effects leaves: of 120 forms tried on three rigs that no single effect explains, 108 were between these
 # after the first steps, and none of those came below 0.9 in the end.
 _NO_LESS, _ASTRAY = 0.97, 1.5
-# of a tolerance, for derivatives: large against the grid, small against the curvature; the second and third time the other
-# way and wider, over the jumps that slips make where they come and go
+# of a tolerance, for derivatives: large against the grid, small against the curvature; the second time the other way and wider,
+# over the jumps that slips make where they come and go, the third time closer
 _STEPS = (0.5, -1.0, 0.25)
 
 

@@ -98,9 +98,8 @@ def _estimates(candidate: Candidate) -> list[str]:
 
 
 def _meaning(effect: str) -> str:
-    """In plain words; of two effects joined by `+`, both. Empty for one that has no words here."""
-    words = wording.EFFECT_WORDS
-    return "; and ".join(words[name] for name in effect.split("+") if name in words)
+    """In plain words; empty for one that has no words here."""
+    return wording.EFFECT_WORDS.get(effect, "")
 
 
 def gap_bars(gap: Gap, named: bool) -> list[GapBar]:

@@ -31,11 +31,11 @@ class Chain(NamedTuple):
     accel_rolled_off: float = 0.0  # its gain is 1 / sqrt(1 + this (f / 10 kHz)^2)
 
 
-def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chain, start_s: float) -> Signals:
+def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chain) -> Signals:
     """Predicted signals as a chain with these faults would show them; new arrays, the input stays."""
     result = dict(signals)
     force_N = result["drive_force_N"]
-    t_s = start_s + (np.arange(len(force_N)) + 0.5) * BLOCK_S
+    t_s = (np.arange(len(force_N)) + 0.5) * BLOCK_S
     delay_s = chain.force_delay_s
     for name in SENSOR_EFFECTS:
         if name not in effects:
@@ -67,9 +67,9 @@ def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chai
     return result
 
 
-def true_force_N(reading_N: float, effects: Effects, t_s: float) -> float:
-    """What the force was when the sensor read this at a time `t_s`; as if it had been constant before."""
-    return (reading_N - float(_force_offset_N(effects, np.array(t_s)))) / _force_gain(effects)
+def true_force_N(reading_N: Floats, effects: Effects, t_s: Floats) -> Floats:
+    """What the force was when the sensor read this at the times `t_s`, of one shape; as if it had been constant before."""
+    return (reading_N - _force_offset_N(effects, t_s)) / _force_gain(effects)
 
 
 def _force_gain(effects: Effects) -> float:

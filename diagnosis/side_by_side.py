@@ -15,11 +15,11 @@ import numpy.typing as npt
 from bridge.kernel import Record, kernel
 from diagnosis import lanes as at
 from diagnosis.lanes import LANES
-from plant.disturb import TWO_PI, ageing_N, level, spring_N, wave
+from diagnosis.reduced import BLOCK_S
+from plant.disturb import TWO_PI, ageing_N, extension_m, level, wave
 from plant.piezo import delivered_share
 
 Floats = npt.NDArray[np.floating[Any]]
-_FURTHEST, _HALVINGS = 4.0, 40  # to find the extension for a force: times that of the linear spring, to 1e-12 of that
 
 
 @kernel
@@ -104,7 +104,7 @@ def advance_lanes(
             _enter(w, params, drive[block], entry_force_N[entry], entry_age_s[entry])
             entry += 1
         samples = steps[block]
-        dt = 1e-3 / samples
+        dt = BLOCK_S / samples
         z_dt = dt
         if first:
             z_dt, first = 0.5 * dt, False
@@ -125,7 +125,7 @@ def advance_lanes(
             p = params[i]
             share = delivered_share(p, frequency_Hz[block]) if vibrating else 1.0
             if p.sag_settling_s > 0.0:
-                share *= 1.0 - p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5e-3) / p.sag_settling_s))
+                share *= 1.0 - p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * BLOCK_S) / p.sag_settling_s))
             w[at.SHARE + i] = share
             w[at.DRIVE + i] = drive[block]
             if dt != dt_before:
@@ -183,7 +183,7 @@ def advance_lanes(
 
         if vibrating:
             phi = (phi + omega * dt * samples) % TWO_PI
-            vibrating_s += 1e-3
+            vibrating_s += BLOCK_S
         for i in range(LANES):
             for row in range(5):
                 out[i, row, block] = w[at.SUM_FORCE + row * LANES + i] / samples
@@ -197,18 +197,6 @@ def advance_lanes(
 def _varies(p: Record) -> bool:
     """Whether the friction's level depends on the place, or on chance."""
     return p.position_ratio != 0.0 or p.roughness_ratio != 0.0 or (p.load_ratio != 0.0 and p.load_seed >= 0.0)
-
-
-@kernel
-def extension_m(p: Record, force_N: float) -> float:
-    """Of the drive's spring, where it has this force."""
-    found_m = 0.0
-    step_m = _FURTHEST * force_N / p.k_d + math.copysign(0.5 * p.gap_m, force_N)
-    for _ in range(_HALVINGS):
-        step_m *= 0.5
-        if math.fabs(spring_N(p, found_m + step_m)) < math.fabs(force_N):
-            found_m += step_m
-    return found_m
 
 
 @kernel

@@ -21,10 +21,10 @@ from diagnosis.commands import Commands
 from diagnosis.lanes import LANES
 from diagnosis.manifest import RigTable
 from diagnosis.reduced import BLOCK_S, SIGNALS
-from diagnosis.side_by_side import advance_lanes, extension_m
+from diagnosis.side_by_side import advance_lanes
 from plant.config import RigConfig
 from plant.core import advance_disturbed
-from plant.disturb import even_m
+from plant.disturb import even_m, extension_m
 from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -40,9 +40,8 @@ _LED_STEP_S = 1e-4  # its features are equal to 1e-3 N to those at 10 us
 
 
 class Start(NamedTuple):
-    """State of the rig at the first block."""
+    """State of the rig at the first block; time counts from there, whatever the clock of the log says."""
 
-    t_s: float
     force_N: float  # in the drive, spring-driven; in the contact otherwise
     position_m: float
     velocity_mps: float = 0.0
@@ -195,7 +194,6 @@ def _side_by_side(rigs: Sequence[Rig], commands: Commands, entries: Sequence[Seq
 
 def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
     held_N = float(np.clip(start.force_N, -p.F_s, p.F_s))
-    s.t_s = start.t_s
     s.x, s.v = start.position_m, start.velocity_mps
     s.z = held_N / p.k_t
     s.age_s = start.age_s
@@ -229,7 +227,7 @@ def _predict(
         samples = steps[block]
         p.samples_per_block = samples
         p.steps_per_sample = 1
-        p.dt_s = 1e-3 / samples
+        p.dt_s = BLOCK_S / samples
         advance_disturbed(params, state, drive[block], frequency_Hz[block], amplitude_m[block],
                           analogue[:, :samples], truth[:, :samples])  # fmt: skip
         for row in range(5):
@@ -266,10 +264,10 @@ def _follow(
     force = np.empty(1)
     ahead_before_m = position_m[0] - s.x
     rate_mps = 0.0
-    share = 1.0 - math.exp(-1e-3 / _RATE_FILTER_S)
+    share = 1.0 - math.exp(-BLOCK_S / _RATE_FILTER_S)
     for block in range(force_N.shape[0]):
         ahead_m = position_m[block] - s.x
-        rate_mps += share * ((ahead_m - ahead_before_m) / 1e-3 - rate_mps)
+        rate_mps += share * ((ahead_m - ahead_before_m) / BLOCK_S - rate_mps)
         ahead_before_m = ahead_m
         force[0] = force_N[block] + stiffness * ahead_m + damping * rate_mps
         _predict(params, state, force, frequency_Hz[block : block + 1], amplitude_m[block : block + 1],

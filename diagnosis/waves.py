@@ -92,7 +92,7 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Ser
                 path_m = np.cumsum(run.commands.drive) * BLOCK_S
                 coordinate = run.start.position_m + path_m - (force - force[0]) / scales.stiffness_N_per_m
         else:
-            coordinate = run.start.t_s + (blocks + 0.5) * BLOCK_S
+            coordinate = (blocks + 0.5) * BLOCK_S
         for segment in run.commands.segments:
             own = slice(segment.first, segment.last)
             cut = segment.sign * force[own]
@@ -128,7 +128,7 @@ def drive_series(runs: list[Prepared], over: str) -> list[Series]:
             if whole < 400 or segment.drive_velocity_mps == 0.0:
                 continue
             mean = own[:whole].reshape(-1, 20).mean(axis=1)
-            t_s = run.start.t_s + (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
+            t_s = (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
             slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
             # noise of the position is the smaller in a relative velocity the faster the drive
             speed_mm_per_s = 1e3 * abs(segment.drive_velocity_mps)

@@ -39,7 +39,7 @@ class ContactConfig(Strict):
     def _fill_in_the_pair(cls, table: Any) -> Any:
         if not isinstance(table, dict) or "pair" not in table or table["pair"] == "":
             return table
-        if table["pair"] not in PAIRS:
+        if not isinstance(table["pair"], str) or table["pair"] not in PAIRS:
             raise ValueError(f"pair = {table['pair']!r}: unknown friction pair; known: {', '.join(PAIRS)}")
         return PAIRS[table["pair"]] | table
 

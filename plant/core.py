@@ -75,7 +75,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         """
         p: Record = params[0]
         s: Record = state[0]
-        # into locals: through the record every store to an output array would force a reload (183 -> 2xx x real time)
+        # into locals: through the record every store to an output array would force a reload
         dt, m, k_d, h_d = p.dt_s, p.m, p.k_d, p.h_d
         k_t, h_t, h_v, F_c, F_s, per_v_s = p.k_t, p.h_t, p.h_v, p.F_c, p.F_s, 1.0 / p.v_s
         tail = p.stribeck_tail

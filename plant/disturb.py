@@ -6,6 +6,7 @@ from bridge.kernel import Record, kernel
 
 TWO_PI = 2.0 * math.pi
 _EVENED = 200  # rounds, of half a step each: whole ones swing ever wider where the speed more than doubles
+_HALVINGS = 44
 LAG_CELL_S = 2e-5  # of the line that remembers the speed: 11 of them in a period at 4.5 kHz
 
 
@@ -119,6 +120,21 @@ def spring_N(p: Record, extension_m: float) -> float:
     if p.knee_ratio != 0.0:
         force_N += p.knee_ratio * p.k_d * (e - min(max(e, -p.knee_m), p.knee_m))
     return force_N
+
+
+@kernel
+def extension_m(p: Record, force_N: float) -> float:
+    """Of the drive's spring, where it has this force: by halving, to 1e-12 of that of a linear spring.
+
+    The softest spring, bilinear with a ratio of -0.9, is extended ten times as far.
+    """
+    found_m = 0.0
+    step_m = 10.0 * force_N / p.k_d + math.copysign(0.5 * p.gap_m, force_N)
+    for _ in range(_HALVINGS):
+        step_m *= 0.5
+        if math.fabs(spring_N(p, found_m + step_m)) < math.fabs(force_N):
+            found_m += step_m
+    return found_m
 
 
 @kernel

@@ -308,19 +308,19 @@ def checked(name: str, table: Any) -> dict[str, float | str]:
         raise ValueError(f"effects.{name} = {table!r}: must be a table; write [effects.{name}] and its keys below it")
     forms = EFFECTS[name].forms
     form = table.get("form", first_form(name))
-    if form not in forms:
+    if not isinstance(form, str) or form not in forms:
         known = ", ".join(f'"{known}"' for known in forms if known) or "none; leave it out"
         raise ValueError(f"effects.{name}.form = {form!r}: unknown form; known: {known}")
-    rows = {row.name: row for row in forms[str(form)].parameters}
-    filled: dict[str, float | str] = {"form": str(form)}
+    rows = {row.name: row for row in forms[form].parameters}
+    filled: dict[str, float | str] = {"form": form}
     for key, value in table.items():
         if key != "form" and key not in rows:
             raise ValueError(f"effects.{name}.{key}: unknown key; known here: form, {', '.join(rows)}")
         if key != "form" and (isinstance(value, bool) or not isinstance(value, int | float)):
             raise ValueError(f"effects.{name}.{key} = {value!r}: must be a number")
     for row in rows.values():
-        value = float(table.get(row.name, row.default))
+        value = table.get(row.name, row.default)
         if not row.low <= value <= row.high:
-            raise ValueError(f"effects.{name}.{row.name} = {value:g}: must be from {row.low:g} to {row.high:g}")
-        filled[row.name] = value
+            raise ValueError(f"effects.{name}.{row.name} = {value}: must be from {row.low:g} to {row.high:g}")
+        filled[row.name] = float(value)
     return filled

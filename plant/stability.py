@@ -22,6 +22,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from plant.config import ContactConfig, RigConfig
+from plant.records import build
 
 Floats = npt.NDArray[np.float64]
 Numbers = float | Floats
@@ -55,9 +56,10 @@ def contact(config: ContactConfig, velocity_mps: Numbers, vibration_velocity_mps
         back = v_a * np.cos(start + half * (_NODES + 1.0))
         v_r = v - back
         q = v_r / config.stribeck_velocity_mps
-        drop = (config.static_force_N - config.coulomb_force_N) * np.exp(-q * q)
-        g = config.coulomb_force_N + drop
-        g_slope = -2.0 * q / config.stribeck_velocity_mps * drop
+        drop_N, tail = config.static_force_N - config.coulomb_force_N, config.stribeck_tail
+        falling, trailing = (1.0 - tail) * np.exp(-q * q), 1.0 / (1.0 + q * q)
+        g = config.coulomb_force_N + drop_N * (falling + tail * trailing)
+        g_slope = -2.0 * q / config.stribeck_velocity_mps * drop_N * (falling + tail * trailing * trailing)
         share = sign * half * _WEIGHTS / np.pi
         mean += np.sum(share * v_r / g, axis=-1)
         # B - v dB/dv under one sum: as a difference of the two it would lose slopes below 1e-16
@@ -65,6 +67,25 @@ def contact(config: ContactConfig, velocity_mps: Numbers, vibration_velocity_mps
     # with vibration the sum rounds to 1e-16 where the slope is 0 (F_s = F_c below the edge): that is no slope
     rounded = (v_a[..., 0] > 0.0) & (np.abs(excess) < 1e-14 * mean)
     return Contact(np.where(rounded, 0.0, excess / mean), config.stiffness_N_per_m * mean)
+
+
+def with_constant_effects(config: RigConfig) -> RigConfig:
+    """A rig without effects that has the numbers which its effects change for good; what else they do is left out."""
+    p: Any = build(config)[0][0]
+    contact = {
+        "coulomb_force_N": float(p.F_c),
+        "static_force_N": float(p.F_s),
+        "stribeck_velocity_mps": float(p.v_s),
+        "viscous_damping_Ns_per_m": float(p.h_v),
+    }
+    drive = {"stiffness_N_per_m": float(p.k_d), "damping_Ns_per_m": float(p.h_d)}
+    return config.model_copy(
+        update={
+            "contact": config.contact.model_copy(update=contact),
+            "drive": config.drive.model_copy(update=drive),
+            "effects": {},
+        }
+    )
 
 
 def _system_matrix(config: RigConfig, at: Contact, drive_stiffness_N_per_m: Numbers) -> Floats:
@@ -158,8 +179,10 @@ def critical_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: float | No
     0 if it is stable at every velocity; None if at none: with h_d = h_v = 0, as in the paper, nothing
     opposes a friction that falls with velocity, however little it falls.
     """
-    # beyond 12 v_s the slope of the Stribeck curve, exp(-144), is below any damping one could mean
-    grid_mps = config.contact.stribeck_velocity_mps * np.geomspace(1e-4, 12.0, 600)
+    # beyond 12 v_s the slope of the Stribeck curve, exp(-144), is below any damping one could mean; that of its tail is 2e-9
+    # of its drop at 1000 v_s
+    furthest = 12.0 if config.contact.stribeck_tail == 0.0 else 1e3
+    grid_mps = config.contact.stribeck_velocity_mps * np.geomspace(1e-4, furthest, 600)
 
     def margin(velocity_mps: Numbers) -> Floats:
         return hurwitz_margin(config, velocity_mps, drive_stiffness_N_per_m)

@@ -2,17 +2,6 @@
 
 from typing import Any, NamedTuple
 
-# the sensors of the evidence contract; everything else is physics
-SENSOR_NAMES = frozenset(
-    {
-        "force-sensor-gain",
-        "force-sensor-bias",
-        "force-sensor-drift",
-        "force-sensor-lag",
-        "force-sensor-delay",
-        "accelerometer-gain",
-    }
-)
 OTHER_NAMES = ("none", "unexplained")
 # what a case that ended in a fault has said: nothing, and nothing is right about it
 _NOTHING_SAID: dict[str, Any] = {

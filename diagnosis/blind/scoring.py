@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 from diagnosis.blind.calibration import Bin, calibration_error, error_of_perfect, judged, log_score, reliability
 from diagnosis.blind.intervals import Score, mean, rate, ratio
 from diagnosis.blind.locating import f1
-from diagnosis.blind.outcomes import OTHER_NAMES, SENSOR_NAMES, Opened
+from diagnosis.blind.outcomes import OTHER_NAMES, Opened
+from diagnosis.sensing import SENSOR_EFFECTS
 
 _SURE = 0.8
 _VISIBLE = 2.0  # detection limits
@@ -165,7 +166,7 @@ def _sure_of(case: Opened, effects_only: bool) -> bool:
 
 
 def _class(names: frozenset[str]) -> frozenset[bool]:
-    return frozenset(name in SENSOR_NAMES for name in names)
+    return frozenset(name in SENSOR_EFFECTS for name in names)
 
 
 def _of_oracle(cases: Sequence[Opened], oracle: Oracle) -> Score | None:

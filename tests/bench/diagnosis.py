@@ -99,7 +99,7 @@ def _gain(effects: dict[str, dict[str, float | str]]) -> float:
     config = RigConfig.model_validate(table)
     blocks = round(SIDE_BY_SIDE_S / 1e-3)
     drive, still = np.full(blocks, paper.DRIVE_VELOCITY_MPS), np.zeros(blocks)
-    commands, start = Commands(drive, still, still, ()), Start(0.0, 0.0, 0.0)
+    commands, start = Commands(drive, still, still, ()), Start(0.0, 0.0)
     apart_s: list[float] = []
     beside_s: list[float] = []
     for _ in range(REPETITIONS):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from plant.disturb import even_m
+from plant.disturb import even_m, extension_m
 from plant.records import build
 from plant.simulate import simulate
 from tests.effects_rig import BLOCK_S, DISTURBED, HEAVY_KG, NO_FRICTION, NOMINAL, TAU, advance_by, rig, run
@@ -185,3 +185,11 @@ def test_simulate_reports_the_drive_where_it_is():
     """Not where a linear spring of the force would put it."""
     result = simulate(rig({"drive-backlash": {"gap_m": 1e-3}}), 0.5)
     assert result.drive_position_m == pytest.approx(5e-4 * result.t_s, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", [*SPRINGS, "soft"])
+@pytest.mark.parametrize("force_N", [15.0, -7.0])
+def test_the_extension_for_a_force_is_where_the_spring_has_it(name, force_N):
+    soft = {"drive-hardening": {"form": "bilinear", "ratio": -0.9, "knee_m": 1e-4}}, bilinear_N(-0.9, 1e-4)
+    effects, spring_N = (SPRINGS | {"soft": soft})[name]
+    assert spring_N(extension_m(build(rig(effects))[0][0], force_N)) == pytest.approx(force_N, rel=1e-9)

@@ -96,7 +96,7 @@ def rigs(rig, effects, roughness=None, count=LANES):
 def test_as_the_plants_kernel(ladder, tables, name, form):
     rig, _ = ladder
     configs = rigs(rig, tables[name, form] if name else {}, count=2)
-    commands, start = there_and_back(), Start(0.0, 0.5 * rig.coulomb_force_N, 0.0)
+    commands, start = there_and_back(), Start(0.5 * rig.coulomb_force_N, 0.0)
     found = predict_many(configs, False, commands, [start] * 2, [()] * 2)
     expected = [alone(config, commands, start) for config in configs]
     assert np.ptp(expected[0]["drive_force_N"]) > 20.0  # it slides both ways
@@ -105,10 +105,9 @@ def test_as_the_plants_kernel(ladder, tables, name, form):
 
 def test_as_the_plants_kernel_on_a_rough_surface_and_with_a_tail(ladder):
     rig, _ = ladder
-    configs = rigs(rig, {}, Roughness(0.01, 2e-5, 7), count=2) + rigs(
-        rig.model_copy(update={"stribeck_tail": 0.3}), {}, count=2
-    )
-    commands, start = there_and_back(), Start(0.0, 0.5 * rig.coulomb_force_N, 0.0)
+    tail = [{"coulomb_force_N": rig.coulomb_force_N * share, "stribeck_tail": 0.3} for share in (1.0, 1.004)]
+    configs = rigs(rig, {}, Roughness(0.01, 2e-5, 7), count=2) + [rig_config(rig, one, {}, None) for one in tail]
+    commands, start = there_and_back(), Start(0.5 * rig.coulomb_force_N, 0.0)
     assert (
         worst(
             predict_many(configs, False, commands, [start] * 4, [()] * 4),
@@ -121,7 +120,7 @@ def test_as_the_plants_kernel_on_a_rough_surface_and_with_a_tail(ladder):
 def test_to_the_last_bit_the_same_in_any_company(ladder, tables):
     """More rigs than go side by side, each with another effect, entered where runs are entered."""
     rig, _ = ladder
-    commands, start = there_and_back(0.1), Start(0.0, 0.5 * rig.coulomb_force_N, 0.0)
+    commands, start = there_and_back(0.1), Start(0.5 * rig.coulomb_force_N, 0.0)
     entries = (Entry(130, 9.0, 0.4), Entry(260, -11.0, None))
     configs = [rig_config(rig, {}, tables[key], None) for key in FORMS]
     assert len(configs) > 2 * LANES

@@ -201,6 +201,35 @@ def test_below_v_d_a_vibration_leaves_stick_slip_that_has_started(drive_mps, dam
     assert swing_N(1.05) < 0.05
 
 
+def test_the_tail_of_the_stribeck_curve_is_a_slope_too():
+    """h_d = -g'(v) far above the Stribeck velocity, where only the tail still falls: 2 d / (q^3 v_s) but for 1 / q^2."""
+    config = rig(damping=0.5)
+    c = config.contact.model_copy(update={"stribeck_tail": 0.4})
+    drop_N, q = 0.4 * (c.static_force_N - c.coulomb_force_N), 5.0
+    slope = -2.0 * drop_N * q / (1.0 + q * q) ** 2  # v_s g'
+    steady_N = c.coulomb_force_N + drop_N / (1.0 + q * q)
+    assert float(contact(c, q * c.stribeck_velocity_mps, 0.0).slip) == pytest.approx(q * slope / steady_N, rel=1e-6)
+    found_mps = critical_velocity_mps(config.model_copy(update={"contact": c}))
+    assert found_mps is not None
+    q = found_mps / c.stribeck_velocity_mps
+    assert q > 10.0
+    assert 2.0 * drop_N * q / (1.0 + q * q) ** 2 / c.stribeck_velocity_mps == pytest.approx(0.5, rel=1e-3)
+
+
+def test_the_map_of_a_rig_with_effects(tmp_path):
+    """What an effect changes for good is in the map, what it has no place for is told."""
+    plain = draw_map(rig(0.002, 50.0), tmp_path / "plain.png")
+    effects = {
+        "drive-damping": {"form": "viscous", "damping_Ns_per_m": 50.0},
+        "frame-compliance": {"ratio": 0.1},
+    }
+    table = rig(0.002).model_dump() | {"effects": effects}
+    found = draw_map(validate(RigConfig, table, "test"), tmp_path / "effects.png")
+    assert found.critical_velocity_mps == plain.critical_velocity_mps
+    assert found.left_out == ("frame-compliance",)
+    assert "left out: frame-compliance" in found.answer
+
+
 def test_the_picture_and_its_numbers(tmp_path):
     result = draw_map(rig(), tmp_path / "map.png")
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")

@@ -1,10 +1,14 @@
 """A force-driven axis: the model led along the measured motion, and what is compared."""
 
+import math
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
+from bridge.faults import Fault
 from diagnosis.axis_drive import relative, true_commands
 from diagnosis.axis_waves import axis_waves
 from diagnosis.evidence import load_evidence
@@ -78,9 +82,30 @@ def test_the_true_force_is_what_the_sensor_made_the_measured_one_of(
     run = plain[1][0]
     chain = relative(Chain(force_delay_s=5e-4, position_delay_s=2e-4))
     smooth = 40.0 * np.sin(2.0 * np.pi * 2.0 * np.arange(len(run.commands.drive)) * 1e-3)
-    commands = true_commands(run.commands._replace(drive=smooth), effects, chain, run.start.t_s)
+    commands = true_commands(run.commands._replace(drive=smooth), effects, chain)
     signals = dict.fromkeys(run.signals | {"drive_position_m": 0, "mass_accel_mps2": 0, "base_accel_mps2": 0}, smooth)
     signals |= dict.fromkeys(("mass_shake_mps2", "base_shake_mps2"), smooth) | {"drive_force_N": commands.drive}
-    shown = sensed(signals, run.commands.frequency_Hz, effects, chain, run.start.t_s)["drive_force_N"]
+    shown = sensed(signals, run.commands.frequency_Hz, effects, chain)["drive_force_N"]
     inner = slice(100, -100)
     assert shown[inner] == pytest.approx(smooth[inner], abs=0.05)  # of 40 N; a lag is undone to second order
+
+
+def test_an_axis_that_hardly_moves_is_refused(plain: tuple[Problem, list[Prepared], Point], tmp_path: Path) -> None:
+    """It rests for all but the last 0.3 s."""
+    make_evidence(tmp_path / "rests", Case("force", drawn=False), seed=5)
+    file = tmp_path / "rests" / "run-01.parquet"
+    table = pq.read_table(file)
+    position_m = table["mass_position_m"].to_numpy().copy()
+    position_m[:-300] = position_m[0] + 1e-7 * np.random.default_rng(1).standard_normal(len(position_m) - 300)
+    position_m[-300:] += position_m[0] - position_m[-300]
+    at = table.column_names.index("mass_position_m")
+    pq.write_table(table.set_column(at, "mass_position_m", pa.array(position_m)), file)
+    with pytest.raises(Fault, match=r"run-01.parquet: mass_position_m: moves for 0\.\d+ s: must be 0.5 s at least"):
+        prepare(load_evidence(tmp_path / "rests"))
+
+
+def test_a_clipped_force_is_clipped_in_the_model_too(plain: tuple[Problem, list[Prepared], Point]) -> None:
+    problem, runs, point = plain
+    force_N = problem.signals(runs[0], point)["drive_force_N"]
+    clipped = runs[0]._replace(clipped={"drive_force_N": (-math.inf, 0.5 * float(force_N.max()))})
+    assert problem.signals(clipped, point)["drive_force_N"].max() == 0.5 * force_N.max()

@@ -60,3 +60,16 @@ def test_a_ripple_is_no_command(rig):
         found = read(rig, 1e-3 * (1.0 + 0.3 * np.sin(frequency_Hz * turns)))
         assert len(found.segments) == 1
         assert np.ptp(found.drive) == 0.0
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.5e-6])
+@pytest.mark.parametrize("zero_m", [0.0, 0.0123])
+def test_a_stop_has_no_velocity(rig, noise_m, zero_m):
+    """Dragged for 3 s and held for 3 s, and held all along."""
+    random = np.random.default_rng(2)
+    for speed_mps, segments in ((1e-3, [1e-3, 0.0]), (0.0, [0.0])):
+        position_m = zero_m + speed_mps * np.minimum(np.arange(BLOCKS) * 1e-3, 3.0)
+        position_m = position_m + noise_m * random.standard_normal(BLOCKS)
+        run = Run("run-01.csv", np.arange(BLOCKS) * 1e-3, {"drive_position_m": position_m}, {}, None, False)
+        found = commands_of(run, rig, {"drive_position_m": position_m}).segments
+        assert [one.drive_velocity_mps for one in found] == pytest.approx(segments, rel=2e-3, abs=0.0)

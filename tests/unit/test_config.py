@@ -19,6 +19,7 @@ from plant.config import RigConfig
         (["rig.slide.mas_kg=1.0"], ["rig.slide.mas_kg", "unknown key", "mass_kg"]),
         (['rig.slide.mass_kg="heavy"'], ["rig.slide.mass_kg", "'heavy'", "number"]),
         (['rig.contact.pair="ice"'], ["ice", "unknown friction pair", "C45-C45 @ 0.063"]),
+        (["rig.contact.pair=[1]"], ["pair = [1]", "unknown friction pair"]),
         (["rig.solver.step_s=2e-5"], ["step_s", "too coarse", "5000", "1e-05"]),
         (["rig.contact.static_force_N=1.0"], ["static_force_N", "coulomb_force_N"]),
         (["controller.samples_per_block=25"], ["samples_per_block", "must equal"]),

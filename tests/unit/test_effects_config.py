@@ -79,6 +79,8 @@ def test_every_form_loads_with_its_defaults_and_at_its_bounds(name: str, tmp_pat
             ["effects.static-friction-ageing.form = 'cubic'", "unknown form", '"log", "power", "settling"'],
         ),
         ("[effects.static-friction-ageing]\nform = 2.0\n", ["form = 2.0", "unknown form"]),
+        ('[effects.drive-damping]\nform = ["viscous"]\n', ["form = ['viscous']", "unknown form"]),
+        (f"[effects.drive-backlash]\ngap_m = {10**400}\n", ["gap_m = 1000", "must be from 0 to 0.1"]),
         ('[effects.drive-backlash]\nform = "wide"\n', ["form = 'wide'", "none; leave it out"]),
         ("[effects.drive-backlash]\ngap = 1e-4\n", ["effects.drive-backlash.gap: unknown key", "form, gap_m"]),
         ("[effects.drive-backlash]\ngap_m = -1e-4\n", ["gap_m = -0.0001", "must be from 0 to 0.1"]),

@@ -130,6 +130,15 @@ def half_is_nan(data: Columns) -> None:
     data["t_s"][::3] = np.nan
 
 
+def paused(data: Columns) -> None:
+    data["t_s"][1000:] += 1800.0
+
+
+def full_of_holes(data: Columns) -> None:
+    for row in range(400, 4000, 400):
+        data["t_s"][row:] += 0.05
+
+
 def short(data: Columns) -> None:
     for name in data:
         data[name] = data[name][:9]
@@ -154,6 +163,8 @@ def in_micronewton(data: Columns) -> None:
             "run-01.parquet: t_s: 2000 rows are not later than the one before, first row 2001: 0 s after 0.9995 s",
         ),
         (half_is_nan, "run-01.parquet: t_s: 1334 samples are no finite number, first row 1"),
+        (paused, "t_s: 1 gaps in time, first at 0.4995 s: 1.8e+03 s without a sample, the longest 1.8e+03 s"),
+        (full_of_holes, "19 % of the run in all: must be 1 s and 10 % at most; split the file there"),
         (short, "run-01.parquet: t_s: 9 rows: must have 16 at least"),
         (in_micronewton, "drive_force_N: largest value 1.70"),
     ],
@@ -207,7 +218,7 @@ def accel_in_other_unit(data: Columns) -> None:
 
 
 def hole_in_time(data: Columns) -> None:
-    data["t_s"][1000:] += 0.5
+    data["t_s"][1000:] += 0.15
 
 
 def drive_in_mm(data: Columns) -> None:
@@ -243,7 +254,7 @@ def slow_accelerometer(data: Columns) -> None:
         (dead_sensor, "constant", "mass_accel_mps2: is 0 in every row; not used", "mass_accel_mps2", 4000),
         (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
         (clipped_force, "clipped", "drive_force_N: ", "", 4000),
-        (hole_in_time, "time-gap", "t_s: 1 gaps in time, first at 0.4995 s: 0.5", "", 4000),
+        (hole_in_time, "time-gap", "t_s: 1 gaps in time, first at 0.4995 s: 0.1", "", 4000),
         (
             drive_in_mm,
             "units",

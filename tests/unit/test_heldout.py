@@ -1,5 +1,6 @@
 """Which names a run kept aside may refute: those that say what it will show."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -75,3 +76,11 @@ def test_what_another_run_does_not_bear_out_is_refuted(retuned, left, refuted):
     )
     fit = SimpleNamespace(form=FORETELLS[0][0])
     assert HeldOut.refutes(held_out, fit, 0.4) is refuted  # pyright: ignore[reportArgumentType]
+
+
+def test_where_nothing_can_be_compared_there_is_no_shrinkage():
+    held_out = HeldOut.__new__(HeldOut)
+    held_out.retuned = HeldOut._gap(np.zeros(0))
+    closed = held_out._closed(np.zeros(0), [np.zeros(0)])
+    assert math.isnan(closed.gap)
+    assert closed.shrinkage is closed.interval_90 is None

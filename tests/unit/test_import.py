@@ -236,3 +236,11 @@ def test_the_command(tmp_path: Path) -> None:
     result = CliRunner().invoke(log_app, arguments)
     assert result.exit_code == 2
     assert json.loads(result.stdout)["fault"] == "BAD_EVIDENCE"
+
+
+def test_a_log_tells_what_it_cannot_hold(tmp_path: Path) -> None:
+    vibration = '[channels]\nvibration_frequency_Hz = { column = "acc" }\nvibration_amplitude_m = { column = "acc" }\n'
+    source, channel_map = setup(tmp_path, ".csv", MAP.replace("[channels]\n", vibration))
+    findings = import_file(source, channel_map, tmp_path / "made.mcap").findings
+    told = [one.where for one in findings if "import it into a folder" in one.text]
+    assert told == [f"{source.name}: vibration_frequency_Hz", f"{source.name}: vibration_amplitude_m"]

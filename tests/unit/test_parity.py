@@ -75,3 +75,18 @@ def test_the_friction_law_is_the_steady_one(clean):
     fast = np.array([-0.1, 0.1])
     assert friction_law(rig, fast) == pytest.approx(paper_rig().contact.coulomb_force_N * np.sign(fast))
     assert friction_law(rig, np.array([1e-9]))[0] == pytest.approx(rig.static_force_N)
+
+
+@pytest.mark.parametrize("place_m", [0.0, 0.0123])
+def test_a_drive_that_is_held_moves_evenly(clean, place_m):
+    evidence, runs = clean
+    held = np.full_like(runs[0].signals["drive_position_m"], place_m)
+    pieces = runs[0].noise.pieces | {"drive_position_m": np.zeros_like(runs[0].noise.pieces["drive_position_m"])}
+    commands = runs[0].commands._replace(drive=np.zeros_like(held))
+    run = runs[0]._replace(
+        signals=runs[0].signals | {"drive_position_m": held},
+        noise=runs[0].noise._replace(pieces=pieces),
+        commands=commands,
+    )
+    (drive,) = (one for one in parity_residuals(evidence.rig, run) if one.name == "drive")
+    assert drive.rms < 1e-3

@@ -100,8 +100,8 @@ def _response(channel: Channel, frequency_Hz: np.ndarray) -> np.ndarray:
 def _filtered(channel: Channel, signal: np.ndarray) -> np.ndarray:
     """Through the analog response, by Fourier transform; before the run the signal stood at its first value.
 
-    A line from first to last value is taken off and the end led back to the start over 2 s, so that the
-    transform's wrap-around meets a signal at rest.
+    The first value is taken off and the end led back to the start over 2 s, so that the transform's wrap-around
+    meets a signal at rest.
     """
     if not (channel.low_pass_Hz or channel.pole_Hz or channel.high_pass_Hz):
         return signal

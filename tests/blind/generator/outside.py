@@ -55,7 +55,7 @@ def _cross_talk(signals: Signals, s: float, n: Numbers) -> None:
 
 
 def _drop_outs(signals: Signals, s: float, n: Numbers) -> None:
-    """A loose plug: force and slide position fall back towards nothing for some milliseconds."""
+    """A loose plug: the force falls back towards nothing for some milliseconds."""
     start_nm = int(1e9 * signals["mass_position_m"][0])  # tells one run from another
     random = noise_of(n, start_nm)
     keep = np.ones(len(signals["t_s"]))
