@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -88,6 +88,9 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
 def _keys_beside(model: type[Strict], path: list[str]) -> list[str]:
     at: Any = model
     for part in path[:-1]:
-        field = at.model_fields.get(part) if hasattr(at, "model_fields") else None
-        at = field.annotation if field else None
+        if hasattr(at, "model_fields"):
+            field = at.model_fields.get(part)
+            at = field.annotation if field else None
+        else:  # an index of a list, or a name in a dict: what these hold comes last
+            at = (get_args(at) or (None,))[-1]
     return sorted(at.model_fields) if hasattr(at, "model_fields") else []

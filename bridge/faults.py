@@ -36,9 +36,9 @@ FAULTS = {
         FaultKind(
             "LOG_WRITE",
             5,
-            "The log could not be written: the disk is full, a size limit was reached, or the folder is not writable. "
-            "What was written before is kept. Free space, or point --log to another disk. `stickslip log recover FILE` "
-            "makes a cut file whole.",
+            "A log or another file could not be written: the disk is full, a size limit was reached, or the folder is not "
+            "writable. What was written before is kept. Free space, or choose another place. `stickslip log recover FILE` "
+            "makes a cut log whole.",
         ),
         FaultKind(
             "PEER_DIED",

@@ -1,5 +1,6 @@
 """Measured data of other programs as columns: CSV, Parquet, MATLAB v5 and TDMS. Every error names file, column and row."""
 
+import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +25,7 @@ class Dialect(NamedTuple):
     delimiter: str = ","
     decimal: str = "."
     skip_rows: int = 0  # lines before the one with the names
+    encoding: str = "utf-8"
 
 
 class Table(NamedTuple):
@@ -32,13 +34,14 @@ class Table(NamedTuple):
     path: Path
     columns: dict[str, Any]
     sample_rate_Hz: float | None = None  # where the file itself says so (TDMS)
+    decimal: str = "."  # of numbers that are text
 
     def column(self, name: str) -> Floats:
         """One column, float64 [rows]. Raises Fault BAD_TABLE when it is not there or is no column of numbers."""
         if name not in self.columns:
             known = ", ".join(sorted(self.columns)) or "none"
             raise Fault("BAD_TABLE", f"{self.path.name}: column {name}: not in the file; known here: {known}")
-        return _numbers(self.columns[name], f"{self.path.name}: column {name}")
+        return _numbers(self.columns[name], f"{self.path.name}: column {name}", self.decimal)
 
 
 def read_table(path: Path, dialect: Dialect | None = None) -> Table:
@@ -46,11 +49,14 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
     if not path.is_file():
         raise Fault("BAD_TABLE", f"{path}: no such file; give the path of a file of measured data")
     if path.suffix not in SUFFIXES:
-        line = f"{path}: ends in {path.suffix or 'nothing'}: must be one of {', '.join(SUFFIXES)}; convert it"
+        remedy = "rename it" if path.suffix.lower() in SUFFIXES else "convert it"
+        line = f"{path}: ends in {path.suffix or 'nothing'}: must be one of {', '.join(SUFFIXES)}; {remedy}"
         raise Fault("BAD_TABLE", line)
     try:
         if path.suffix == ".csv":
-            return Table(path, _csv(path, dialect or Dialect()))
+            dialect = dialect or Dialect()
+            _check_dialect(path, dialect)
+            return Table(path, _csv(path, dialect), decimal=dialect.decimal)
         if path.suffix == ".parquet":
             table: Any = pq.read_table(path)
             return Table(path, {name: table.column(name) for name in table.column_names})
@@ -66,13 +72,43 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
         raise Fault("BAD_TABLE", line) from None
 
 
+def _check_dialect(path: Path, dialect: Dialect) -> None:
+    """Refuse a file whose line of names is written in another way. Raises Fault BAD_TABLE."""
+    with path.open("rb") as file:
+        lines = [file.readline() for _ in range(dialect.skip_rows + 1)]
+    how = "`stickslip log import` reads it with a map that has, under [source],"
+    try:
+        names = lines[-1].decode(dialect.encoding)
+    except UnicodeDecodeError as error:
+        line = (
+            f"{path.name}: line {len(lines)}: is not {dialect.encoding}: {error.reason} at character {error.start + 1}"
+        )
+        raise Fault("BAD_TABLE", f'{line}; save it as UTF-8, or {how} encoding = "latin-1"') from None
+    except LookupError:
+        raise Fault(
+            "BAD_TABLE", f"source.encoding = {dialect.encoding!r}: is none that Python knows; try latin-1"
+        ) from None
+    other = next((mark for mark in (";", "\t", ",") if mark in names), None)
+    if dialect.delimiter not in names and other is not None:
+        line = f"{path.name}: line {len(lines)}: the names are separated by {other!r}, not by {dialect.delimiter!r}"
+        raise Fault("BAD_TABLE", f"{line}; {how} delimiter = {json.dumps(other)}, and decimal where it is no point")
+
+
 def _csv(path: Path, dialect: Dialect) -> dict[str, Any]:
-    table: Any = pa_csv.read_csv(
-        path,
-        read_options=pa_csv.ReadOptions(skip_rows=dialect.skip_rows),
-        parse_options=pa_csv.ParseOptions(delimiter=dialect.delimiter),
-        convert_options=pa_csv.ConvertOptions(decimal_point=dialect.decimal),
-    )
+    def read(threads: bool) -> Any:
+        return pa_csv.read_csv(
+            path,
+            read_options=pa_csv.ReadOptions(
+                skip_rows=dialect.skip_rows, encoding=dialect.encoding, use_threads=threads
+            ),
+            parse_options=pa_csv.ParseOptions(delimiter=dialect.delimiter),
+            convert_options=pa_csv.ConvertOptions(decimal_point=dialect.decimal),
+        )
+
+    try:
+        table = read(threads=True)
+    except pa.ArrowInvalid:
+        table = read(threads=False)  # which names the row
     return {name.strip(): table.column(name) for name in table.column_names}
 
 
@@ -111,14 +147,14 @@ def _tdms(path: Path) -> Table:
     return Table(path, columns | short, rates_Hz.pop() if len(rates_Hz) == 1 else None)
 
 
-def _numbers(values: Any, where: str) -> Floats:
+def _numbers(values: Any, where: str, decimal: str) -> Floats:
     """A column as float64; an empty cell is NaN. Raises Fault BAD_TABLE with the row of the first text in it."""
     if isinstance(values, pa.ChunkedArray):
         column: Any = values
         if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
             # rows as a person counts them: the first one under the names is 1
             for row, text in enumerate(column.to_pylist(), 1):
-                if text is not None and not _is_number(text):
+                if text is not None and not _is_number(text, decimal):
                     line = f"{where}: row {row} = {text!r}: must be a number; remove the row or name another column"
                     raise Fault("BAD_TABLE", line)
         try:
@@ -131,9 +167,9 @@ def _numbers(values: Any, where: str) -> Floats:
     return array.astype(np.float64)
 
 
-def _is_number(text: str) -> bool:
+def _is_number(text: str, decimal: str) -> bool:
     try:
-        float(text)
+        float(text if decimal == "." else text.replace(decimal, "."))
     except ValueError:
         return False
     return True

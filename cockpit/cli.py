@@ -317,6 +317,13 @@ def replay_command(
     sys.exit(guarded(work, as_json))
 
 
+_NO_FAULTS = {
+    "0": "all is well; a diagnosis that was made is, whatever it says",
+    "1": "the command did its work, and the run, the log or the comparison is not as it should be; or, with a traceback, "
+    "an error of the program: please report it",
+}
+
+
 @app.command()
 def explain(
     code: Annotated[
@@ -325,12 +332,17 @@ def explain(
 ) -> None:
     """Say what a fault code or an exit status means and what to do."""
     if not code:
-        for kind in sorted(FAULTS.values(), key=lambda kind: kind.exit_status):
-            print(f"{kind.exit_status:>3}  {kind.code}")
+        rows = [(kind.exit_status, kind.code) for kind in FAULTS.values()]
+        for status, meaning in sorted((*rows, *((int(status), said) for status, said in _NO_FAULTS.items()))):
+            print(f"{status:>3}  {meaning}")
+        return
+    if code in _NO_FAULTS:
+        print(f"exit status {code}: {_NO_FAULTS[code]}")
         return
     kinds = [kind for kind in FAULTS.values() if code.upper() in {kind.code, str(kind.exit_status)}]
     if not kinds:
-        print(f"stickslip: {code}: unknown code; known: {', '.join(FAULTS)}", file=sys.stderr)
+        statuses = ", ".join(sorted({*_NO_FAULTS, *(str(kind.exit_status) for kind in FAULTS.values())}, key=int))
+        print(f"stickslip: {code}: unknown; known: {', '.join(FAULTS)}; exit statuses {statuses}", file=sys.stderr)
         sys.exit(2)
     print("\n\n".join(f"{kind.code} (exit status {kind.exit_status})\n{kind.help}" for kind in kinds))
 

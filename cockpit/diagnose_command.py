@@ -59,22 +59,34 @@ def diagnose(
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster)
         sources = find_sources(evidence)
-        one = len(evidence) == 1 and sources[0].folder == evidence[0].resolve()
-        _check_destinations(wishes, one)
+        one = all(path.resolve() == sources[0].folder for path in evidence)
+        _check_destinations(wishes, one, sources)
         return _diagnose_one(sources[0], wishes) if one else _diagnose_many(sources, wishes)
 
     sys.exit(guarded(work, as_json == _STDOUT))
 
 
-def _check_destinations(wishes: _Wishes, one: bool) -> None:
+def _check_destinations(wishes: _Wishes, one: bool, sources: list["Source"]) -> None:
     """Refuse now what could not be written after minutes of work. Raises Fault CONFIG or LOG_WRITE."""
     if wishes.apply is not None and not one:
         raise Fault(
             "CONFIG", f"--apply {wishes.apply}: takes one evidence folder; a rig file has the effects of one rig"
         )
+    from diagnosis.manifest import MANIFEST, RUN_SUFFIXES
+
+    seen: dict[Path, str] = {}
     for option, path in (("--json", wishes.json), ("--report", wishes.report), ("--apply", wishes.apply)):
         if path is None or path == _STDOUT:
             continue
+        whole = path.resolve()
+        if whole in seen:
+            raise Fault("CONFIG", f"{option} {path}: is where {seen[whole]} goes; choose another")
+        seen[whole] = option
+        measured = whole.name == MANIFEST or whole.suffix in RUN_SUFFIXES
+        if measured and whole.exists() and whole.parent in {source.folder.resolve() for source in sources}:
+            raise Fault(
+                "CONFIG", f"{option} {path}: belongs to the evidence, which is never overwritten; choose another"
+            )
         folder_wanted = option == "--report" and not one
         if path.exists() and path.is_dir() != folder_wanted:
             rule = "must be a folder, one report for each evidence" if folder_wanted else "must be a file, not a folder"
@@ -94,23 +106,35 @@ def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
         refuse_force_drive(evidence)
     with watched() as progress:
         diagnosis = _result(source, evidence, wishes, progress)
-    written: list[str] = []
-    with writing():
-        if wishes.json is not None:
-            _write_json(wishes.json, to_json(diagnosis))
-        if wishes.report is not None:
-            write_report(diagnosis, source.name, wishes.report)
-            written.append(f"report     {wishes.report}")
     if wishes.json != _STDOUT:
-        print("\n".join(in_words(diagnosis) + written))
-    if wishes.apply is not None:
-        said = "not written: nothing explains the gap, there is no effect to apply"
-        if diagnosis.verdict != "unexplained":
-            with writing():
-                write_rig(diagnosis, evidence, wishes.apply)
-            said = str(wishes.apply)
-        print(f"rig file   {said}", file=sys.stderr if wishes.json == _STDOUT else sys.stdout)
+        print("\n".join(in_words(diagnosis)))
+    wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
+        ("", wishes.json, lambda path: _write_json(path, to_json(diagnosis))),
+        ("report     ", wishes.report, lambda path: write_report(diagnosis, source.name, path)),
+    ]
+    if wishes.apply is not None and diagnosis.verdict == "unexplained":
+        _tell(wishes, "rig file   not written: nothing explains the gap, there is no effect to apply")
+    else:
+        wanted.append(("rig file   ", wishes.apply, lambda path: write_rig(diagnosis, evidence, path)))
+    failed: list[str] = []
+    for word, path, write in wanted:
+        if path is not None:
+            try:  # what one disk refuses the others may still get
+                with writing():
+                    write(path)
+            except Fault as fault:
+                failed.append(fault.line)
+                continue
+            if word:
+                _tell(wishes, f"{word}{path}")
+    if failed:
+        raise Fault("LOG_WRITE", "\n".join(failed))
     return 0
+
+
+def _tell(wishes: _Wishes, line: str) -> None:
+    """On stdout, but where the JSON goes there."""
+    print(line, file=sys.stderr if wishes.json == _STDOUT else sys.stdout)
 
 
 def _result(
@@ -150,7 +174,7 @@ def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
             _write_json(wishes.json, many_as_json(results))
     if wishes.json != _STDOUT:
         print("\n".join(in_a_line(outcome) for outcome in results))
-        if wishes.report is not None:
+        if wishes.report is not None and any(outcome.diagnosis is not None for outcome in results):
             print(f"reports    {wishes.report}")
     codes = [outcome.fault[0] for outcome in results if outcome.fault is not None]
     # bad evidence first: that is what the person who called can mend

@@ -101,6 +101,7 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
         beside = path.parent / rig_name
         rig_path = beside if beside.suffix == ".toml" and beside.is_file() else _find(rig_name, "rigs")
         table["rig"] = _merged(read_toml(rig_path), overrides)
+        return validate(Scenario, table, f"{path.name} with {rig_path.name}")
     return validate(Scenario, table, path.name)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from bridge import stickslip_pb2 as wire
 from bridge.logfile import RunData, read_run
+from diagnosis.logcheck import damage_findings
 from diagnosis.cycles import Cycles, find_cycles
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
@@ -102,7 +103,7 @@ def judge_run(run: RunData) -> Verdict:
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
         latency=_latency(run),
-        faults=faults,
+        faults=faults + [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, run.path)],
     )
 
 

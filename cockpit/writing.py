@@ -9,9 +9,12 @@ from bridge.faults import Fault
 
 
 def check_writable(option: str, path: Path) -> None:
-    """Raise Fault LOG_WRITE where the nearest folder above a file does not allow it."""
-    above = next(parent for parent in (path, *path.absolute().parents) if parent.exists())
-    if not os.access(above, os.W_OK) or (above != path and not above.is_dir()):
+    """Raise Fault LOG_WRITE where a file, or the nearest folder above it, does not allow it."""
+    above = next(parent for parent in path.absolute().parents if parent.exists())
+    refused = path.exists() and not os.access(path, os.W_OK)
+    if path.is_file() or not path.exists():  # it is written beside itself first
+        refused |= not os.access(above, os.W_OK) or not above.is_dir()
+    if refused:
         raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {above} does not allow it; choose another")
 
 
@@ -23,5 +26,6 @@ def writing() -> Generator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        line = f"{error.filename}: cannot be written: {error.strerror}; choose another place or free space"
+        where = str(error.filename).removesuffix(".part")
+        line = f"{where}: cannot be written: {error.strerror}; choose another place or free space"
         raise Fault("LOG_WRITE", line) from None

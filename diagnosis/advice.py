@@ -55,7 +55,7 @@ _SINGLE: Final[dict[str, str]] = {
     "position-dependent-friction": _TRACK,
     "normal-load-fluctuation": _TRACK,
 }
-_BY_PLACE: Final = {"drive": _TAP, "piezo": _SWEEP, "friction": _SPEEDS}
+_BY_PLACE: Final = {"sensor": _WEIGHT, "drive": _TAP, "structure": _FRAME, "piezo": _SWEEP, "friction": _SPEEDS}
 
 
 def advice(effects: tuple[str, ...], drive: str) -> str:

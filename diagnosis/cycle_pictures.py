@@ -49,6 +49,10 @@ def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -
     return best
 
 
+def _mean_of(cycles: int) -> str:
+    return f"mean of {cycles} cycles" if cycles > 1 else "one cycle"
+
+
 def _cycles_there(signals: Signals, segment: Segment, scales: Scales) -> bool:
     """Whether nothing slips, or something twice."""
     return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
@@ -82,7 +86,7 @@ def force_picture(told: Told, scales: Scales) -> Picture:
         slips = [slips_of(version.signals, told.segment, scales) for version in told.versions]
         if all(len(one.middles) >= 2 for one in slips):
             curves = [_whole_cycle(version, found) for version, found in zip(told.versions, slips, strict=True)]
-            title = f"{_place(told)}: mean of {len(slips[0].middles) - 1} cycles from slip to slip"
+            title = f"{_place(told)}: {_mean_of(len(slips[0].middles) - 1)} from slip to slip"
             return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
         if all(len(one.middles) == 1 for one in slips) or (
             told.segment.first and all(len(one.middles) for one in slips)

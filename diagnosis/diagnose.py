@@ -22,6 +22,7 @@ from diagnosis.heldout import Closed, HeldOut
 from diagnosis.imitation import imitators
 from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
+from diagnosis.phases import is_phase
 from diagnosis.phases_by_run import starts_by_run
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
@@ -317,13 +318,18 @@ def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
     own = len(fit.deviations)
     deviation = np.sqrt(np.diag(fit.covariance()))[own:]
     parameters = {
-        axis.name: _estimate(axis, float(w), float(spread))
+        axis.name: estimate_of(axis, float(w), float(spread))
         for axis, w, spread in zip(fit.form.axes, fit.w, deviation, strict=True)
         if axis.effect == name
     }
     return Candidate(name, probability, fit.form.forms[name], parameters)
 
 
-def _estimate(axis: Axis, w: float, deviation: float) -> Estimate:
-    low, high = sorted((axis.value(w - 1.645 * deviation), axis.value(w + 1.645 * deviation)))
-    return Estimate(axis.value(w), (low, high))
+def estimate_of(axis: Axis, w: float, deviation: float) -> Estimate:
+    """A parameter with its 90 % interval, from its coordinate and the standard deviation of that."""
+    value, half = axis.value(w), 1.645 * deviation
+    if is_phase(axis.name):  # round the value, and not round again where it passes pi
+        half = min(half * axis.scale, math.pi)
+        return Estimate(value, (value - half, value + half))
+    low, high = sorted((axis.value(w - half), axis.value(w + half)))
+    return Estimate(value, (low, high))

@@ -4,6 +4,7 @@ What cannot be used is left out and reported as a finding; where nothing usable 
 """
 
 from collections.abc import Iterator
+from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,13 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
-from bridge.tables import read_table
+from bridge.tables import Table, read_table
 from diagnosis.evidence_checks import Columns, checked
 from diagnosis.findings import Finding
 from diagnosis.log_evidence import columns_of_log
 from diagnosis.manifest import MANIFEST, STANDARD, ChannelMap, Manifest, RigTable, RunTable, read_manifest
 
 Floats = npt.NDArray[np.float64]
+_ALIKE = 0.85  # of two names, by `difflib`: a letter or the case is another
 SHAKE_RATE_HZ = 8000.0  # a slower accelerometer has too few samples a millisecond to tell how strongly it vibrates
 # what each column tells that no other one does, by kind of drive
 _COST_SPRING = {
@@ -79,8 +81,9 @@ def load_evidence(folder: Path) -> Evidence:
 
 
 def _run(folder: Path, manifest: Manifest, table: RunTable) -> tuple[Run, list[Finding]]:
-    columns = read_columns(folder / table.file, manifest.channels)
-    return examine(columns, manifest.rig, table)
+    columns, damaged = read_columns(folder / table.file, manifest.channels)
+    run, findings = examine(columns, manifest.rig, table)
+    return run, damaged + findings
 
 
 def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list[Finding]]:
@@ -120,6 +123,13 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
             told[0],
             "stands alone: frequency and amplitude are needed, the run counts as one without vibration",
         )
+    for name in told:
+        if negative := int((columns[name] < 0.0).sum()):
+            yield (
+                "sign",
+                name,
+                f"{negative} samples are negative: must be 0 where it is off, above it else; not used there",
+            )
     rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
     if len(told) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
         for name in ("mass_accel_mps2", "base_accel_mps2"):
@@ -131,14 +141,15 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
                 )
 
 
-def read_columns(path: Path, channels: dict[str, ChannelMap]) -> Columns:
-    """The standard columns of a data file, mapped and in SI units, unchecked. Raises Fault BAD_EVIDENCE.
+def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, list[Finding]]:
+    """The standard columns of a data file, mapped and in SI units, unchecked, and what it has besides or has lost.
 
-    A run log has the standard columns; one of them that `channels` maps is scaled like any other.
+    A run log has the standard columns; one of them that `channels` maps is scaled like any other. Raises Fault BAD_EVIDENCE.
     """
     try:
         if path.suffix == ".mcap":
-            return {name: _scaled(values, channels.get(name), name) for name, values in columns_of_log(path).items()}
+            logged, damaged = columns_of_log(path)
+            return {name: _scaled(values, channels.get(name), name) for name, values in logged.items()}, damaged
         table = read_table(path)
         found: Columns = {}
         for name in STANDARD:
@@ -150,7 +161,17 @@ def read_columns(path: Path, channels: dict[str, ChannelMap]) -> Columns:
     except Fault as fault:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
         raise Fault("BAD_EVIDENCE", line) from None
-    return found
+    return found, list(_misspelt(path.name, found, table))
+
+
+def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
+    """Columns that are not used and have nearly the name of one that is not there."""
+    for name in STANDARD:
+        near = [] if name in found else get_close_matches(name, table.columns.keys() - found.keys(), 1, _ALIKE)
+        for other in near:
+            yield Finding(
+                "missing", f"{file}: {name}", f'not there, but {other} is: set channels.{name}.column = "{other}"'
+            )
 
 
 def _scaled(values: Floats, channel: ChannelMap | None, name: str) -> Floats:

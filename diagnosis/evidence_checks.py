@@ -19,14 +19,18 @@ Note = Callable[[str, str, str], None]  # kind, column, text
 _FEWEST_ROWS = 16
 # more bad rows than this, and the file is not what it says it is
 _LARGEST_BAD_SHARE = 0.1
+_LARGEST_WILD_SHARE = 1e-3  # of samples that no rig shows: a loose contact, or a value that stands for none
 _SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m")
 _GAP_STEPS = 10.0  # times the usual step
 # A pause that is longer, or gaps that take a larger share of a run, hide slips that the model would go on to make
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
 _VELOCITY_TOLERANCE = 0.1  # of the stated drive velocity against the drive position's slope
+_ANOTHER = 3.0  # times as fast, or as slow, or the other way: another drive than the one stated
 _FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
 _FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
 _FEWEST_IN_A_SLIP = 3.0  # samples
+_SHORTEST_S = 1.0  # of a run
+_QUICKEST_S = 2e-6  # between samples: 500 kHz
 _SLOWEST_S = 0.05  # between samples, where nothing slips: with a force drive
 # Largest values that can be right; a factor of 1000, as between mm and m, shows in at least one of them on a bench rig.
 _LARGEST = {
@@ -58,10 +62,11 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
                 "not-finite", name, f"{bad.sum()} of {len(bad)} samples are no finite number; not used", int(bad.sum())
             )
             del usable[name]
-    usable, rows = _good_rows(usable, file, findings)
+    usable, rows = _good_rows(usable, rig, file, findings)
     t_s = usable["t_s"]
     step_s = np.diff(t_s)
     usual_s = float(np.median(step_s))
+    _check_length(float(t_s[-1] - t_s[0]) + usual_s, usual_s, file)
     gaps = np.flatnonzero(step_s > _GAP_STEPS * usual_s)
     if len(gaps):
         at = gaps[0]
@@ -97,7 +102,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
                 seen.lowest if seen.clipped_low else -math.inf,
                 seen.highest if seen.clipped_high else math.inf,
             )
-    _compare_velocity(usable, rig, table, note)
+    _compare_velocity(usable, rig, table, note, file)
     if (
         rig.drive_stiffness_N_per_m
         and "drive_force_N" in usable
@@ -107,6 +112,14 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         note("sign", "drive_force_N", f"{text} channels.drive_force_N.scale")
         del usable["drive_force_N"]
     return usable, clipped, findings
+
+
+def _check_length(length_s: float, step_s: float, file: str) -> None:
+    if length_s < _SHORTEST_S:
+        remedy = "give a longer run"
+        if step_s < _QUICKEST_S:
+            remedy += f"; a sample every {step_s:.3g} s: is the column in seconds? If not, set channels.t_s.scale"
+        raise Fault("BAD_EVIDENCE", f"{file}: t_s: {length_s:.3g} s long: must be {_SHORTEST_S:g} s at least; {remedy}")
 
 
 def _check_rate(step_s: float, rig: RigTable, file: str) -> None:
@@ -141,8 +154,10 @@ def _check_shape(columns: Columns, file: str) -> None:
             raise Fault("BAD_EVIDENCE", line)
 
 
-def _good_rows(columns: Columns, file: str, findings: list[Finding]) -> tuple[Columns, npt.NDArray[np.int64]]:
-    """Only rows that are finite throughout and later than every row before, and which those are."""
+def _good_rows(
+    columns: Columns, rig: RigTable, file: str, findings: list[Finding]
+) -> tuple[Columns, npt.NDArray[np.int64]]:
+    """Only rows that are finite throughout, without a wild sample, and later than every row before, and which those are."""
     t_s = columns["t_s"]
     rows = len(t_s)
     good = np.ones(rows, np.bool_)
@@ -153,6 +168,16 @@ def _good_rows(columns: Columns, file: str, findings: list[Finding]) -> tuple[Co
             text = f"{len(bad)} samples are no finite number, first row {bad[0] + 1}; these rows are not used"
             found.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
             good[bad] = False
+        limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else _LARGEST.get(name, math.inf)
+        wild = np.flatnonzero(np.isfinite(values) & (np.abs(values) > limit))
+        # more of them, and it is the unit that is wrong
+        if not name.endswith("position_m") and 0 < len(wild) <= _LARGEST_WILD_SHARE * rows:
+            at = int(wild[0])
+            text = (
+                f"{len(wild)} samples are beyond {limit:g}, first row {at + 1}: {values[at]:g}; these rows are not used"
+            )
+            found.append(Finding("wild", f"{file}: {name}", text, len(wild)))
+            good[wild] = False
     latest_s = np.maximum.accumulate(np.where(np.isfinite(t_s), t_s, -np.inf))
     repeated = np.zeros(rows, np.bool_)
     repeated[1:] = np.isfinite(t_s[1:]) & (t_s[1:] <= latest_s[:-1])
@@ -210,19 +235,27 @@ def _too_far(name: str, values: Floats, t_s: Floats, rig: RigTable, table: RunTa
     return f"travels {travel_m:.3g}: the drive moves by {drive_m:.3g} m in this time, the unit cannot be right"
 
 
-def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
+def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: Note, file: str) -> None:
     if rig.drive == "force":
         return
     stated_mps, measured_mps = table.drive_velocity_mps, None
     if "drive_position_m" in columns:
         t_s, position_m = columns["t_s"], columns["drive_position_m"]
-        measured_mps = float(position_m[-1] - position_m[0]) / float(t_s[-1] - t_s[0])
-        if stated_mps and abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps):
+        travel_m = float(position_m[-1] - position_m[0])
+        measured_mps = travel_m / float(t_s[-1] - t_s[0])
+        if stated_mps is not None:
             text = (
                 f"moves at {measured_mps:.4g} m/s on average, drive_velocity_mps says {stated_mps:.4g}: check units and time; "
                 "where the drive changes its speed leave drive_velocity_mps out"
             )
-            note("units", "drive_position_m", text)
+            reach_m = rig.static_force_N / (rig.drive_stiffness_N_per_m or math.inf)
+            another = (
+                not 1.0 / _ANOTHER < measured_mps / stated_mps < _ANOTHER if stated_mps else abs(travel_m) > reach_m
+            )
+            if another:
+                raise Fault("BAD_EVIDENCE", f"{file}: drive_position_m: {text}")
+            if abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps) > 0.0:
+                note("units", "drive_position_m", f"{text}; the stated one is used")
     where = "drive_position_m" if stated_mps is None else "drive_velocity_mps"
     fastest_mps = abs((measured_mps if stated_mps is None else stated_mps) or 0.0)
     if fastest_mps > _FASTEST * rig.stribeck_velocity_mps:

@@ -37,6 +37,7 @@ class SourceMap(Strict):
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] = ","
     decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
     skip_rows: Annotated[int, Field(ge=0)] = 0
+    encoding: str = "utf-8"
 
 
 class RunMap(Strict):
@@ -88,7 +89,7 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
     """
     wanted = validate(ImportMap, read_toml(map_path), map_path.name)
     source = wanted.source
-    table = read_table(path, Dialect(source.delimiter, source.decimal, source.skip_rows))
+    table = read_table(path, Dialect(source.delimiter, source.decimal, source.skip_rows, source.encoding))
     columns = _columns(table, wanted, map_path.name)
     try:
         if out.suffix == ".mcap":
@@ -164,7 +165,7 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
         if before.channels:
             line = f"{out / MANIFEST}: has [channels], which imported runs must not pass; choose another --out"
             raise Fault("BAD_EVIDENCE", line)
-        if run.file in {other.file for other in before.run}:
+        if path.stem in {other.file.rsplit(".", 1)[0] for other in before.run}:
             line = f"{out / run.file}: is already a run of this folder; rename {path.name} or choose another --out"
             raise Fault("BAD_EVIDENCE", line)
         runs = [*before.run, run]

@@ -8,12 +8,14 @@ import numpy.typing as npt
 from bridge.export import CHANNELS
 from bridge.faults import Fault
 from bridge.logfile import RunData, block_period_ns, read_run, sample_times_s
+from diagnosis.findings import Finding
+from diagnosis.logcheck import damage_findings
 
 Columns = dict[str, npt.NDArray[np.float64]]
 
 
-def columns_of_log(path: Path) -> Columns:
-    """The standard columns of a run log, one row a sample. Raises Fault BAD_LOG, BAD_MESSAGE."""
+def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
+    """The standard columns of a run log, one row a sample, and what of it is damaged. Raises Fault BAD_LOG, BAD_MESSAGE."""
     run = read_run(path)
     sensors = run.sensors
     if not len(sensors):
@@ -27,7 +29,7 @@ def columns_of_log(path: Path) -> Columns:
         samples = sensors["drive_force_N"].shape[1]
         columns["vibration_frequency_Hz"] = np.repeat(frequency_Hz, samples)
         columns["vibration_amplitude_m"] = np.repeat(amplitude_m, samples)
-    return columns
+    return columns, damage_findings(run.damage, path)
 
 
 def _commanded(run: RunData) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from bridge import stickslip_pb2 as wire
 from bridge.export import CHANNELS
 from bridge.faults import Fault
+from bridge.log_reader import Damage
 from bridge.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
 from bridge.messages import SCHEMA_VERSION, parsed
 from bridge.topics import BY_NAME
@@ -124,9 +125,9 @@ def _table(reader: LogReader, name: str, key: str) -> Any:
         return {}
 
 
-def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
+def damage_findings(damage: Damage, path: Path) -> list[Finding]:
+    """What of a log was lost."""
     found: list[Finding] = []
-    damage = reader.damage
     remedy = f"`stickslip log recover {path}` saves the rest"
     if not damage.closed:
         text = f"has no end, {damage.cut_bytes} bytes of an open chunk were lost; {remedy}"
@@ -138,6 +139,11 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
     if damage.bad_records:
         text = f"{damage.bad_records} definitions or stretches of bytes make no sense; {remedy}"
         found.append(Finding("damaged", path.name, text, damage.bad_records))
+    return found
+
+
+def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
+    found = damage_findings(reader.damage, path)
     for role, table in reader.metadata.items():
         version = table.get("schema_version")
         if version is not None and version != str(SCHEMA_VERSION):
@@ -157,7 +163,7 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
             text = f"the {event.source} dropped {dropped[1]} messages because it was too slow"
             found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
     plant_codes = [event.code for event in seen.events if event.source == "plant"]
-    if damage.closed and "START" in plant_codes and "END" not in plant_codes:
+    if reader.damage.closed and "START" in plant_codes and "END" not in plant_codes:
         found.append(Finding("no-end", "/event/plant", "the plant began its run and never ended it"))
     return found
 

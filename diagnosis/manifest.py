@@ -1,5 +1,6 @@
 """What `manifest.toml` of an evidence folder may say: the rig, how well it is known, the channels and the runs."""
 
+import math
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal
 
@@ -23,8 +24,12 @@ STANDARD = (
 )
 _SPRING_ONLY = ("drive_stiffness_N_per_m", "drive_damping_Ns_per_m")
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+# far above any rig, and far below what arithmetic ends at
+Positive = Annotated[float, Field(gt=0, lt=1e12)]
+NotNegative = Annotated[float, Field(ge=0, lt=1e12)]
+# Of the mass on the contact's stiffness, 7.2e3 on the paper's rig: a step of the model is half of its inverse
+_FASTEST_CONTACT_RAD_PER_S = 2e5
+_LONGEST_SLIP_S = 5.0
 
 
 class RigTable(Strict):
@@ -54,6 +59,18 @@ class RigTable(Strict):
             raise ValueError(
                 f"static_force_N = {self.static_force_N:g}: must not be below coulomb_force_N = "
                 f"{self.coulomb_force_N:g}; exchange them or measure again"
+            )
+        contact_rad_per_s = (self.contact_stiffness_N_per_m / self.mass_kg) ** 0.5
+        if contact_rad_per_s > _FASTEST_CONTACT_RAD_PER_S:
+            raise ValueError(
+                f"contact_stiffness_N_per_m = {self.contact_stiffness_N_per_m:g} on mass_kg = {self.mass_kg:g}: swings at "
+                f"{contact_rad_per_s:.3g} rad/s: must be {_FASTEST_CONTACT_RAD_PER_S:g} at most; check their units"
+            )
+        slip_s = math.pi * (self.mass_kg / self.drive_stiffness_N_per_m) ** 0.5 if self.drive_stiffness_N_per_m else 0.0
+        if slip_s > _LONGEST_SLIP_S:
+            raise ValueError(
+                f"mass_kg = {self.mass_kg:g} on drive_stiffness_N_per_m = {self.drive_stiffness_N_per_m:g}: a slip would take "
+                f"{slip_s:.3g} s: must be {_LONGEST_SLIP_S:g} s at most; check their units"
             )
         known = [name for name, value in self.values().items() if value is not None]
         for key, share in self.tolerance.items():
@@ -110,11 +127,12 @@ class Manifest(Strict):
     @model_validator(mode="after")
     def _names_are_right(self) -> "Manifest":
         check_channel_names(self.channels)
-        files = [run.file for run in self.run]
-        for file in files:
-            if files.count(file) > 1:
+        names = [str(PurePath(run.file).with_suffix("")) for run in self.run]
+        for run, name in zip(self.run, names, strict=True):
+            if names.count(name) > 1:
                 raise ValueError(
-                    f"run.file = {file!r}: given {files.count(file)} times; each run has a file of its own"
+                    f"run.file = {run.file!r}: {names.count(name)} runs are called {name!r}; each run has a file of its own, "
+                    "and goes by its name without the suffix: rename one"
                 )
         if all(run.holdout for run in self.run):
             raise ValueError("run.holdout = true for every run: must be false for one at least; nothing is left to fit")

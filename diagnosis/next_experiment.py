@@ -56,7 +56,7 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
     best = _best(problem, nuisances, first, second)
     if best is None or best.separation < _SEPARATES or best.feature is None:
         most = (
-            "no run"
+            "no run within reach of this rig separates them"
             if best is None
             else f"no run separates them by more than {best.separation:.1f} standard deviations"
         )
@@ -64,7 +64,12 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
             advice(names, "spring"), f"{both} look alike: {most}.", None if best is None else best.separation
         )
     there = f"{best.separation:.1f} standard deviations, most in {_in_words(best.feature)}"
-    if present > best.separation:
+    if present > _DECISIVE:
+        why = (
+            f"{both} differ by {present:.1f} standard deviations in the present runs, which is enough; "
+            f"a run like this would confirm it, with {there}."
+        )
+    elif present > best.separation:
         why = (
             f"{both} differ by {present:.1f} standard deviations in the present runs; there it would again be {there}."
         )

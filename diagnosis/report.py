@@ -48,7 +48,14 @@ def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path) -> None:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file, its folder too, whole or not at all. Raises OSError."""
+    """Write a file, its folder too, whole or not at all; a link stays one. Raises OSError.
+
+    What is no file, like /dev/null or a pipe, is written into: it must never be replaced.
+    """
+    if path.is_relative_to("/dev") or (path.exists() and not path.is_file()):
+        path.write_text(text, encoding="utf-8")
+        return
+    path = path.resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     try:

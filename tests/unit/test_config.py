@@ -7,7 +7,7 @@ import pytest
 
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
-from cockpit.scenario import load_rig, load_scenario
+from cockpit.scenario import load_rig, load_scenario, rig_setting
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 
@@ -52,6 +52,13 @@ def test_missing_and_broken_files(tmp_path: Path) -> None:
     broken.write_text("a = = 1")
     with pytest.raises(Fault, match="not valid TOML"):
         load_rig(str(broken), [])
+
+
+def test_an_error_in_a_rig_file_names_it(tmp_path: Path) -> None:
+    rig = tmp_path / "mine.toml"
+    rig.write_text("[effects.drive-backlash]\ngap = 1e-4\n")
+    with pytest.raises(Fault, match=r"paper-c45-c45.toml with mine.toml: rig: effects.drive-backlash.gap: unknown key"):
+        load_scenario("paper-c45-c45", [rig_setting(str(rig))])
 
 
 def test_overrides_leave_the_table_alone() -> None:

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from bridge.faults import FAULTS
 from cockpit.cli import app
 from diagnosis import many
+from diagnosis.report import write_whole
 from diagnosis.strict_json import strict_json
 from tests import made_up
 
@@ -160,6 +161,9 @@ def test_folders_of_the_same_name_keep_apart(tmp_path):
         (["--report", "rig/run-01.csv/report.html"], "LOG_WRITE"),
         (["rig2", "--apply", "rig.toml"], "CONFIG"),
         (["rig2", "--report", "rig/run-01.csv"], "CONFIG"),
+        (["--json", "rig/run-01.csv"], "CONFIG"),
+        (["--apply", "rig/manifest.toml"], "CONFIG"),
+        (["--json", "a", "--report", "./a"], "CONFIG"),
     ],
 )
 def test_what_cannot_be_written_is_said_before_the_work(options, code, tmp_path, monkeypatch):
@@ -187,3 +191,41 @@ def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
     result = diagnose(folders(tmp_path, "rig") / "rig", "--json", tmp_path / "a.json")
     assert result.exit_code == 130
     assert not (tmp_path / "a.json").exists()
+
+
+def test_the_answer_is_said_whatever_cannot_be_written(tmp_path):
+    """A folder appears where the JSON goes, while the diagnosis works: report and words are there all the same."""
+
+    def in_the_way(evidence, progress, jobs):
+        (tmp_path / "a.json").mkdir()
+        return made_up.quick(evidence, progress, jobs)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(many, "real_diagnose", in_the_way)
+        result = diagnose(
+            folders(tmp_path, "rig") / "rig", "--json", tmp_path / "a.json", "--report", tmp_path / "a.html"
+        )
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert f"LOG_WRITE: {tmp_path / 'a.json'}: cannot be written" in result.stderr
+    assert result.stdout.startswith("effect: drive-backlash")
+    assert f"report     {tmp_path / 'a.html'}" in result.stdout
+    assert (tmp_path / "a.html").stat().st_size > 1000
+
+
+def test_a_link_stays_one_and_a_device_is_written_into(tmp_path):
+    (tmp_path / "link.json").symlink_to(tmp_path / "there.json")
+    assert diagnose(folders(tmp_path, "rig") / "rig", "--json", tmp_path / "link.json").exit_code == 0
+    assert (tmp_path / "link.json").is_symlink()
+    assert json.loads((tmp_path / "there.json").read_text())["verdict"] == "effect"
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(tmp_path / "pipe", "all of it")
+    assert os.read(reader, 100) == b"all of it"
+    os.close(reader)
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_one_folder_given_twice_is_one(tmp_path):
+    rig = folders(tmp_path, "rig") / "rig"
+    assert diagnose(rig, rig, "--apply", tmp_path / "found.toml").exit_code == 0
+    assert (tmp_path / "found.toml").is_file()

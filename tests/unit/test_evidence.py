@@ -92,7 +92,24 @@ def test_a_good_folder(tmp_path: Path) -> None:
         ("mass_kg = 0.005", "mass_kg = 5.0", "tolerance.mass_kg = 5: must be from 0 to 1; it is relative"),
         ("[[run]]", '[channels]\nforce = { column = "F" }\n[[run]]', "channels.force: unknown key; known here: t_s,"),
         ("[[run]]", "[channels]\nt_s = { scale = 2.0 }\n[[run]]", "channels.t_s.column: missing"),
-        ("[[run]]", "[[run]]\nspeed = 1", "manifest.toml: run.0.speed = 1: unknown key; known here:"),
+        (
+            "[[run]]",
+            "[[run]]\nspeed = 1",
+            "manifest.toml: run.0.speed = 1: unknown key; known here: drive_velocity_mps, file",
+        ),
+        (
+            "[[run]]",
+            '[channels]\nt_s = { colum = "t" }\n[[run]]',
+            "channels.t_s.colum = 't': unknown key; known here: column",
+        ),
+        ("[[run]]", '[[run]]\nfile = "./run-01.csv"\n[[run]]', "run.file = './run-01.csv': 2 runs are called 'run-01'"),
+        ("mass_kg = 1.5", "mass_kg = 1e300", "rig.mass_kg = 1e+300: must be less than"),
+        (
+            "mass_kg = 1.5",
+            "mass_kg = 1e9",
+            "mass_kg = 1e+09 on drive_stiffness_N_per_m = 11700: a slip would take 918 s",
+        ),
+        ("mass_kg = 1.5", "mass_kg = 1e-5", "mass_kg = 1e-05: swings at 2.78e+06 rad/s: must be 200000 at most"),
         ("run-01.parquet", "../run-01.parquet", "file = '../run-01.parquet': must lie in the evidence folder"),
         ("run-01.parquet", "run-01.xlsx", "file = 'run-01.xlsx': must end in .parquet, .csv, .mat, .mcap"),
         ("run-01.parquet", "run-07.parquet", "run-07.parquet: no such file"),
@@ -130,6 +147,22 @@ def half_is_nan(data: Columns) -> None:
     data["t_s"][::3] = np.nan
 
 
+def half_a_second(data: Columns) -> None:
+    for name in data:
+        data[name] = data[name][:1000]
+
+
+def time_in_ks(data: Columns) -> None:
+    data["t_s"] = data["t_s"] * 1e-3
+
+
+def another_speed(factor: float) -> Callable[[Columns], None]:
+    def change(data: Columns) -> None:
+        data["drive_position_m"] = data["drive_position_m"] * factor
+
+    return change
+
+
 def paused(data: Columns) -> None:
     data["t_s"][1000:] += 1800.0
 
@@ -163,6 +196,10 @@ def in_micronewton(data: Columns) -> None:
             "run-01.parquet: t_s: 2000 rows are not later than the one before, first row 2001: 0 s after 0.9995 s",
         ),
         (half_is_nan, "run-01.parquet: t_s: 1334 samples are no finite number, first row 1"),
+        (half_a_second, "run-01.parquet: t_s: 0.5 s long: must be 1 s at least; give a longer run"),
+        (time_in_ks, "0.002 s long: must be 1 s at least; give a longer run; a sample every 5e-07 s"),
+        (another_speed(-1.0), "drive_position_m: moves at -0.0005 m/s on average, drive_velocity_mps says 0.0005"),
+        (another_speed(4.0), "drive_position_m: moves at 0.002 m/s on average, drive_velocity_mps says 0.0005"),
         (paused, "t_s: 1 gaps in time, first at 0.4995 s: 1.8e+03 s without a sample, the longest 1.8e+03 s"),
         (full_of_holes, "19 % of the run in all: must be 1 s and 10 % at most; split the file there"),
         (short, "run-01.parquet: t_s: 9 rows: must have 16 at least"),
@@ -237,6 +274,19 @@ def force_the_other_way(data: Columns) -> None:
     data["drive_force_N"] *= -1.0
 
 
+def wild_force(data: Columns) -> None:
+    data["drive_force_N"][[500, 700]] = -9999.0
+
+
+def negative_vibration(data: Columns) -> None:
+    data["vibration_frequency_Hz"] = np.full(4000, 2000.0)
+    data["vibration_amplitude_m"] = np.full(4000, -2e-8)
+
+
+def misspelt(data: Columns) -> None:
+    data["mass_Accel_mps2"] = data.pop("mass_accel_mps2")
+
+
 def half_a_vibration(data: Columns) -> None:
     data["vibration_frequency_Hz"] = np.full(4000, 2000.0)
 
@@ -265,6 +315,8 @@ def slow_accelerometer(data: Columns) -> None:
         (mass_in_mm, "units", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
         (twice_as_fast, "units", "moves at 0.001 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
         (force_the_other_way, "sign", "drive_force_N: pulls against the drive's motion", "drive_force_N", 4000),
+        (wild_force, "wild", "drive_force_N: 2 samples are beyond 5214, first row 501: -9999; these rows", "", 3998),
+        (negative_vibration, "sign", "vibration_amplitude_m: 4000 samples are negative", "", 4000),
         (slow_accelerometer, "rate", "mass_accel_mps2: 2000 Hz, below 8000 Hz: how strongly it vibrates", "", 4000),
     ],
 )
@@ -342,10 +394,11 @@ def test_a_tolerance_of_nothing_is_told(tmp_path: Path) -> None:
 def test_a_channel_map_scales_a_run_log_too(tmp_path: Path) -> None:
     log = tmp_path / "run.mcap"
     log.write_bytes(short_log())
-    plain = read_columns(log, {})
+    plain, damaged = read_columns(log, {})
+    assert damaged == []
     doubled = ChannelMap(column="drive_force_N", scale=2.0, offset=1.0)
     other = ChannelMap(column="a", scale=9.0)  # of the folder's other files
-    scaled = read_columns(log, {"drive_force_N": doubled, "mass_accel_mps2": other})
+    scaled, _ = read_columns(log, {"drive_force_N": doubled, "mass_accel_mps2": other})
     assert (scaled["drive_force_N"] == 2.0 * plain["drive_force_N"] + 1.0).all()
     assert (scaled["mass_accel_mps2"] == plain["mass_accel_mps2"]).all()
 
@@ -379,12 +432,19 @@ def test_every_format_gives_the_same(tmp_path: Path) -> None:
 
 
 def test_a_run_log_is_a_run(tmp_path: Path) -> None:
-    (tmp_path / "manifest.toml").write_text(MANIFEST.replace("run-01.parquet", "run.mcap"))
     (tmp_path / "run.mcap").write_bytes(short_log())
-    (run,) = load_evidence(tmp_path).runs
-    assert len(run.t_s) == 8000
-    assert np.diff(run.t_s) == pytest.approx(5e-5)
-    assert {"drive_force_N", "base_accel_mps2", "vibration_frequency_Hz"} <= run.columns.keys()
+    columns, _ = read_columns(tmp_path / "run.mcap", {})
+    assert len(columns["t_s"]) == 8000
+    assert np.diff(columns["t_s"]) == pytest.approx(5e-5)
+    assert {"drive_force_N", "base_accel_mps2", "vibration_frequency_Hz"} <= columns.keys()
+
+
+def test_what_a_cut_log_has_lost_is_told(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_bytes(short_log()[: len(short_log()) * 2 // 3])
+    columns, (cut,) = read_columns(tmp_path / "run.mcap", {})
+    assert 3000 < len(columns["t_s"]) < 7000
+    assert cut.kind == "cut"
+    assert "log recover" in cut.text
 
 
 def test_the_command_in_force_is_the_one_that_the_rig_had(tmp_path: Path) -> None:
@@ -392,8 +452,7 @@ def test_the_command_in_force_is_the_one_that_the_rig_had(tmp_path: Path) -> Non
         tables["command"]["amplitude_m"] = 1e-9 * (tables["command"]["block"] + 1)
 
     doctored(tmp_path, change, "run.mcap")
-    (tmp_path / "manifest.toml").write_text(MANIFEST.replace("run-01.parquet", "run.mcap"))
-    amplitude_m = load_evidence(tmp_path).runs[0].columns["vibration_amplitude_m"].reshape(400, 20)
+    amplitude_m = read_columns(tmp_path / "run.mcap", {})[0]["vibration_amplitude_m"].reshape(400, 20)
     # in lockstep block n moves under the command that answers block n - 1
     assert amplitude_m[:, 0] == pytest.approx(1e-9 * np.arange(400))
 
@@ -415,3 +474,10 @@ def test_no_folder_and_no_manifest(tmp_path: Path) -> None:
         load_evidence(Path(__file__))
     with pytest.raises(Fault, match=r"manifest.toml: no such file"):
         load_evidence(tmp_path)
+
+
+def test_a_misspelt_column_is_named(tmp_path: Path) -> None:
+    data = columns()
+    misspelt(data)
+    said = [one.text for one in load_evidence(folder(tmp_path, data)).findings if "mass_accel_mps2" in one.where]
+    assert said[0] == 'not there, but mass_Accel_mps2 is: set channels.mass_accel_mps2.column = "mass_Accel_mps2"'

@@ -244,3 +244,36 @@ def test_a_log_tells_what_it_cannot_hold(tmp_path: Path) -> None:
     findings = import_file(source, channel_map, tmp_path / "made.mcap").findings
     told = [one.where for one in findings if "import it into a folder" in one.text]
     assert told == [f"{source.name}: vibration_frequency_Hz", f"{source.name}: vibration_amplitude_m"]
+
+
+CSV = "Zeit;F\n" + "".join(f"{i * 0.5:.1f};{9.5 + 0.01 * (i % 7):.2f}\n" for i in range(4000)).replace(".", ",")
+GERMAN = MAP.replace('column = "time"', 'column = "Zeit"').replace(
+    'mass_accel_mps2 = { column = "acc", scale = 9.80665 }\n', ""
+)
+SOURCE = '[source]\ndelimiter = ";"\ndecimal = ","\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "channel_map", "expected"),
+    [
+        (CSV.replace("9,56", "OVL", 1), SOURCE + GERMAN, "column F: row 7 = 'OVL': must be a number"),
+        (CSV, GERMAN, "line 1: the names are separated by ';', not by ','"),
+        (CSV.replace("F", "F/µm", 1), SOURCE + GERMAN, "line 1: is not utf-8"),
+        (CSV.replace("1,0;9,52", "1,0", 1), SOURCE + GERMAN, "Row #4: Expected 2 columns, got 1"),
+    ],
+    ids=["text", "delimiter", "encoding", "ragged"],
+)
+def test_a_csv_file_of_another_kind_names_place_and_remedy(tmp_path: Path, text: str, channel_map: str, expected: str):
+    (tmp_path / "a.csv").write_text(text, encoding="latin-1")
+    (tmp_path / "map.toml").write_text(channel_map)
+    with pytest.raises(Fault) as caught:
+        import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out")
+    assert expected in caught.value.line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_csv_file_in_another_encoding(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(CSV.replace("F", "F/µN", 1), encoding="latin-1")
+    source = SOURCE + 'encoding = "latin-1"\n'
+    (tmp_path / "map.toml").write_text(source + GERMAN.replace('column = "F"', 'column = "F/µN"'), encoding="utf-8")
+    assert import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out").rows == 4000

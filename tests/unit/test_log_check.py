@@ -162,3 +162,11 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
             assert line in caught.value.line
         for command in ("check", "info", "recover"):
             assert CliRunner().invoke(log_app, [command, str(path)]).exit_code == 7
+
+
+def test_the_verdict_on_a_cut_log_says_what_was_lost(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(short_log()[: len(short_log()) * 2 // 3])
+    told = json.loads(CliRunner().invoke(log_app, ["info", str(path), "--json"]).stdout)
+    assert told["good"] is False
+    assert "bytes of an open chunk were lost" in " ".join(told["faults"])

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from diagnosis.diagnose import estimate_of
 from diagnosis.gap import floor_of, replicates
 from diagnosis.library import trials, wave_trial
 from diagnosis.nuisance import Nuisances
 from diagnosis.phases import has_own_phases, in_run, is_phase, phase_of, without_phases_of
 from diagnosis.problem import Problem
-from diagnosis.refit import Fitter
+from diagnosis.refit import Axis, Fitter
 from diagnosis.result import Estimate
 from diagnosis.twin import Roughness
 from diagnosis.waves import Wave
@@ -90,3 +91,11 @@ def test_a_phase_is_named_with_its_run():
     assert estimate_in_words(phase_of("run-02.csv"), Estimate(1.234, (1.13, 1.33))) == (
         "phase in run-02.csv 1.23 rad (90 %: 1.13 to 1.33)"
     )
+
+
+def test_the_interval_of_a_phase_holds_it_wherever_it_lies():
+    axis = Axis("normal-load-fluctuation", "phase_rad", 1.0, False, 3.0, -math.pi, math.pi)
+    for w, deviation in ((2.75, 0.5), (-3.1, 0.1), (9.0, 0.2), (0.5, 50.0)):
+        value, (low, high) = estimate_of(axis, w, deviation)
+        assert low <= value <= high
+        assert high - low == pytest.approx(min(2 * 1.645 * deviation, 2 * math.pi))
