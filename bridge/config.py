@@ -80,6 +80,8 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
         return f"{source}: {key}: {message}" if path else f"{source}: {message}"
     if kind in {"float_type", "int_type"} and isinstance(problem["input"], str):
         return f"{source}: {key} = {problem['input']!r}: must be a number; write it without quotes"
+    if kind in {"model_type", "dict_type"}:
+        return f"{source}: {key} = {problem['input']!r}: must be a table; write {path[-1] if path else 'it'} = {{ KEY = VALUE }}"
     rule = message[:1].lower() + message[1:]
     rule = rule.replace("input should be", "must be")
     return f"{source}: {key} = {problem['input']!r}: {rule}; change the value"

@@ -7,8 +7,8 @@ import numpy as np
 
 from bridge import stickslip_pb2 as wire
 from bridge.logfile import RunData, read_run
-from diagnosis.logcheck import damage_findings
 from diagnosis.cycles import Cycles, find_cycles
+from diagnosis.logcheck import damage_findings
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
 _ALARM_RATIO = 1.05
