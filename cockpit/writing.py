@@ -10,12 +10,12 @@ from bridge.faults import Fault
 
 def check_writable(option: str, path: Path) -> None:
     """Raise Fault LOG_WRITE where a file, or the nearest folder above it, does not allow it."""
-    above = next(parent for parent in path.absolute().parents if parent.exists())
-    refused = path.exists() and not os.access(path, os.W_OK)
-    if path.is_file() or not path.exists():  # it is written beside itself first
-        refused |= not os.access(above, os.W_OK) or not above.is_dir()
-    if refused:
-        raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {above} does not allow it; choose another")
+    needed = [path] if path.exists() else []
+    if path.is_file() or not needed:  # it is written beside itself first
+        needed.append(next(parent for parent in path.absolute().parents if parent.exists()))
+    for place in needed:
+        if not os.access(place, os.W_OK) or (place != path and not place.is_dir()):
+            raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {place} does not allow it; choose another")
 
 
 @contextmanager

@@ -102,7 +102,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
                 seen.lowest if seen.clipped_low else -math.inf,
                 seen.highest if seen.clipped_high else math.inf,
             )
-    _compare_velocity(usable, rig, table, note, file)
+    _compare_velocity(usable, rig, table, note)
     if (
         rig.drive_stiffness_N_per_m
         and "drive_force_N" in usable
@@ -235,7 +235,7 @@ def _too_far(name: str, values: Floats, t_s: Floats, rig: RigTable, table: RunTa
     return f"travels {travel_m:.3g}: the drive moves by {drive_m:.3g} m in this time, the unit cannot be right"
 
 
-def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: Note, file: str) -> None:
+def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
     if rig.drive == "force":
         return
     stated_mps, measured_mps = table.drive_velocity_mps, None
@@ -253,7 +253,7 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
                 not 1.0 / _ANOTHER < measured_mps / stated_mps < _ANOTHER if stated_mps else abs(travel_m) > reach_m
             )
             if another:
-                raise Fault("BAD_EVIDENCE", f"{file}: drive_position_m: {text}")
+                raise Fault("BAD_EVIDENCE", f"{table.file}: drive_position_m: {text}")
             if abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps) > 0.0:
                 note("units", "drive_position_m", f"{text}; the stated one is used")
     where = "drive_position_m" if stated_mps is None else "drive_velocity_mps"

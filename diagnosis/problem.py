@@ -314,9 +314,9 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     if rig.drive == "spring":
         scales = scales_of(rig)
         commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
-    if commands.motion is not None and moving_s(commands.motion, rig) < _SHORTEST_MOTION_S:
+    if commands.motion is not None and (seconds := moving_s(commands.motion, rig)) < _SHORTEST_MOTION_S:
         line = (
-            f"{run.file}: mass_position_m: moves for {moving_s(commands.motion, rig):.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
+            f"{run.file}: mass_position_m: moves for {seconds:.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
             "least, or there is no friction to compare; leave the run out, or check channels.mass_position_m.scale"
         )
         raise Fault("BAD_EVIDENCE", line)

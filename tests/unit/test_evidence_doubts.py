@@ -1,0 +1,185 @@
+"""Doubts about an evidence folder: every one is a finding, and what is doubtful is not used."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridge.faults import Fault
+from diagnosis.evidence import load_evidence, read_columns
+from tests.evidence_folder import MANIFEST, Columns, columns, folder, kinds
+from tests.logs import short_log
+
+
+def spike_of_nan(data: Columns) -> None:
+    data["mass_accel_mps2"][[7, 9]] = np.nan, np.inf
+
+
+def repeated_time(data: Columns) -> None:
+    data["t_s"][100] = data["t_s"][99]
+
+
+def dead_sensor(data: Columns) -> None:
+    data["mass_accel_mps2"][:] = 0.0
+
+
+def clipped_force(data: Columns) -> None:
+    np.minimum(data["drive_force_N"], 16.0, out=data["drive_force_N"])
+
+
+def accel_in_other_unit(data: Columns) -> None:
+    data["mass_accel_mps2"] *= 1e6
+
+
+def hole_in_time(data: Columns) -> None:
+    data["t_s"][1000:] += 0.15
+
+
+def drive_in_mm(data: Columns) -> None:
+    data["drive_position_m"] *= 1000.0
+
+
+def mass_in_mm(data: Columns) -> None:
+    data["mass_position_m"] = data["drive_position_m"] * 1000.0
+
+
+def twice_as_fast(data: Columns) -> None:
+    data["drive_position_m"] *= 2.0
+
+
+def force_the_other_way(data: Columns) -> None:
+    data["drive_force_N"] *= -1.0
+
+
+def wild_force(data: Columns) -> None:
+    data["drive_force_N"][[500, 700]] = -9999.0
+
+
+def negative_vibration(data: Columns) -> None:
+    data["vibration_frequency_Hz"] = np.full(4000, 2000.0)
+    data["vibration_amplitude_m"] = np.full(4000, -2e-8)
+
+
+def misspelt(data: Columns) -> None:
+    data["mass_Accel_mps2"] = data.pop("mass_accel_mps2")
+
+
+def half_a_vibration(data: Columns) -> None:
+    data["vibration_frequency_Hz"] = np.full(4000, 2000.0)
+
+
+def slow_accelerometer(data: Columns) -> None:
+    half_a_vibration(data)
+    data["vibration_amplitude_m"] = np.full(4000, 2e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "text", "unused", "rows"),
+    [
+        (spike_of_nan, "not-finite", "mass_accel_mps2: 2 samples are no finite number, first row 8", "", 3998),
+        (repeated_time, "time", "t_s: 1 rows are not later than the one before, first row 101", "", 3999),
+        (dead_sensor, "constant", "mass_accel_mps2: is 0 in every row; not used", "mass_accel_mps2", 4000),
+        (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
+        (clipped_force, "clipped", "drive_force_N: ", "", 4000),
+        (hole_in_time, "time-gap", "t_s: 1 gaps in time, first at 0.4995 s: 0.1", "", 4000),
+        (
+            drive_in_mm,
+            "units",
+            "drive_position_m: travels 1: the drive moves by 0.001 m in this time",
+            "drive_position_m",
+            4000,
+        ),
+        (mass_in_mm, "units", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
+        (twice_as_fast, "units", "moves at 0.001 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
+        (force_the_other_way, "sign", "drive_force_N: pulls against the drive's motion", "drive_force_N", 4000),
+        (wild_force, "wild", "drive_force_N: 2 samples are beyond 5214, first row 501: -9999; these rows", "", 3998),
+        (negative_vibration, "sign", "vibration_amplitude_m: 4000 samples are negative", "", 4000),
+        (slow_accelerometer, "rate", "mass_accel_mps2: 2000 Hz, below 8000 Hz: how strongly it vibrates", "", 4000),
+    ],
+)
+def test_doubts_are_told_and_not_used(
+    tmp_path: Path, change: Callable[[Columns], None], kind: str, text: str, unused: str, rows: int
+) -> None:
+    data = columns()
+    change(data)
+    evidence = load_evidence(folder(tmp_path, data))
+    assert text in kinds(evidence)[kind]
+    (run,) = evidence.runs
+    assert unused not in run.columns
+    assert len(run.t_s) == rows
+    assert (np.diff(run.t_s) > 0).all()
+    assert all(np.isfinite(values).all() and len(values) == rows for values in run.columns.values())
+    assert ("drive_force_N" in run.clipped) == (kind == "clipped")
+
+
+def test_only_the_end_that_a_sensor_reached_limits_the_model(tmp_path: Path) -> None:
+    """Rows that are left out before count: the file's own row is told."""
+    data = columns()
+    repeated_time(data)
+    clipped_force(data)
+    evidence = load_evidence(folder(tmp_path, data))
+    assert evidence.runs[0].clipped == {"drive_force_N": (-math.inf, 16.0)}
+    first = int(np.flatnonzero(data["drive_force_N"] == 16.0)[0]) + 1
+    assert first > 101
+    assert f"first row {first};" in kinds(evidence)["clipped"]
+
+
+def test_a_drive_that_goes_back_may_unload_its_spring(tmp_path: Path) -> None:
+    """0.1 mm of a spring that is loaded by 1.3 mm: the force stays as it was, forward."""
+    data = columns()
+    data["drive_position_m"] *= -0.1
+    manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "")
+    assert kinds(load_evidence(folder(tmp_path, data, manifest))) == {}
+
+
+def test_half_a_vibration_is_none_and_told(tmp_path: Path) -> None:
+    data = columns()
+    half_a_vibration(data)
+    findings = load_evidence(folder(tmp_path, data)).findings
+    (told,) = [one for one in findings if "vibration" in one.where]
+    assert told.in_words().split()[:3] == ["missing", "run-01.parquet:", "vibration_frequency_Hz:"]
+
+
+def test_a_speed_without_a_drive_position_may_be_in_mm(tmp_path: Path) -> None:
+    data = columns()
+    del data["drive_position_m"]
+    manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "drive_velocity_mps = 0.5")
+    assert (
+        "0.5 m/s, 1e+03 times rig.stribeck_velocity_mps"
+        in kinds(load_evidence(folder(tmp_path, data, manifest)))["units"]
+    )
+
+
+def test_time_in_ms_is_refused(tmp_path: Path) -> None:
+    """51.2 kHz in ms is a sample every 20 ms, and a slip of this rig lasts 36."""
+    data = columns()
+    data["t_s"] = np.arange(4000) / 51.2
+    with pytest.raises(
+        Fault, match=r"t_s: a sample every 0.0195.* must be 0.0119 s at most.* channels.t_s.scale = 0.001"
+    ):
+        load_evidence(folder(tmp_path, data))
+
+
+def test_a_tolerance_of_nothing_is_told(tmp_path: Path) -> None:
+    manifest = MANIFEST.replace("mass_kg = 0.005", "drive_damping_Ns_per_m = 0.1")
+    assert (
+        "rig.tolerance.drive_damping_Ns_per_m: is relative"
+        in kinds(load_evidence(folder(tmp_path, columns(), manifest)))["tolerance"]
+    )
+
+
+def test_what_a_cut_log_has_lost_is_told(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_bytes(short_log()[: len(short_log()) * 2 // 3])
+    columns, (cut,) = read_columns(tmp_path / "run.mcap", {})
+    assert 3000 < len(columns["t_s"]) < 7000
+    assert cut.kind == "cut"
+    assert "log recover" in cut.text
+
+
+def test_a_misspelt_column_is_named(tmp_path: Path) -> None:
+    data = columns()
+    misspelt(data)
+    said = [one.text for one in load_evidence(folder(tmp_path, data)).findings if "mass_accel_mps2" in one.where]
+    assert said[0] == 'not there, but mass_Accel_mps2 is: set channels.mass_accel_mps2.column = "mass_Accel_mps2"'
