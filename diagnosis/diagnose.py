@@ -45,6 +45,7 @@ from diagnosis.search import (
 )
 from diagnosis.summary import summary
 from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, hidden_by_noise, judge, much_left
+from diagnosis.workers import one_thread
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
@@ -65,8 +66,13 @@ _WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that sho
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
     """Diagnose one evidence. `progress` is told, in words, what is known and the share of the work that is done.
 
-    Raises Fault BAD_EVIDENCE when nothing can be compared.
+    The answer does not depend on `jobs`. Raises Fault BAD_EVIDENCE when nothing can be compared.
     """
+    with one_thread():
+        return _diagnosed(evidence, progress, jobs)
+
+
+def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     began = time.monotonic()
     runs = prepare(evidence)
     fitted = [run for run in runs if not run.holdout]
