@@ -39,9 +39,7 @@ def run(
         bus.announce()
         # in lockstep plant and controller take turns: on one core the wake-up of the other costs a tenth
         granted = realtime.claim(0 if lockstep else 1)
-        if not lockstep:
-            process.event("START", granted)
-        process.loop(stop)
+        process.loop(stop, granted)
 
 
 class _Process:
@@ -69,8 +67,11 @@ class _Process:
         self._events += 1
         self._send[CONTROLLER_EVENT.name](event.SerializeToString())
 
-    def loop(self, stop: threading.Event) -> None:
-        """Consume blocks in order and answer each; the plant takes the newest answer it has."""
+    def loop(self, stop: threading.Event, granted: str) -> None:
+        """Consume blocks in order and answer each; the plant takes the newest answer it has.
+
+        `granted`: the priority of this process, told when the run begins.
+        """
         node = self._node
         heard_s = time.monotonic()
         started = False
@@ -90,8 +91,11 @@ class _Process:
             if stale and received.topic is SENSORS:
                 self.event("FRESH", "blocks arrive again")
                 stale = False
-            started |= received.topic is SENSORS
             self._consume(received)
+            if received.topic is SENSORS and not started:
+                started = True
+                if not self._lockstep:  # not before: the plant waits with its first block until the recorder listens
+                    self.event("START", granted)
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
 
     def _consume(self, received: Received) -> None:

@@ -42,6 +42,31 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     assert set(data.headers) == {"run", "plant", "controller"}
 
 
+def test_a_recorder_that_comes_last_misses_nothing(tmp_path: Path) -> None:
+    log, endpoint = tmp_path / "run.mcap", free_endpoint()
+    roles = {"plant": ["--wait-for", "controller,recorder"], "controller": [], "recorder": ["--log", str(log)]}
+    common = ["--set", "duration_s=2.0", "--endpoint", endpoint]
+    started: list[subprocess.Popen[bytes]] = []
+    try:
+        for role, more in roles.items():
+            started.append(subprocess.Popen([*COMMAND, role, *common, *more], stderr=subprocess.DEVNULL))
+            if role == "controller":
+                with Bus(BusConfig(endpoint=endpoint), "stranger", lockstep=False) as bus:
+                    assert not bus.wait_for({"controller"}, 60.0)
+        for process in started:
+            assert process.wait(60) == 0
+    finally:
+        for process in started:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+    data = read_run(log)
+    assert [(event.source, event.code) for event in data.events if event.code in {"START", "GAP"}] == [
+        ("plant", "START"),
+        ("controller", "START"),
+    ]
+
+
 def test_operator_stop_and_reset(tmp_path: Path) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
     arguments = ["--set", "duration_s=12.0", "--set", "controller.policy.enabled_from_s=0.0"]
