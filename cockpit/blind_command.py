@@ -92,7 +92,12 @@ def blind_run(folder: SetArgument, jobs: Jobs = None) -> None:
 def blind_score(
     folder: SetArgument,
     key: Key,
-    as_json: Annotated[Path | None, typer.Option("--json", help="Write the scores here as JSON.")] = None,
+    as_json: Annotated[
+        Path | None,
+        typer.Option(
+            "--json", help="Write the scores here as JSON, with what is there and what was said of every case."
+        ),
+    ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
     baselines: Annotated[
         bool, typer.Option("--baselines", help="Oracle and tree ensemble too: half a minute a case and core.")
@@ -121,7 +126,9 @@ def blind_score(
         print(table(methods, sealed))
         with writing():
             if as_json is not None:
-                write_json(as_json, {"format": "blind-scores/1", "sealed": sealed, "methods": plain(methods)})
+                rows = [case.row() for case in cases]
+                scores = {"format": "blind-scores/1", "sealed": sealed, "methods": plain(methods), "cases": rows}
+                write_json(as_json, scores)
             if report is not None:
                 write_report(methods, sealed, folder.name, report)
                 print(f"\nreport     {report}")

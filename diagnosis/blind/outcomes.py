@@ -81,6 +81,21 @@ class Opened(NamedTuple):
         together = len(self.named) + len(self.truth)
         return 2.0 * len(self.named & self.truth) / together if together else 1.0
 
+    def row(self) -> dict[str, Any]:
+        """What is there and what was said of it, for `--json`."""
+        keys = ("name", "formula", "detectability")
+        return {
+            "case": self.name,
+            "kind": self.stratum,
+            "effects": [{key: effect.get(key) for key in keys} for effect in self.answer["effects"]],
+            "channels_left_out": self.answer["leave_out"],
+            "verdict": self.verdict,
+            "named": sorted(self.named),
+            "group": sorted(self.group),
+            "first": [{"effect": name, "probability": probability} for name, probability in self.ranked[:3]],
+            "shrinkage": self.said["gap"].get("shrinkage"),
+        }
+
 
 def opened(name: str, answer: dict[str, Any], result: dict[str, Any]) -> Opened:
     """A case with what is in its result file."""

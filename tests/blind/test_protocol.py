@@ -249,7 +249,14 @@ def test_a_set_is_scored_once(done):
     result = score(done, "--json", done / "scores.json", "--report", done / "report.html")
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith(f"{CASES} cases (sealed set, opened once)")
-    assert json.loads((done / "scores.json").read_text())["sealed"] is True
+    scores = json.loads((done / "scores.json").read_text())
+    assert scores["sealed"] is True
+    there = {name: [effect["name"] for effect in answer["effects"]] for name, answer in answers(done).items()}
+    assert {row["case"]: [effect["name"] for effect in row["effects"]] for row in scores["cases"]} == there
+    right = [
+        row["first"][0]["effect"] == there[row["case"]][0] for row in scores["cases"] if row["kind"] == "one-effect"
+    ]
+    assert sum(right) / len(right) == scores["methods"]["diagnosis"]["singles"]["top_1"]["value"]
     page = (done / "report.html").read_text()
     assert "Does 80 % mean 80 %?" in page
     assert "http" not in page
