@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from bridge.config import validate
 from bridge.faults import Fault
+from diagnosis.by_run import as_in_rig_file
 from diagnosis.evidence import Evidence
-from diagnosis.phases import without_phases_of
 from diagnosis.report import write_whole
 from diagnosis.result import Diagnosis
 from diagnosis.wording import headline
@@ -72,7 +72,7 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
     for name in diagnosis.effects:
         candidate = next(one for one in diagnosis.candidates if one.effect == name)
         effects[name] = {"form": candidate.form} if candidate.form else {}
-        effects[name] |= without_phases_of({key: estimate.value for key, estimate in candidate.parameters.items()})
+        effects[name] |= as_in_rig_file({key: estimate.value for key, estimate in candidate.parameters.items()})
     return table | {"effects": effects} if effects else table
 
 

@@ -26,7 +26,8 @@ def entries_of(signals: Signals, commands: Commands, scales: Scales) -> tuple[En
             force_N, _ = _line(cut["drive_force_N"][:_MOST])
             found.append(Entry(segment.first, segment.sign * force_N, None))
         elif segment.slips > 0:
-            found += _stuck(segment, cut, scales)
+            before = {name: segment.sign * values[: segment.first] for name, values in signals.items()}
+            found += _stuck(segment, cut, scales, len(find_slips(before, scales).tops) == 0)
     return tuple(found)
 
 
@@ -36,13 +37,15 @@ def misread(entry: Entry, noise: Noise, random: np.random.Generator) -> Entry:
     return entry._replace(force_N=entry.force_N + error_N)
 
 
-def _stuck(segment: Segment, cut: Signals, scales: Scales) -> list[Entry]:
+def _stuck(segment: Segment, cut: Signals, scales: Scales, never_slipped: bool) -> list[Entry]:
     measured_N = cut["drive_force_N"]
     slips = find_slips(cut, scales)
     blocks = min(_MOST, int(slips.tops[0]) // 2)
     if blocks < _FEWEST:
         return []
     force_N, rate_N = _line(measured_N[:blocks])
+    if never_slipped:
+        return [Entry(segment.first, segment.sign * force_N, segment.first * BLOCK_S, from_before=True)]
     since = (force_N - float(measured_N[slips.bottoms].mean())) / rate_N if rate_N > 0.0 else -1.0
     if since < 0.0:  # in a slip
         return []

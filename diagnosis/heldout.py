@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.by_run import Table
 from diagnosis.gap import Floor, cell_squares, differences, floor_of, replicates, whitened
 from diagnosis.nuisance import Nuisances
-from diagnosis.phases import PHASE, Table, has_own_phases
+from diagnosis.phases import PHASE, has_own_phases
 from diagnosis.problem import Problem
 from diagnosis.random_friction import RANDOM, is_random
 from diagnosis.refit import NOTHING, Fit, Form

@@ -11,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.axis_waves import axis_waves
+from diagnosis.by_run import of_run
 from diagnosis.manifest import RigTable
 from diagnosis.phases import OTHER_PHASE, PHASE
-from diagnosis.problem import Prepared, Problem
+from diagnosis.problem import AGE_BEFORE, AGEING, Prepared, Problem
 from diagnosis.reduced import BLOCK_S
 from diagnosis.refit import Axis, Form
 from diagnosis.ringing import ringing_Hz
+from diagnosis.twin import AGE_BEFORE_S
 from diagnosis.waves import (
     Wave,
     drive_series,
@@ -31,6 +33,7 @@ from plant.effects import EFFECTS
 Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
 _STUCK = (1.05, 1.13)  # own frequency of a base over the one at which it rings with the slide stuck to it
+_AGES, _AGE_LIMITS_S = 1.2, (1e-3, 1e5)  # of the contact when a run begins: from 1 to 100 s are usual
 _AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 
 
@@ -104,10 +107,17 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         starts = [{"corner_Hz": share * highest_Hz} for share in (0.9, 2.0)]
     elif name == "piezo-resonance":
         starts = [{"resonance_Hz": share * highest_Hz} for share in (0.5, 0.75, 0.9, 1.2, 2.0)]
-    return [_trial(name, form, scale, start) for start in starts]
+    of_runs: list[Axis] = []
+    if name == AGEING:
+        of_runs = [
+            Axis(name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, _AGES, *_AGE_LIMITS_S)
+            for run in runs
+            if any(entry.from_before for entry in run.entries)
+        ]
+    return [_trial(name, form, scale, start, of_runs) for start in starts]
 
 
-def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, float]) -> Trial:
+def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, float], of_runs: list[Axis]) -> Trial:
     axes: list[Axis] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name in scale:
@@ -115,6 +125,7 @@ def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, floa
             size = start.get(row.name, unit.scale)
             axes.append(Axis(name, row.name, size, unit.logarithmic, unit.prior, row.low, row.high))
     # a coordinate that may have either sign starts at half a unit; one that stays positive at its scale
+    axes += of_runs
     w = np.array([0.0 if axis.logarithmic else 0.5 for axis in axes])
     return Trial(Form({name: form}, tuple(axes)), w)
 
@@ -170,15 +181,19 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
     length_s = max(len(run.commands.drive) for run in runs) * BLOCK_S
     # wide, so that the rig's number of the same name, which holds a part of it, goes back to where it was
     level = {"ratio": _Scale(0.1, False, 3.0)}
+    rested = {"rested_s": _Scale(0.3, True, 1.5)}
     wave = {"ratio": _Scale(0.02, True, 1.5), "phase_rad": _Scale(1.0, False, 3.0)}
     mode = {"resonance_Hz": _Scale(1.0, True, 0.7), "damping_ratio": _Scale(0.05, True, 0.7)}
     table: dict[tuple[str, str], dict[str, _Scale]] = {
-        ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)},
-        ("static-friction-ageing", "power"): {"ratio": _Scale(0.04, True, 1.5), "exponent": _Scale(0.3, True, 0.5)},
+        ("static-friction-ageing", "log"): {"ratio": _Scale(0.02, True, 1.5), "age_scale_s": _Scale(0.1, True, 1.5)}
+        | rested,
+        ("static-friction-ageing", "power"): {"ratio": _Scale(0.04, True, 1.5), "exponent": _Scale(0.3, True, 0.5)}
+        | rested,
         ("static-friction-ageing", "settling"): {
             "ratio": _Scale(0.05, True, 1.5),
             "settling_s": _Scale(0.5, True, 1.0),
-        },
+        }
+        | rested,
         ("frictional-lag", "time"): {"lag_s": _Scale(0.06 * slip_s, True, 1.5)},
         ("frictional-lag", "dead-time"): {
             "delay_s": _Scale(0.03 * slip_s, True, 1.5),

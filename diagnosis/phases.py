@@ -5,41 +5,36 @@ in a run that was kept aside nobody knows: there a draw has any, and a predictio
 """
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from zlib import crc32
 
 import numpy as np
 
+from diagnosis.by_run import Table, as_in_rig_file, is_of_run, of_run
+
 PHASE = "phase_rad"
 OTHER_PHASE = "other_phase_rad"  # of a second wave
-_OF = f"{PHASE} of "
-Table = Mapping[str, float | str]
 
 
 def phase_of(file: str) -> str:
     """The name of the phase in one of the runs after the first."""
-    return _OF + file
+    return of_run(PHASE, file)
 
 
 def is_phase(name: str) -> bool:
     """Whether a parameter is a phase, in whichever run."""
-    return name in {PHASE, OTHER_PHASE} or name.startswith(_OF)
+    return name in {PHASE, OTHER_PHASE} or is_of_run(name, PHASE)
 
 
 def has_own_phases(table: Collection[str]) -> bool:
     """Whether an effect begins in another phase in every run."""
-    return any(name.startswith(_OF) for name in table)
-
-
-def without_phases_of(table: Table) -> dict[str, float | str]:
-    """The effect as it is in the first run, which is how a rig file has it."""
-    return {name: value for name, value in table.items() if not name.startswith(_OF)}
+    return any(is_of_run(name, PHASE) for name in table)
 
 
 def in_run(table: Table, file: str, kept_aside: bool, seed: int | None) -> dict[str, float | str] | None:
     """An effect as it is in one run, with a drawn phase where there is a seed and no phase is known; None: its mean."""
-    plain = without_phases_of(table)
-    if len(plain) == len(table):
+    plain = as_in_rig_file(table)
+    if not has_own_phases(table):
         return plain
     if not kept_aside:
         return plain | {PHASE: table.get(phase_of(file), plain[PHASE])}

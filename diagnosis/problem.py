@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from bridge.faults import Fault
 from diagnosis.axis_drive import relative, true_commands
 from diagnosis.axis_features import axis_features, moving_s
+from diagnosis.by_run import of_run
 from diagnosis.commands import Commands, commands_of
 from diagnosis.entries import entries_of, misread
 from diagnosis.evidence import Evidence, Run
@@ -27,6 +28,7 @@ from plant.config import RigConfig
 from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
+AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # how old the contact was when a run began
 _PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
 # of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
 _SCALE_SPREAD = 0.004
@@ -225,12 +227,20 @@ def _truly(reading_N: float, effects: Effects, t_s: float) -> float:
 
 def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
     start = run.start._replace(force_N=_truly(run.start.force_N, point.effects, 0.0))
+    age_s = point.effects.get(AGEING, {}).get(of_run(AGE_BEFORE, run.file))
+    if age_s is not None:
+        start = start._replace(age_s=float(age_s))
+    if draw is not None:
+        start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
     entries = tuple(
-        entry._replace(force_N=_truly(entry.force_N, point.effects, entry.block * BLOCK_S)) for entry in run.entries
+        entry._replace(
+            force_N=_truly(entry.force_N, point.effects, entry.block * BLOCK_S),
+            age_s=entry.age_s + start.age_s if entry.from_before and entry.age_s is not None else entry.age_s,
+        )
+        for entry in run.entries
     )
     chain = point.chain
     if draw is not None:
-        start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
         chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
         entries = tuple(misread(entry, run.noise, draw.random) for entry in entries)
     return _Asked(point, draw, _moving(run, point.effects, draw), start, entries, chain)
@@ -266,7 +276,7 @@ def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
 def _key(run: Prepared, one: _Asked, inputs: object) -> object:
     """What decides how a run of the model goes of which nothing is drawn."""
     rig = _hashable({"rig": one.point.values})
-    return run.file, one.start.force_N, one.entries, inputs, rig, _hashable(one.effects)
+    return run.file, one.start.force_N, one.start.age_s, one.entries, inputs, rig, _hashable(one.effects)
 
 
 def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:

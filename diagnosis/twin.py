@@ -29,6 +29,7 @@ from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
 Effects = dict[str, dict[str, float | str]]
+AGE_BEFORE_S = 10.0  # of a contact when a run begins, where nothing is known of it
 _COARSEST_STEP_S = 7e-5
 _STEPS_PER_PERIOD = 16
 _CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiffness
@@ -45,7 +46,7 @@ class Start(NamedTuple):
     force_N: float  # in the drive, spring-driven; in the contact otherwise
     position_m: float
     velocity_mps: float = 0.0
-    age_s: float = 10.0
+    age_s: float = AGE_BEFORE_S
     drive_m: float | None = None  # as the drive's own sensor has it, whose zero is not that of the slide's
 
 
@@ -55,6 +56,7 @@ class Entry(NamedTuple):
     block: int
     force_N: float  # in the drive's spring
     age_s: float | None  # of the contact, where the slide sticks; None: it slides on
+    from_before: bool = False  # it has stuck since before the run began: the age at the start comes on top
 
 
 class Rig(NamedTuple):

@@ -99,12 +99,12 @@ def late_mps(p: Record, s: Record, t_s: float, speed_mps: float) -> float:
 
 @kernel
 def ageing_N(p: Record, age_s: float) -> float:
-    """How much the static friction has grown at this age of the contact."""
+    """By how much the static friction at this age of the contact is above F_s."""
     if p.age_exponent > 0.0:
-        return p.age_growth_N * age_s**p.age_exponent
+        return p.age_growth_N * age_s**p.age_exponent - p.age_rested_N
     if p.age_settling_s > 0.0:
-        return p.age_growth_N * (1.0 - math.exp(-age_s / p.age_settling_s))
-    return p.age_growth_N * math.log(1.0 + age_s / p.age_scale_s)
+        return p.age_growth_N * (1.0 - math.exp(-age_s / p.age_settling_s)) - p.age_rested_N
+    return p.age_growth_N * math.log(1.0 + age_s / p.age_scale_s) - p.age_rested_N
 
 
 @kernel

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from bridge.kernel import record
 from plant.config import RigConfig
-from plant.disturb import LAG_CELL_S
+from plant.disturb import LAG_CELL_S, ageing_N
 from plant.effects import LONGEST_DELAY, LONGEST_LAG_S
 
 # Rows of the array that a block fills, one column a sample. The first five are the sensors of the rig, in the order of
@@ -35,7 +35,7 @@ PARAMS = np.dtype(
             *("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"),
             *("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"),
             # the effects of `plant.effects`, all 0 in the nominal rig
-            *("age_growth_N", "age_scale_s", "age_exponent", "age_settling_s", "age_length_m"),
+            *("age_growth_N", "age_scale_s", "age_exponent", "age_settling_s", "age_length_m", "age_rested_N"),
             *("lag_s", "lag_dead_s", "lag_distance_m", "late_share"),
             "quadratic_Ns2_per_m2",
             *("position_ratio", "position_wavelength_m", "position_phase_rad", "position_sin_2", "position_cos_2"),
@@ -173,6 +173,7 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.age_growth_N = value["ratio"] * p.F_s
         p.age_scale_s, p.age_exponent = value.get("age_scale_s", 1.0), value.get("exponent", 0.0)
         p.age_settling_s = value.get("settling_s", 0.0)
+        p.age_rested_N = ageing_N(p, value.get("rested_s", 0.0))
     elif name == "frictional-lag":
         p.lag_s, p.lag_dead_s = value.get("lag_s", 0.0), value.get("delay_s", 0.0)
         p.lag_distance_m = value.get("distance_m", 0.0)
