@@ -61,6 +61,12 @@ def test_breakaway_after_a_rest_is_that_of_the_bristle_and_the_age(ageing):
 
 
 @pytest.mark.parametrize("ageing", FORMS, ids=lambda ageing: ageing["form"])
+def test_the_static_friction_can_be_that_of_a_rested_contact(ageing):
+    from_new, from_rested = (pulled_after(0.5, ageing | {"rested_s": rested_s})[1].max() for rested_s in (0.0, 0.2))
+    assert from_new - from_rested == pytest.approx(growth_N(ageing, 0.2), rel=0.03)
+
+
+@pytest.mark.parametrize("ageing", FORMS, ids=lambda ageing: ageing["form"])
 def test_breakaway_grows_with_the_rest_as_the_formula(ageing):
     """The bristle's own reach takes a share of the age that is the same after every rest."""
     rests_s = (0.15, 0.3, 0.6) if ageing["form"] == "settling" else (0.3, 1.0, 3.0)

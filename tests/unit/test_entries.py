@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from diagnosis.by_run import is_of_run, of_run
+from diagnosis.library import trials
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
+from diagnosis.reduced import BLOCK_S
 from tests.prepared import prepared
 
 
@@ -30,6 +33,31 @@ def test_entries_are_sticks_and_even_sliding(ladder):
         assert entry.force_N == pytest.approx(read_N, abs=0.1)
         if entry.age_s is not None:
             assert 0.0 < entry.age_s < 2.0
+
+
+def test_a_contact_that_no_slip_has_renewed_is_as_old_as_it_was_before(ladder):
+    evidence, runs = ladder
+    begun = [entry for run in runs for entry in run.entries if entry.from_before]
+    run = shaken_run(runs)
+    assert begun == [run.entries[0]]
+    problem, nuisances = Problem(evidence.rig, runs), Nuisances(evidence.rig)
+    first, *_ = run.commands.segments
+    ageing = {"form": "log", "ratio": 0.02, "age_scale_s": 0.1}
+
+    def breakaway(age_before_s, file=run.file):
+        table = ageing | {of_run("age_before_s", file): age_before_s}
+        point = nuisances.point(np.zeros(len(nuisances)), {"static-friction-ageing": table})
+        force_N = problem.signals(run, point)["drive_force_N"][: first.last]
+        return float(force_N.max()), float(force_N.argmax()) * BLOCK_S
+
+    (young_N, young_s), (old_N, old_s) = breakaway(1.0), breakaway(10.0)
+    grown_N = ageing["ratio"] * evidence.rig.static_force_N * np.log((10.1 + old_s) / (1.1 + young_s))
+    assert old_N - young_N == pytest.approx(grown_N, rel=0.03)
+    assert breakaway(1.0, file="another") == (old_N, old_s)
+    axes = [trial.form.axes for trial in trials(problem) if "static-friction-ageing" in trial.form.forms]
+    assert {axis.name for of_form in axes for axis in of_form if is_of_run(axis.name)} == {
+        of_run("age_before_s", run.file)
+    }
 
 
 @pytest.mark.parametrize(

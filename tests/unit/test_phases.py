@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from diagnosis.by_run import as_in_rig_file
 from diagnosis.diagnose import estimate_of
 from diagnosis.gap import floor_of, replicates
 from diagnosis.library import trials, wave_trial
 from diagnosis.nuisance import Nuisances
-from diagnosis.phases import has_own_phases, in_run, is_phase, phase_of, without_phases_of
+from diagnosis.phases import has_own_phases, in_run, is_phase, phase_of
 from diagnosis.problem import Problem
 from diagnosis.refit import Axis, Fitter
 from diagnosis.result import Estimate
@@ -64,7 +65,7 @@ def test_a_refit_finds_both_phases(problem):
     assert table["ratio"] == pytest.approx(0.06, rel=0.1)
     later = float(table[phase_of(problem.runs[1].file)]) - float(table["phase_rad"])
     assert math.remainder(later - LATER, 2.0 * math.pi) == pytest.approx(0.0, abs=0.25)
-    one_phase = fitter.predicted(fit.deviations, {"normal-load-fluctuation": without_phases_of(table)})
+    one_phase = fitter.predicted(fit.deviations, {"normal-load-fluctuation": as_in_rig_file(table)})
     assert np.sum(fitter.whitened(one_phase)[0] ** 2) > 3.0 * fit.chi2
 
 
@@ -83,7 +84,7 @@ def test_every_run_has_its_own_phase_and_nobody_knows_that_of_one_kept_aside():
 
 
 def test_a_rig_file_has_the_phase_of_the_first_run():
-    assert without_phases_of(TABLE) == LOAD | {"phase_rad": 0.4}
+    assert as_in_rig_file(TABLE) == LOAD | {"phase_rad": 0.4}
     assert [is_phase(name) for name in ("phase_rad", phase_of("a.csv"), "frequency_Hz")] == [True, True, False]
 
 
