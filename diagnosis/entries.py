@@ -20,14 +20,23 @@ def entries_of(signals: Signals, commands: Commands, scales: Scales) -> tuple[En
     if "drive_force_N" not in signals:
         return ()
     found: list[Entry] = []
-    for segment in commands.segments:
-        cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
+    slid_at: int | None = None  # when the contact was last made new, as far as the run shows
+    before = 0
+    # a slip is seen once the force has risen again, which may be when the next segment has begun
+    ends = [segment.first for segment in commands.segments[1:]] + [len(commands.drive)]
+    for segment, end in zip(commands.segments, ends, strict=True):
+        around = {name: segment.sign * values[before:end] for name, values in signals.items()}
+        renewed = before + find_slips(around, scales).bottoms
+        slid_at = _last(renewed[renewed <= segment.first], slid_at)
         if segment.still:
-            force_N, _ = _line(cut["drive_force_N"][:_MOST])
+            force_N, _ = _line(segment.sign * signals["drive_force_N"][segment.first :][:_MOST])
             found.append(Entry(segment.first, segment.sign * force_N, None))
+            slid_at = segment.last
         elif segment.slips > 0:
-            before = {name: segment.sign * values[: segment.first] for name, values in signals.items()}
-            found += _stuck(segment, cut, scales, len(find_slips(before, scales).tops) == 0)
+            cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
+            found += _stuck(segment, cut, scales, slid_at)
+            slid_at = _last(renewed, slid_at)
+        before = segment.last
     return tuple(found)
 
 
@@ -37,19 +46,22 @@ def misread(entry: Entry, noise: Noise, random: np.random.Generator) -> Entry:
     return entry._replace(force_N=entry.force_N + error_N)
 
 
-def _stuck(segment: Segment, cut: Signals, scales: Scales, never_slipped: bool) -> list[Entry]:
+def _last(blocks: npt.NDArray[np.int64], before: int | None) -> int | None:
+    return int(blocks[-1]) if len(blocks) else before
+
+
+def _stuck(segment: Segment, cut: Signals, scales: Scales, slid_at: int | None) -> list[Entry]:
     measured_N = cut["drive_force_N"]
     slips = find_slips(cut, scales)
     blocks = min(_MOST, int(slips.tops[0]) // 2)
     if blocks < _FEWEST:
         return []
     force_N, rate_N = _line(measured_N[:blocks])
-    if never_slipped:
-        return [Entry(segment.first, segment.sign * force_N, segment.first * BLOCK_S, from_before=True)]
-    since = (force_N - float(measured_N[slips.bottoms].mean())) / rate_N if rate_N > 0.0 else -1.0
-    if since < 0.0:  # in a slip
+    in_a_slip = rate_N <= 0.0 or force_N < float(measured_N[slips.bottoms].mean())
+    if in_a_slip and slid_at is not None:
         return []
-    return [Entry(segment.first, segment.sign * force_N, since * BLOCK_S)]
+    age_s = (segment.first - (slid_at or 0)) * BLOCK_S
+    return [Entry(segment.first, segment.sign * force_N, age_s, from_before=slid_at is None)]
 
 
 def _line(values: Floats) -> tuple[float, float]:

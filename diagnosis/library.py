@@ -18,7 +18,7 @@ from diagnosis.problem import AGE_BEFORE, AGEING, Prepared, Problem
 from diagnosis.reduced import BLOCK_S
 from diagnosis.refit import Axis, Form
 from diagnosis.ringing import ringing_Hz
-from diagnosis.twin import AGE_BEFORE_S
+from diagnosis.twin import AGE_BEFORE_S, AGE_SPREAD
 from diagnosis.waves import (
     Wave,
     drive_series,
@@ -33,7 +33,7 @@ from plant.effects import EFFECTS
 Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
 _STUCK = (1.05, 1.13)  # own frequency of a base over the one at which it rings with the slide stuck to it
-_AGES, _AGE_LIMITS_S = 1.2, (1e-3, 1e5)  # of the contact when a run begins: from 1 to 100 s are usual
+_AGE_LIMITS_S = (1e-3, 1e5)
 _AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 
 
@@ -110,7 +110,7 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
     of_runs: list[Axis] = []
     if name == AGEING:
         of_runs = [
-            Axis(name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, _AGES, *_AGE_LIMITS_S)
+            Axis(name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, AGE_SPREAD, *_AGE_LIMITS_S)
             for run in runs
             if any(entry.from_before for entry in run.entries)
         ]

@@ -23,7 +23,7 @@ from diagnosis.noise import Noise, noise_of
 from diagnosis.phases import in_run
 from diagnosis.reduced import BLOCK_S, SHAKEN, reduce_run, without_vibration
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
-from diagnosis.twin import Effects, Entry, Roughness, Start, predict, predict_many, rig_config
+from diagnosis.twin import AGE_BEFORE_S, AGE_SPREAD, Effects, Entry, Roughness, Start, predict, predict_many, rig_config
 from plant.config import RigConfig
 from plant.effects import EFFECTS
 
@@ -231,7 +231,7 @@ def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
     if age_s is not None:
         start = start._replace(age_s=float(age_s))
     if draw is not None:
-        start = start._replace(age_s=float(draw.random.uniform(1.0, 30.0)))
+        start = start._replace(age_s=AGE_BEFORE_S * math.exp(AGE_SPREAD * float(draw.random.normal())))
     entries = tuple(
         entry._replace(
             force_N=_truly(entry.force_N, point.effects, entry.block * BLOCK_S),

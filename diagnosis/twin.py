@@ -29,7 +29,8 @@ from plant.records import CHANNELS, TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
 Effects = dict[str, dict[str, float | str]]
-AGE_BEFORE_S = 10.0  # of a contact when a run begins, where nothing is known of it
+# How old a contact is when a run begins, and the spread of its logarithm: from a stick that was under way to a quarter of an hour
+AGE_BEFORE_S, AGE_SPREAD = 10.0, 1.5
 _COARSEST_STEP_S = 7e-5
 _STEPS_PER_PERIOD = 16
 _CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiffness
