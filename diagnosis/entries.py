@@ -1,5 +1,6 @@
 """The measured force with which every segment begins, for the model to begin with as well (`diagnosis.twin` says why)."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,23 +21,14 @@ def entries_of(signals: Signals, commands: Commands, scales: Scales) -> tuple[En
     if "drive_force_N" not in signals:
         return ()
     found: list[Entry] = []
-    slid_at: int | None = None  # when the contact was last made new, as far as the run shows
-    before = 0
-    # a slip is seen once the force has risen again, which may be when the next segment has begun
-    ends = [segment.first for segment in commands.segments[1:]] + [len(commands.drive)]
-    for segment, end in zip(commands.segments, ends, strict=True):
-        around = {name: segment.sign * values[before:end] for name, values in signals.items()}
-        renewed = before + find_slips(around, scales).bottoms
-        slid_at = _last(renewed[renewed <= segment.first], slid_at)
+    renewed = _renewed(signals, commands, scales)
+    for segment in commands.segments:
+        cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
         if segment.still:
-            force_N, _ = _line(segment.sign * signals["drive_force_N"][segment.first :][:_MOST])
+            force_N, _ = _line(cut["drive_force_N"][:_MOST])
             found.append(Entry(segment.first, segment.sign * force_N, None))
-            slid_at = segment.last
         elif segment.slips > 0:
-            cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
-            found += _stuck(segment, cut, scales, slid_at)
-            slid_at = _last(renewed, slid_at)
-        before = segment.last
+            found += _stuck(segment, cut, scales, renewed[renewed <= segment.first])
     return tuple(found)
 
 
@@ -46,22 +38,29 @@ def misread(entry: Entry, noise: Noise, random: np.random.Generator) -> Entry:
     return entry._replace(force_N=entry.force_N + error_N)
 
 
-def _last(blocks: npt.NDArray[np.int64], before: int | None) -> int | None:
-    return int(blocks[-1]) if len(blocks) else before
+def _renewed(signals: Signals, commands: Commands, scales: Scales) -> npt.NDArray[np.int64]:
+    """The blocks at which the contact was new: where slips and even sliding ended."""
+    slid = [segment.last for segment in commands.segments if segment.still]
+    sign = np.sign(commands.drive)
+    turns = [0, *(np.flatnonzero(np.diff(sign)) + 1).tolist(), len(sign)]
+    for first, last in pairwise(turns):
+        slips = find_slips({name: sign[first] * values[first:last] for name, values in signals.items()}, scales)
+        slid += (first + slips.bottoms).tolist()
+    return np.array(sorted(slid), np.int64)
 
 
-def _stuck(segment: Segment, cut: Signals, scales: Scales, slid_at: int | None) -> list[Entry]:
+def _stuck(segment: Segment, cut: Signals, scales: Scales, renewed: npt.NDArray[np.int64]) -> list[Entry]:
     measured_N = cut["drive_force_N"]
     slips = find_slips(cut, scales)
     blocks = min(_MOST, int(slips.tops[0]) // 2)
     if blocks < _FEWEST:
         return []
     force_N, rate_N = _line(measured_N[:blocks])
-    in_a_slip = rate_N <= 0.0 or force_N < float(measured_N[slips.bottoms].mean())
-    if in_a_slip and slid_at is not None:
+    if len(renewed) == 0:
+        return [Entry(segment.first, segment.sign * force_N, segment.first * BLOCK_S, from_before=True)]
+    if rate_N <= 0.0 or force_N < float(measured_N[slips.bottoms].mean()):  # in a slip
         return []
-    age_s = (segment.first - (slid_at or 0)) * BLOCK_S
-    return [Entry(segment.first, segment.sign * force_N, age_s, from_before=slid_at is None)]
+    return [Entry(segment.first, segment.sign * force_N, (segment.first - int(renewed[-1])) * BLOCK_S)]
 
 
 def _line(values: Floats) -> tuple[float, float]:

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from diagnosis.by_run import is_of_run, of_run
+from diagnosis.commands import Commands, Segment
+from diagnosis.entries import entries_of
 from diagnosis.library import trials
 from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Problem
+from diagnosis.problem import Problem, scales_of
 from diagnosis.reduced import BLOCK_S
 from tests.prepared import prepared
 
@@ -58,6 +60,26 @@ def test_a_contact_that_no_slip_has_renewed_is_as_old_as_it_was_before(ladder):
     assert {axis.name for of_form in axes for axis in of_form if is_of_run(axis.name)} == {
         of_run("age_before_s", run.file)
     }
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_age_counts_from_the_last_slip_under_whichever_drive(ladder, sign):
+    """At 5 mm/s slips end at 180, 380, ...; at 0.5 mm/s from 1000 on the same climb takes ten times as long."""
+    evidence, _ = ladder
+    rows = np.arange(6000)
+    tops = np.arange(150, 1000, 200)
+    at = [0, *np.stack([tops, tops + 30], axis=1).ravel(), 2700, 2730, 4400, 4430, 6000]
+    force_N = sign * np.interp(rows, at, [13.0, *[17.0, 11.0] * 7, 17.0])
+    drive = np.where(rows < 1000, sign * 5e-3, sign * 5e-4)
+    segments = (
+        Segment(400, 1000, sign * 5e-3, 0.0, 0.0, slips=3),
+        Segment(1100, 6000, sign * 5e-4, 0.0, 0.0, slips=1),
+    )
+    commands = Commands(drive, np.zeros(6000), np.zeros(6000), segments)
+    first, second = entries_of({"drive_force_N": force_N}, commands, scales_of(evidence.rig))
+    assert (first.age_s, second.age_s) == pytest.approx((0.02, 0.12))
+    assert not first.from_before
+    assert not second.from_before
 
 
 @pytest.mark.parametrize(
