@@ -29,7 +29,7 @@ _WORTH_A_STEP = 0.5  # of chi2
 _SHARES = (1.0, 0.3, 0.1)  # of a step; a static friction stayed at chi2 235 without the last, and went to 158 with it
 # Effects that change a number of the rig table alone: it and the effect are one direction. With a derivative of its own for each,
 # the number stayed at its bound and the effect at 3 of 10 %: chi2 196, where 133 was to be had, and another effect was named.
-_LEVELS = {
+LEVELS = {
     "coulomb-level": "coulomb_force_N",
     "static-level": "static_force_N",
     "stribeck-velocity": "stribeck_velocity_mps",
@@ -335,7 +335,7 @@ class Fitter:
         """The nuisances' derivatives, of a number that an effect changes that of the effect."""
         rates = nuisance_rates.copy()
         for column, axis, w in zip(axis_rates.T, form.axes, now[len(self.nuisances) :].tolist(), strict=True):
-            name = _LEVELS.get(axis.effect)
+            name = LEVELS.get(axis.effect)
             if name in self.nuisances.rig_names:
                 i = self.nuisances.rig_names.index(name)
                 growth = self.nuisances.growth(name, float(now[i]))

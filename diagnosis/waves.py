@@ -48,9 +48,9 @@ class Series(NamedTuple):
     run: str = ""  # file
 
 
-def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int) -> list[Wave]:
+def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, harmonics: int = 1) -> list[Wave]:
     """The strongest waves of the friction over `position` [m] or `time` [s], two in each of `most` ranges of periods."""
-    return _strongest(friction_series(runs, scales, over), most)
+    return _strongest(friction_series(runs, scales, over), most, harmonics)
 
 
 def two_friction_waves(runs: list[Prepared], scales: Scales, most: int) -> list[tuple[Wave, Wave]]:
