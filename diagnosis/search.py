@@ -6,6 +6,7 @@ away, into a valley of its own. What survives is refitted, and only the refit co
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any, NamedTuple, TypeVar
@@ -24,6 +25,7 @@ Floats = npt.NDArray[np.floating[Any]]
 Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
 _QUICK = 8  # trials of a screening that get two steps of a refit,
 _QUICK_AT_LEAST = 4  # these whatever they promise,
+_QUICK_OF_FORM = 4  # but no more of one form: a track has some thirty starts
 _PROMISING = 5.0  # the others if they would take this much of chi2
 _PROMISING_MUCH = 40.0
 _FULL = 3  # single effects that are refitted to the end,
@@ -146,7 +148,7 @@ def refitted(fitter: Fitter, origins: list[Origin], found: list[list[Screened]],
     starts: list[Screened] = []
     promising: list[Screened] = []
     for (base, _), trials in zip(origins, found, strict=True):
-        first = trials[:_QUICK]
+        first = _first(trials)
         promising += _promising_waves(first, base.chi2)
         starts += [one for i, one in enumerate(first) if i < _QUICK_AT_LEAST or one.chi2 < base.chi2 - _PROMISING]
     if len(origins) > 1:
@@ -164,7 +166,7 @@ def refitted_rest(
     Screening sent a roll-off of 9 kHz to 23, from where it came to 310; from 4 kHz, where it was to be tried, to 77. A wave
     begins where the data have it, or nowhere.
     """
-    seen = best_of_each(found[-1][:_QUICK], by_form=True)
+    seen = best_of_each(_first(found[-1]), by_form=True)
     passed_over = best_of_each(found[-1], by_form=True)[len(seen) :]
     fits = _refitted(fitter, origins[0].fit.chi2, passed_over, [], jobs, _FULL)
     described = origins[-1].fit.deviations
@@ -208,7 +210,7 @@ def pairs_of_effects(
         firsts = [one for one in singles[:_PAIRED] if base.chi2 - one.chi2 > _WORTH_PAIRING * (base.chi2 - best)]
     starts: list[Screened] = []
     for first in firsts:
-        starts += _beside(fitter, first, trials, jobs)[:_QUICK]
+        starts += _first(_beside(fitter, first, trials, jobs))
     worth = sorted((one for one in starts if one.chi2 < best - _LEAST_OF_SECOND), key=lambda one: one.chi2)
     return _refitted(fitter, best, worth[:_QUICK], _promising_waves(worth, best), jobs, _FULL_PAIRS)
 
@@ -245,6 +247,18 @@ def _of_any_size(origins: list[Origin], screened: list[Screened]) -> list[Screen
         first, *others = [(origin.fit.deviations, np.array([size])) for origin in origins for size in _SIZES]
         found.append(Screened(one.form, *first, math.inf, tuple(others)))
     return found
+
+
+def _first(screened: list[Screened]) -> list[Screened]:
+    """The most promising, of no form more than a few."""
+    of_form: Counter[str] = Counter()
+    found: list[Screened] = []
+    for one in screened:
+        key = str(one.form.forms)
+        of_form[key] += 1
+        if of_form[key] <= _QUICK_OF_FORM:
+            found.append(one)
+    return found[:_QUICK]
 
 
 def _levels(described: Fit, screened: list[Screened]) -> list[Screened]:

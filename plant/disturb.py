@@ -65,7 +65,11 @@ def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos
     if p.position_ratio != 0.0:
         if p.position_seed < 0.0:
             angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
-            along = wave(angle_rad, p.position_sin_2, p.position_cos_2)
+            if p.position_width > 0.0:
+                apart = angle_rad / TWO_PI - math.floor(angle_rad / TWO_PI + 0.5)
+                along = math.exp(-0.5 * (apart / p.position_width) ** 2)
+            else:
+                along = wave(angle_rad, p.position_sin_2, p.position_cos_2)
             if p.position_other_share != 0.0:
                 other_rad = TWO_PI * x / p.position_other_wavelength_m + p.position_other_phase_rad
                 along += p.position_other_share * math.sin(other_rad)

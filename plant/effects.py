@@ -119,6 +119,14 @@ EFFECTS: Final[dict[str, Effect]] = {
                     Parameter("other_phase_rad", -_TAU, _TAU, 0.0),
                 ),
             ),
+            "bumps": Form(
+                "friction times 1 + ratio exp(-(d / width)^2 / 2), d of wavelength_m from the nearest of the places where "
+                "2 pi x / wavelength_m + phase is a whole turn",
+                (
+                    *(_ratio(0.05, -0.9, 0.9), Parameter("wavelength_m", 1e-5, 1.0, 4e-3), _SHAPE[0]),
+                    Parameter("width", 0.01, 0.5, 0.1),
+                ),
+            ),
             "random": Form(
                 "friction times 1 + ratio n(x), n smooth noise of unit rms, a new value every wavelength_m / 2",
                 (_ratio(0.03, 0.0, 0.9), Parameter("wavelength_m", 1e-5, 1.0, 4e-3), Parameter("seed", 0, 1e6, 0)),

@@ -40,6 +40,7 @@ PARAMS = np.dtype(
             "quadratic_Ns2_per_m2",
             *("position_ratio", "position_wavelength_m", "position_phase_rad", "position_sin_2", "position_cos_2"),
             *("position_other_share", "position_other_wavelength_m", "position_other_phase_rad", "position_seed"),
+            "position_width",
             *("forward_ratio", "backward_ratio", "kinetic_backward_ratio"),
             *("load_ratio", "load_frequency_Hz", "load_phase_rad", "load_sin_2", "load_cos_2", "load_seed"),
             *("drift_per_s", "drift_ratio", "drift_settling_s", "drift_before_s"),
@@ -184,6 +185,7 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
     elif name == "position-dependent-friction":
         p.position_ratio, p.position_wavelength_m = value["ratio"], value["wavelength_m"]
         p.position_phase_rad, p.position_sin_2, p.position_cos_2 = (value.get(key, 0.0) for key in _WAVE_SHAPE)
+        p.position_width = value.get("width", 0.0)
         p.position_other_share = value.get("other_share", 0.0)
         p.position_other_wavelength_m = value.get("other_wavelength_m", 0.0)
         p.position_other_phase_rad = value.get("other_phase_rad", 0.0)

@@ -55,6 +55,11 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
             log={"wavelength_m": (1.5e-3, 5e-3), "other_wavelength_m": (5e-4, 1.5e-3)},
             even={"phase_rad": TURN, "other_share": (0.4, 1.0), "other_phase_rad": TURN},
         ),
+        Sizes(
+            *("bumps", "ratio", 0.008, 0.16, BOTH_SIGNS),
+            log={"wavelength_m": (1e-3, 5e-3)},
+            even={"phase_rad": TURN, "width": (0.06, 0.2)},
+        ),
         Sizes("random", "ratio", 0.004, 0.08, log={"wavelength_m": (5e-4, 5e-3)}, even={"seed": (1.0, 1e5)}),
     ),
     "direction-dependent-friction": (

@@ -48,6 +48,16 @@ def test_friction_along_the_track_may_be_two_waves():
     assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 + 0.1 * wave), rel=6e-4)
 
 
+def test_friction_along_the_track_may_have_bumps():
+    values = {"form": "bumps", "ratio": -0.2, "wavelength_m": 2e-3, "phase_rad": 0.7, "width": 0.1}
+    result = towed({"position-dependent-friction": values}, FAST_MPS, 1.0)
+    nearest = np.round(result.true_position_m / 2e-3 + 0.7 / TAU) - 0.7 / TAU
+    apart = result.true_position_m / 2e-3 - nearest
+    bumps = np.exp(-0.5 * (apart / 0.1) ** 2)
+    assert bumps.max() > 0.999
+    assert result.true_friction_force_N == pytest.approx(CONTACT.coulomb_force_N * (1 - 0.2 * bumps), rel=2e-3)
+
+
 @pytest.mark.parametrize(
     ("form", "forward", "backward"),
     [("backward", 1.0, 1.2), ("both", 1.1, 0.9), ("kinetic", 1.0, 1.2)],
