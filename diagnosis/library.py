@@ -32,9 +32,8 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
-_STEEP_WAVES = (
-    2  # for waves with a harmonic: bumps of 3.14 mm had 0.38 of the breakaways' sum of squares as sines, 0.90 with it
-)
+# of waves with a harmonic: bumps of 3.14 mm had 0.38 of the breakaways' sum of squares as sines, 0.90 with it
+_STEEP_WAVES = 2
 # Of the pitch of bumps: the longest, and beside them, in spreads of theirs. Bumps of 1.30 mm came to chi2 656 from 1.305 mm, and
 # to 185 from 1.29.
 _LOBES_OF_BUMPS, _BESIDE = 2, (-0.25, 0.0, 0.25)

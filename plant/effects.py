@@ -44,9 +44,8 @@ LONGEST_LAG_S = 0.025  # of friction behind the velocity, as a dead time
 
 _TAU = 2.0 * math.pi
 _SPRING = ("spring",)
-_RESTED = Parameter(
-    "rested_s", 0.0, 1e4, 0.0
-)  # the age at which the static friction is F_s: it was measured after some rest
+# the age at which the static friction is F_s: it was measured after some rest
+_RESTED = Parameter("rested_s", 0.0, 1e4, 0.0)
 # a wave is w(a) = sin a + second_sin sin 2a + second_cos cos 2a, a with the phase: few real ones are pure
 _SHAPE = (
     Parameter("phase_rad", -_TAU, _TAU, 0.0),
@@ -68,15 +67,15 @@ EFFECTS: Final[dict[str, Effect]] = {
         "friction",
         {
             "log": Form(
-                "F_s grows by ratio F_s ln(1 + age / age_scale_s)",
+                "F_s grows by ratio F_s ln(1 + age / age_scale_s), less what that is at an age of rested_s",
                 (_ratio(0.02, 0.0, 1.0), Parameter("age_scale_s", 1e-4, 100.0, 0.1), _RESTED),
             ),
             "power": Form(
-                "F_s grows by ratio F_s (age / 1 s)^exponent",
+                "F_s grows by ratio F_s (age / 1 s)^exponent, less what that is at an age of rested_s",
                 (_ratio(0.04, 0.0, 1.0), Parameter("exponent", 0.05, 1.0, 0.3), _RESTED),
             ),
             "settling": Form(
-                "F_s grows by ratio F_s (1 - exp(-age / settling_s))",
+                "F_s grows by ratio F_s (1 - exp(-age / settling_s)), less what that is at an age of rested_s",
                 (_ratio(0.05, 0.0, 1.0), Parameter("settling_s", 1e-4, 1e4, 0.5), _RESTED),
             ),
         },
