@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis import twin
+from diagnosis.by_run import as_in_rig_file
 from diagnosis.commands import Commands
 from diagnosis.lanes import LANES, gone
 from diagnosis.library import trials
@@ -35,7 +36,9 @@ def tables(ladder):
     """Every form as the library tries it; a random one as it might be drawn."""
     rig, runs = ladder
     tried = {
-        next(iter(trial.form.forms.items())): trial.form.tables(trial.w)
+        next(iter(trial.form.forms.items())): {
+            name: as_in_rig_file(table) for name, table in trial.form.tables(trial.w).items()
+        }
         for trial in reversed(trials(Problem(rig, runs)))
     }
     load = {"form": "random", "ratio": 0.03, "frequency_Hz": 4.0, "seed": 3.0}
