@@ -16,6 +16,12 @@ def is_of_run(name: str, parameter: str = "") -> bool:
     return name.startswith(parameter + _OF) if parameter else _OF in name
 
 
+def name_and_run(name: str) -> tuple[str, str]:
+    """The parameter, and the file of its run or nothing."""
+    parameter, _, file = name.partition(_OF)
+    return parameter, file
+
+
 def as_in_rig_file(table: Table) -> dict[str, float | str]:
     """The effect without what is of single runs."""
     return {name: value for name, value in table.items() if not is_of_run(name)}

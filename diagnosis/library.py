@@ -25,6 +25,7 @@ from diagnosis.waves import (
     drive_waves,
     friction_series,
     friction_waves,
+    friction_waves_beside,
     two_friction_waves,
     waves_apart,
 )
@@ -34,11 +35,11 @@ Floats = npt.NDArray[np.floating[Any]]
 _WAVES = 4  # ranges of periods that are searched
 # of waves with a harmonic: bumps of 3.14 mm had 0.38 of the breakaways' sum of squares as sines, 0.90 with it
 _STEEP_WAVES = 2
-# Of the pitch of bumps: the longest, and beside them, in spreads of theirs. Bumps of 1.30 mm came to chi2 656 from 1.305 mm, and
-# to 185 from 1.29.
+# Of bumps the longest pitches are tried, and a quarter of their spread to either side: bumps of 1.30 mm came to chi2 641 from
+# 1.306 mm, to 131 from 1.295.
 _LOBES_OF_BUMPS, _BESIDE = 2, (-0.25, 0.0, 0.25)
 _STUCK = (1.05, 1.13)  # own frequency of a base over the one at which it rings with the slide stuck to it
-_AGE_LIMITS_S = (1e-3, 1e5)
+_AGE_LIMITS_S = (1e-3, 1e5)  # a block, a day
 _AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 
 
@@ -85,9 +86,9 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         if rig.drive == "force":
             waves = axis_waves(runs, "position", _AXIS_WAVES)
         else:
-            waves = friction_waves(runs, problem.scales, "position", _STEEP_WAVES, harmonics=2)[-_LOBES_OF_BUMPS:]
-        beside = [wave._replace(period=wave.period * (1.0 + at * wave.spread)) for wave in waves for at in _BESIDE]
-        return [_bumps_trial(name, wave, sign) for wave in beside for sign in (1.0, -1.0)]
+            longest = friction_waves(runs, problem.scales, "position", _STEEP_WAVES, harmonics=2)[-_LOBES_OF_BUMPS:]
+            waves = friction_waves_beside(runs, problem.scales, longest, _BESIDE)
+        return [_bumps_trial(name, wave, sign) for wave in waves for sign in (1.0, -1.0)]
     waves: list[Wave] = []
     if rig.drive == "force" and PHASE in scale:
         waves = axis_waves(runs, "position" if "wavelength_m" in scale else "time", _AXIS_WAVES)
@@ -137,8 +138,8 @@ def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, floa
             unit = scale[row.name]
             size = start.get(row.name, unit.scale)
             axes.append(Axis(name, row.name, size, unit.logarithmic, unit.prior, row.low, row.high))
-    # a coordinate that may have either sign starts at half a unit; one that stays positive at its scale
     axes += of_runs
+    # a coordinate that may have either sign starts at half a unit; one that stays positive at its scale
     w = np.array([0.0 if axis.logarithmic else 0.5 for axis in axes])
     return Trial(Form({name: form}, tuple(axes)), w)
 

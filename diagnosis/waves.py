@@ -53,6 +53,18 @@ def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, h
     return _strongest(friction_series(runs, scales, over), most, harmonics)
 
 
+def friction_waves_beside(runs: list[Prepared], scales: Scales, waves: list[Wave], at: tuple[float, ...]) -> list[Wave]:
+    """Waves along the track with their harmonic, at periods `at` so many spreads from those of `waves`, each in its own phase."""
+    series = friction_series(runs, scales, "position")
+    found: list[Wave] = []
+    for wave in waves:
+        periods = wave.period * (1.0 + wave.spread * np.array(at))
+        _, shares = fitted(series, periods, 2)
+        beside = zip(periods.tolist(), shares, strict=True)
+        found += [wave_of(period, own)._replace(spread=wave.spread) for period, own in beside]
+    return found
+
+
 def two_friction_waves(runs: list[Prepared], scales: Scales, most: int) -> list[tuple[Wave, Wave]]:
     """The two waves of the friction along the track that take most together, of the strongest of each range of periods."""
     series = friction_series(runs, scales, "position")

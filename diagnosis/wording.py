@@ -4,6 +4,7 @@ import math
 import re
 from typing import Final
 
+from diagnosis.by_run import name_and_run
 from diagnosis.result import Diagnosis, Estimate
 
 EFFECT_WORDS: Final = {
@@ -71,7 +72,7 @@ def name_and_unit(name: str) -> tuple[str, str]:
 
     `phase_rad of run-02.csv` is ("phase in run-02.csv", "rad").
     """
-    name, _, file = name.partition(" of ")
+    name, file = name_and_run(name)
     if file:
         word, unit = name_and_unit(name)
         return f"{word} in {file}", unit
