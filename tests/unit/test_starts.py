@@ -8,7 +8,7 @@ import pytest
 from diagnosis.problem import Problem
 from diagnosis.ringing import ringing_Hz
 from diagnosis.twin import predict, rig_config
-from diagnosis.waves import drive_waves, two_friction_waves
+from diagnosis.waves import Wave, drive_waves, friction_series, friction_waves_beside, two_friction_waves
 from tests.prepared import prepared
 
 PITCH_M = 1e-3
@@ -62,6 +62,20 @@ def test_two_waves_along_the_track_are_found_together(tmp_path):
         for first, other in pairs
     )
     assert all(first.ratio >= other.ratio > 0.0 for first, other in pairs)
+
+
+def test_waves_beside_a_wave_have_their_own_phase(tmp_path):
+    """At other periods the phase at the zero of the position differs by turns; where the slide is it must stay."""
+    bumps = {"form": "bumps", "ratio": 0.15, "wavelength_m": 3e-3, "phase_rad": 0.7, "width": 0.12}
+    evidence, runs = prepared(tmp_path / "bumps", "ladder", {"position-dependent-friction": bumps})
+    scales = Problem(evidence.rig, runs).scales
+    own = Wave(3e-3, 0.05, 0.0, spread=0.04)
+    shorter, same, longer = friction_waves_beside(runs, scales, [own], (-0.25, 0.0, 0.25))
+    assert [one.period for one in (shorter, same, longer)] == pytest.approx([2.97e-3, 3e-3, 3.03e-3])
+    at_m = np.concatenate([one.at for one in friction_series(runs, scales, "position")]).mean()
+    turns = [at_m / one.period + one.phase_rad / (2.0 * math.pi) for one in (shorter, same, longer)]
+    for beside in (turns[0], turns[2]):
+        assert math.remainder(beside - turns[1], 1.0) == pytest.approx(0.0, abs=0.15)
 
 
 def test_a_base_that_rings_shows_its_frequency(tmp_path):
