@@ -247,6 +247,8 @@ def _assembled(
     by_effect = {fit.form.effects[0]: fit for fit in reversed(singles)}
     if verdict.named is not None:
         by_effect |= dict.fromkeys(verdict.named.form.effects, verdict.named)
+    elif verdict.ranked and is_random(verdict.ranked[0].fit.form):
+        by_effect[verdict.ranked[0].fit.form.effects[0]] = verdict.ranked[0].fit
     alone = {"none": retuned.chi2} | {fit.form.effects[0]: fit.chi2 for fit in reversed(singles)}
     candidates = tuple(
         _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))

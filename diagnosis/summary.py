@@ -35,6 +35,12 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 f"{names} explains the runs that were fitted, but not {', '.join(gap.runs)}, kept aside: "
                 f"there the gap is {times(with_it)} noise floors with it, {times(gap.retuned)} without."
             )
+        nearest = next((one for one in diagnosis.candidates if one.effect not in ("none", "unexplained")), None)
+        if nearest is not None and nearest.form == "random":
+            sentences.append(
+                f"It scatters as {nearest.effect} at random would (probability {percent(nearest.probability)}), and as bursts "
+                "of debris or a tilted track would: no path can be told from these runs."
+            )
     if gap.runs and math.isfinite(gap.nominal):
         sentences.append(
             f"Rig and model are {times(gap.nominal)} noise floors apart as described, and {times(gap.retuned)} after "

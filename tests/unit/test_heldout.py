@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +26,22 @@ FORETELLS = [
     (form("drive-speed-ripple", "time", "frequency_Hz", *WAVE), False),
     (form("position-dependent-friction", "random", "ratio", "wavelength_m"), False),
 ]
+
+
+def stand_in(retuned: float, left: float, gap: float = 1.0, scattered: float = 1.0) -> Any:
+    """Held-out runs of 100 features, in chi2 by their course; gap and what is left of it in floors, by their scatter."""
+    return SimpleNamespace(
+        _chi2_retuned=retuned,
+        _chi2=lambda _fit: left,
+        floor=SimpleNamespace(whitening=range(100)),
+        retuned=gap,
+        _squares=lambda _form, _at: [np.array([scattered**2])],
+        _gap=HeldOut._gap,
+    )
+
+
+def fit_of(form: Form) -> Any:
+    return SimpleNamespace(form=form, deviations=None, w=None)
 
 
 def both(first: Form, second: Form) -> Form:
@@ -51,13 +68,25 @@ def test_what_goes_by_a_wider_floor_is_measured_by_that_floor():
 
 
 @pytest.mark.parametrize(("effect", "does"), FORETELLS)
-def test_what_says_nothing_of_another_run_is_not_refuted(effect, does):
-    """Held-out runs of which the fit leaves all that there was."""
-    held_out = SimpleNamespace(
-        _chi2_retuned=500.0, _chi2=lambda _fit: 500.0, floor=SimpleNamespace(whitening=range(100))
-    )
+def test_what_says_nothing_of_another_run_is_not_asked_to_follow_it(effect, does):
+    """Held-out runs of which the fit leaves all that there was by its course, and nothing by its scatter."""
+    held_out = stand_in(500.0, 500.0, gap=5.0, scattered=1.0)
     assert foretells(effect) is does
-    assert HeldOut.refutes(held_out, SimpleNamespace(form=effect), 0.4) is does  # pyright: ignore[reportArgumentType]
+    assert HeldOut.refutes(held_out, fit_of(effect), 0.4) is does
+
+
+@pytest.mark.parametrize(
+    ("gap", "left", "refuted"),
+    [
+        (8.8, 5.3, True),  # a tilted track taken for a load
+        (9.5, 1.9, False),
+        (1.5, 1.4, False),  # nothing is left that a right one would not leave
+        (8.8, 3.5, False),  # much is left, and most is closed
+    ],
+)
+def test_what_another_run_scatters_far_more_than_it_should_is_refuted(gap, left, refuted):
+    load = FORETELLS[4][0]
+    assert HeldOut.refutes(stand_in(500.0, 500.0, gap, left), fit_of(load), 0.4) is refuted
 
 
 @pytest.mark.parametrize(
@@ -71,11 +100,7 @@ def test_what_says_nothing_of_another_run_is_not_refuted(effect, does):
     ],
 )
 def test_what_another_run_does_not_bear_out_is_refuted(retuned, left, refuted):
-    held_out = SimpleNamespace(
-        _chi2_retuned=retuned, _chi2=lambda _fit: left, floor=SimpleNamespace(whitening=range(100))
-    )
-    fit = SimpleNamespace(form=FORETELLS[0][0])
-    assert HeldOut.refutes(held_out, fit, 0.4) is refuted  # pyright: ignore[reportArgumentType]
+    assert HeldOut.refutes(stand_in(retuned, left), fit_of(FORETELLS[0][0]), 0.4) is refuted
 
 
 def test_where_nothing_can_be_compared_there_is_no_shrinkage():

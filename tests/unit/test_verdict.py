@@ -10,6 +10,7 @@ from diagnosis.verdict import JITTER, judge
 FEATURES = 100
 NUISANCES = 2
 EXPECTED = 40.0  # chi2 of a perfect model
+TRACK = "position-dependent-friction"
 
 
 def fit(chi2, *effects):
@@ -47,6 +48,11 @@ def test_a_gap_that_nothing_takes_is_unexplained():
 )
 def test_what_leaves_more_than_a_right_effect_would_is_unexplained(base, left, kind):
     assert judge(fit(base), [fit(left, "coulomb-level")], [], EXPECTED).kind == kind
+
+
+@pytest.mark.parametrize(("left", "kind"), [(145.0, "effect"), (500.0, "unexplained")])
+def test_a_gain_has_no_other_formula_that_would_leave_much(left, kind):
+    assert judge(fit(4000.0), [fit(left, "force-sensor-gain")], [], EXPECTED).kind == kind
 
 
 def test_two_effects_must_leave_less_than_one():
@@ -132,29 +138,39 @@ class Scatter:
 @pytest.mark.parametrize(
     ("single", "left", "gained", "kind", "effects"),
     [
-        (900.0, 50.0, 100.0, "effect", ["normal-load-fluctuation"]),
+        (900.0, 50.0, 100.0, "effect", [TRACK]),
         (900.0, 50.0, 5.0, "unexplained", []),  # its freedom costs what it brings
         (900.0, 500.0, 100.0, "unexplained", []),  # much is left that is no such scatter
-        (400.0, 50.0, 90.0, "effect", ["coulomb-level", "normal-load-fluctuation"]),  # both
+        (400.0, 50.0, 90.0, "effect", ["coulomb-level", TRACK]),  # both
         (45.0, 40.0, 90.0, "effect", ["coulomb-level"]),  # nothing was left for it
     ],
 )
 def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind, effects):
-    verdict = judge(fit(1000.0), [fit(single, "coulomb-level")], [], EXPECTED, [Scatter(left, gained)])
+    scatter = Scatter(left, gained, effect=TRACK)
+    verdict = judge(fit(1000.0), [fit(single, "coulomb-level")], [], EXPECTED, [scatter])
     assert verdict.kind == kind
     assert sorted(verdict.named.form.effects if verdict.named else []) == effects
 
 
+def test_what_varies_at_random_over_time_may_be_no_load():
+    load = "normal-load-fluctuation"
+    verdict = judge(fit(1000.0), [fit(900.0, "coulomb-level")], [], EXPECTED, [Scatter(50.0, 100.0)])
+    assert (verdict.kind, verdict.named, verdict.refuted) == ("unexplained", None, ())
+    assert list(verdict.probabilities)[:2] == ["unexplained", load]
+    assert 0.2 < verdict.probabilities[load] < 0.4
+
+
 def test_a_path_is_judged_by_what_it_can_explain_not_by_what_noise_takes_from_it():
-    scatter = Scatter(60.0, 150.0, more=40.0)  # 1.5 of the expected, 2.25 where half as much again is noise
+    # 1.5 of the expected, 2.25 where half as much again is noise
+    scatter = Scatter(60.0, 150.0, more=40.0, effect=TRACK)
     verdict = judge(fit(1000.0), [fit(900.0, "coulomb-level")], [], EXPECTED, [scatter])
     assert verdict.named is not None
-    assert verdict.named.form.effects == ("normal-load-fluctuation",)
+    assert verdict.named.form.effects == (TRACK,)
 
 
 def test_what_few_waves_leave_of_a_rough_track_is_no_second_effect():
-    scatters = [Scatter(50.0, 90.0), Scatter(50.0, 80.0, effect="position-dependent-friction")]
-    waves = fit(400.0, "position-dependent-friction")
+    scatters = [Scatter(50.0, 90.0), Scatter(50.0, 80.0, effect=TRACK)]
+    waves = fit(400.0, TRACK)
     verdict = judge(fit(1000.0), [waves], [], EXPECTED, scatters)
     assert verdict.named is not None
     assert verdict.named.form == waves.form  # the waves, not a path of which nobody knows more than its size
