@@ -32,8 +32,8 @@ _LEAST_CLOSED = 0.25
 # expected and closed 0.49, where it had closed 0.95 of the fitted runs; seven large effects rightly named left 1 to 4 times.
 _MUCH, _LEAST_OF_MUCH = 5.0, 0.6
 # Floors: what a load that turns or varies at random, its scatter in the floor, leaves more than must close that share of the gap.
-# A tilted track taken for one closed 0.45 of 8.8 floors, a load with a wave of the track beside it 0.29 of 5.6; three right ones
-# of 8 to 10 detection limits 0.9 and more.
+# A tilted track taken for one closed 0.45 of 8.8 floors, a load with a wave of the track beside it 0.29 of 5.6; two right ones of
+# 8 detection limits 0.93 and more.
 _SCATTERED = 2.2
 _CHANCE = 8.0  # of chi2 that a right one may be worse by, where it shows little: a seal named as ageing was by 16
 

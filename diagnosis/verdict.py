@@ -38,11 +38,10 @@ _EXACT = frozenset({"force-sensor-gain", "force-sensor-bias", "drive-stiffness"}
 # worth nobody knows: there a right model must leave the expected, and nothing is looked for in what scatters.
 _HIDDEN_BY_NOISE = 0.4
 _COST_OF_UNKNOWN = 4.0  # log evidence: effects of the library are likelier than others
-_LOAD = "normal-load-fluctuation"
 _REFUTED = 12.0  # log evidence by which `unexplained` is ahead of what the runs kept aside do not bear out
 # Log evidence by which `unexplained` is ahead of a load that varies at random over time. Of five that were named on a sealed set
 # one was one; bursts of debris and a tilted track, of 4 to 10 detection limits, scatter alike.
-_RANDOM_LOAD = 2.5
+_LOAD, _RANDOM_LOAD = "normal-load-fluctuation", 2.5
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise. Of 30 evidences without a
 # gap the most was 7.5 under an older floor, of six under this one 0; with an effect of 0.9 detection limits a wrong one had 3.
 COST_OF_EFFECT = 12.0

@@ -9,6 +9,7 @@ import pytest
 from diagnosis import wording
 from diagnosis.report import rig_row, where_map, write_report
 from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Parameter, Picture, Shrinkage
+from diagnosis.summary import summary
 from tests import made_up
 
 NAN = math.nan
@@ -162,6 +163,14 @@ def test_an_effect_that_cannot_be_told_from_another_says_so_at_once():
     made = made_up.diagnosis()._replace(not_distinguishable=(("drive-damping", "drive-backlash"),))
     assert "or drive-damping, which would look the same" in wording.headline(made)
     assert "two and three" in wording.headline(made._replace(effects=("two", "three")))
+
+
+@pytest.mark.parametrize(("form", "said"), [("random", True), ("sine", False)])
+def test_what_scatters_at_random_says_what_else_would(form, said):
+    nearest = (Candidate("unexplained", 0.6), Candidate("normal-load-fluctuation", 0.3, form))
+    made = made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest)
+    told = " ".join(summary(made))
+    assert ("as normal-load-fluctuation at random would (probability 30 %)" in told) is said
 
 
 @pytest.mark.parametrize(
