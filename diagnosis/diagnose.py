@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.advice import UNCOUPLE
 from diagnosis.evidence import Evidence
 from diagnosis.flexible import flexible_differences
 from diagnosis.gap import (
@@ -24,11 +25,12 @@ from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
 from diagnosis.phases import is_phase
 from diagnosis.phases_by_run import starts_by_run
+from diagnosis.pick_up import PICK_UP, pick_up
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction, is_random
 from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
-from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Gap, Shrinkage
+from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.retuning import retuned_rig
 from diagnosis.search import (
     Origin,
@@ -44,7 +46,15 @@ from diagnosis.search import (
     screened,
 )
 from diagnosis.summary import summary
-from diagnosis.verdict import COST_OF_EFFECT, NEVER_WITHOUT_GAP, Verdict, hidden_by_noise, judge, much_left
+from diagnosis.verdict import (
+    COST_OF_EFFECT,
+    NEVER_WITHOUT_GAP,
+    Verdict,
+    although_outside,
+    hidden_by_noise,
+    judge,
+    much_left,
+)
 from diagnosis.workers import one_thread
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -138,6 +148,8 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         held_out = HeldOut(problem, fitter.nuisances, best, retuned, roughness, jobs)
         if verdict.named is not None and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
             verdict, best = judge(retuned, singles, pairs, expected_chi2, random, refuted=True), retuned
+    if any(finding.kind == PICK_UP for finding in evidence.findings):
+        verdict = although_outside(verdict)
     progress(f"verdict: {verdict.kind}", 0.8)
     return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, held_out, began, jobs)
 
@@ -242,6 +254,7 @@ def _assembled(
     if held_out is not None:
         cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
         judged = _judged(fitter, held_out, retuned, best, verdict, tried, jobs)
+    cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
     by_effect = {fit.form.effects[0]: fit for fit in reversed(singles)}
@@ -259,6 +272,12 @@ def _assembled(
     followed = [one for one in verdict.ranked if not is_random(one.fit.form)]
     alike = imitators(fitter, followed, verdict.scale) if _refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
+    if verdict.outside:
+        following = Experiment(
+            UNCOUPLE, "What is compared shows no gap: the vibration in the force signal is left.", None
+        )
+    else:
+        following = next_experiment(fitter.problem, nuisances, leaders)
     done = Diagnosis(
         verdict=verdict.kind,
         effects=effects,
@@ -267,7 +286,7 @@ def _assembled(
         not_distinguishable=(alike,) if alike else (),
         where=tuple(where),
         gap=judged,
-        next_experiment=next_experiment(fitter.problem, nuisances, leaders),
+        next_experiment=following,
         rig=nuisances.parameters(best.deviations),
         findings=evidence.findings,
         pictures=pictures(
@@ -324,6 +343,12 @@ def _cells(floor: Floor, z: Floats) -> list[Cell]:
         for (signal, regime, band_Hz, run), share in zip(cell_names(floor), shares, strict=True)
         if share > 0.0
     ]
+
+
+def _vibrating(evidence: Evidence) -> list[Cell]:
+    """Cells of forces that vibrate as no spring does, in what is ordinary, as the others are in floors."""
+    found = [(run.file, pick_up(evidence.rig, run.t_s, run.columns)) for run in evidence.runs]
+    return [Cell("drive_force_N", "steady", one.band_Hz, file, one.limits**2 - 1.0) for file, one in found if one]
 
 
 def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:

@@ -17,6 +17,7 @@ from diagnosis.evidence_checks import Columns, checked
 from diagnosis.findings import Finding
 from diagnosis.log_evidence import columns_of_log
 from diagnosis.manifest import MANIFEST, STANDARD, ChannelMap, Manifest, RigTable, RunTable, read_manifest
+from diagnosis.pick_up import PICK_UP, pick_up
 
 Floats = npt.NDArray[np.float64]
 _ALIKE = 0.85  # of two names, by `difflib`: a letter or the case is another
@@ -111,6 +112,8 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
     ]
     t_s = usable.pop("t_s")
     findings += [Finding(kind, f"{table.file}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
+    if vibrates := pick_up(rig, t_s, usable):
+        findings.append(Finding(PICK_UP, f"{table.file}: drive_force_N", vibrates.text))
     return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout), findings
 
 

@@ -3,6 +3,7 @@
 import math
 
 from diagnosis.phases import has_own_phases
+from diagnosis.pick_up import PICK_UP
 from diagnosis.result import Diagnosis
 from diagnosis.wording import EFFECT_WORDS, estimate_in_words, percent, signal_name, times
 
@@ -41,6 +42,10 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 f"It scatters as {nearest.effect} at random would (probability {percent(nearest.probability)}), and as bursts "
                 "of debris or a tilted track would: no path can be told from these runs."
             )
+    vibrating = [finding for finding in diagnosis.findings if finding.kind == PICK_UP]
+    if vibrating:
+        others = ", ".join(finding.where.partition(":")[0] for finding in vibrating[1:])
+        sentences.append(f"{vibrating[0].where} {vibrating[0].text}." + (f" So in {others}." if others else ""))
     if gap.runs and math.isfinite(gap.nominal):
         sentences.append(
             f"Rig and model are {times(gap.nominal)} noise floors apart as described, and {times(gap.retuned)} after "

@@ -92,6 +92,7 @@ class Verdict(NamedTuple):
     ranked: tuple[Model, ...]  # single effects by evidence, the best first
     scale: float  # the misfit that all evidence is divided by
     refuted: tuple[str, ...] = ()  # effects that won, and that the runs kept aside do not bear out
+    outside: bool = False  # what is compared shows no gap, and something else does
 
 
 def much_left(fit: Fit, expected_chi2: float) -> bool:
@@ -223,6 +224,15 @@ def judge(
     others = [fit for fit in followed if fit is not best.fit and fit.form.effects[0] not in best.fit.form.effects]
     runner_up = others[0] if others else None
     return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
+
+
+def although_outside(verdict: Verdict) -> Verdict:
+    """The verdict where something shows that no fit looks at, and that no effect of the library makes: never "no gap"."""
+    if verdict.kind != "no-gap":
+        return verdict
+    swapped = {"none": verdict.probabilities["unexplained"], "unexplained": verdict.probabilities["none"]}
+    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    return verdict._replace(kind="unexplained", probabilities=probabilities, outside=True)
 
 
 def _square(values: Floats) -> float:

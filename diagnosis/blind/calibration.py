@@ -76,6 +76,7 @@ def _error(pairs: Sequence[tuple[float, bool]]) -> float:
 
 
 def _split(pairs: Sequence[tuple[float, bool]]) -> list[list[tuple[float, bool]]]:
-    ordered = sorted(pairs)
+    # by nothing else: right ones sorted behind wrong ones of the same probability made bins of each
+    ordered = sorted(pairs, key=lambda pair: pair[0])
     count = max(1, min(_BINS, len(ordered) // _FEWEST_IN_BIN))
     return [[ordered[i] for i in rows] for rows in np.array_split(np.arange(len(ordered)), count) if len(rows)]

@@ -119,6 +119,10 @@ def test_probabilities_are_judged():
     assert calibration_error([]) is None
 
 
+def test_equal_probabilities_are_binned_in_the_order_of_the_cases():
+    assert calibration_error([(0.8, i % 5 != 0) for i in range(40)]).value == pytest.approx(0.0)
+
+
 def test_what_chance_alone_shows_is_told():
     """Of 10 fair coins the number of heads is off by 1.23 in the mean; what is certain is never off."""
     assert error_of_perfect([(0.5, True)] * 10).value == pytest.approx(0.123, abs=0.01)

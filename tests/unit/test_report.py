@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from diagnosis import wording
+from diagnosis.findings import Finding
+from diagnosis.pick_up import PICK_UP
 from diagnosis.report import rig_row, where_map, write_report
 from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Parameter, Picture, Shrinkage
 from diagnosis.summary import summary
@@ -171,6 +173,12 @@ def test_what_scatters_at_random_says_what_else_would(form, said):
     made = made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest)
     told = " ".join(summary(made))
     assert ("as normal-load-fluctuation at random would (probability 30 %)" in told) is said
+
+
+def test_a_force_that_vibrates_is_in_the_summary_with_its_runs():
+    findings = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
+    told = " ".join(summary(made_up.diagnosis()._replace(findings=findings)))
+    assert "run-01.csv: drive_force_N vibrates with 0.3 N. So in run-02.csv, run-04.csv." in told
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.random_friction import Scattered
 from diagnosis.refit import NOTHING, Axis, Fit, Form
-from diagnosis.verdict import JITTER, judge
+from diagnosis.verdict import JITTER, although_outside, judge
 
 FEATURES = 100
 NUISANCES = 2
@@ -30,6 +30,16 @@ def test_an_effect_that_takes_most_is_named():
     assert verdict.named is not None
     assert verdict.named.form.effects == ("coulomb-level",)
     assert sum(verdict.probabilities.values()) == pytest.approx(1.0)
+
+
+def test_what_shows_elsewhere_turns_no_gap_into_unexplained_and_nothing_else():
+    nothing = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED)
+    outside = although_outside(nothing)
+    assert (outside.kind, outside.outside) == ("unexplained", True)
+    assert next(iter(outside.probabilities)) == "unexplained"
+    assert sum(outside.probabilities.values()) == pytest.approx(1.0)
+    effect = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED)
+    assert although_outside(effect) == effect
 
 
 def test_a_gap_that_nothing_takes_is_unexplained():
