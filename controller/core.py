@@ -1,5 +1,6 @@
 """One step of the controller: onset, policy, limits. The same function runs live, in lockstep and in replay."""
 
+import math
 from typing import Any
 
 import numpy.typing as npt
@@ -9,7 +10,7 @@ from controller.codes import BLOCK
 from controller.limits import allow
 from controller.onset import contact, drive_velocity
 from controller.policy import decide, want
-from controller.vibration import burst, measure
+from controller.vibration import burst, measure, skip
 
 
 @kernel
@@ -40,24 +41,32 @@ def step(
     s: Record = state[0]
     samples = p.samples_per_block
     force_N = 0.0
+    usable = True
     if events & BLOCK:
         block: Record = sensors[0]
         s.block = block.sequence
         position_m = 0.0
+        accel_mps2 = 0.0
         for i in range(samples):
             force_N += float(block.drive_force_N[i])
             position_m += float(block.drive_position_m[i])
+            accel_mps2 += float(block.mass_accel_mps2[i]) + float(block.base_accel_mps2[i])
         force_N /= samples
         position_m /= samples
-        if gap_blocks > 0:  # the rings hold blocks one period apart: a slope across a gap would be wrong
+        # one sample that is no number would stay in the filters for ever: such a block is as good as lost
+        usable = math.isfinite(force_N + position_m + accel_mps2)
+        missing_blocks = gap_blocks if usable else gap_blocks + 1
+        if missing_blocks > 0:  # the rings hold blocks one period apart: a slope across a gap would be wrong
             s.force_count = 0
             s.position_count = 0
-        measure(p, s, block.base_accel_mps2)
-        drive_velocity(p, s, position_m)
-        contact(p, s, force_N, burst(p, s, block.mass_accel_mps2, scratch))
-        decide(p, s, t_ns, force_N)
-        want(p, s)
-    allow(p, s, events, s.wanted_Hz, s.wanted_m)
+            skip(p, s, missing_blocks)
+        if usable:
+            measure(p, s, block.base_accel_mps2)
+            drive_velocity(p, s, position_m)
+            contact(p, s, force_N, burst(p, s, block.mass_accel_mps2, scratch))
+            decide(p, s, t_ns, force_N)
+            want(p, s)
+    allow(p, s, events, s.wanted_Hz, s.wanted_m if usable else math.nan)
 
     c: Record = command[0]
     c.sequence = s.steps

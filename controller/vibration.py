@@ -70,6 +70,12 @@ def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
 
 
 @kernel
+def skip(p: Record, s: Record, blocks: int) -> None:
+    """Turn the demodulator's phase through blocks that were not measured: the exciter went on."""
+    s.phase_rad = (s.phase_rad + TWO_PI * s.allowed_Hz * p.block_s * blocks) % TWO_PI
+
+
+@kernel
 def burst(p: Record, s: Record, mass_accel_mps2: Record, scratch: Record) -> float:
     """Rms of the slide's acceleration over the block [m/s2], without the exciter's line and its second harmonic."""
     for i in range(mass_accel_mps2.shape[0]):

@@ -1,5 +1,6 @@
 """The controller on the rig, both in this process: what the loop does, sample by sample."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,20 +44,25 @@ def close_the_loop(
     controller: dict[str, Any] | None = None,
     pair: str = "C45-C45 @ 0.063",
     seed: int = 1,
+    deliver: Callable[[int, bytes], bytes | None] = lambda block, payload: payload,
 ) -> Loop:
-    """Run the loop in lockstep for `seconds`."""
+    """Run the loop in lockstep for `seconds`; `deliver` says what becomes of each block on its way, None for lost."""
     plant = PlantNode(validate(RigConfig, {"contact": {"pair": pair}} | (rig or {}), "rig"), seed)
     node = ControllerNode(validate(ControllerConfig, controller or {}, "controller"))
     blocks = round(seconds * 1000)
     traces: list[bytes] = []
-    truth = np.empty((2, blocks))
+    truth: list[tuple[float, float]] = []
     commands: list[bytes] = []
     for block in range(blocks):
         sensors, _ = plant.advance(commands)
-        command = node.block(sensors.payload)
+        payload = deliver(block, sensors.payload)
+        if payload is None:
+            commands = []
+            continue
+        command = node.block(payload)
         assert command is not None
         commands = [command.payload]
         traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)
-        truth[:, block] = plant.truth[0, -1], plant.truth[2].max()
+        truth.append((plant.truth[0, -1], plant.truth[2].max()))
     trace = np.frombuffer(b"".join(traces), TRACE_LAYOUT.dtype)
-    return Loop(trace["t_ns"] * 1e-9, trace, truth[0], truth[1])
+    return Loop(trace["t_ns"] * 1e-9, trace, *np.array(truth).T)

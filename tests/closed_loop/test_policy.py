@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bridge import stickslip_pb2 as wire
+from bridge.messages import sensor_block
 from tests.closed_loop.loop import close_the_loop
 
 PAIRS = {
@@ -137,3 +138,43 @@ def test_no_false_stick_in_a_minute_of_smooth_sliding() -> None:
     controller = {"policy": {"probe_every_s": 600.0}}
     loop = close_the_loop(60.0, controller=controller, rig={"solver": {"step_s": 1e-5}})
     assert not (loop.trace["state"][loop.t_s > 4.0] == wire.STICK).any()
+
+
+@pytest.mark.parametrize("channel", ["drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("bad_block", [20, 300, 1500])  # before, at and after the switch-on
+def test_a_sample_that_is_no_number_is_forgotten(channel: str, value: float, bad_block: int) -> None:
+    def deliver(block: int, payload: bytes) -> bytes:
+        if block != bad_block:
+            return payload
+        sensors = sensor_block(20).read(payload, "sensors")
+        sensors[channel][0, 7] = value
+        return sensors.tobytes()
+
+    loop = close_the_loop(4.0, controller={"policy": {"enabled_from_s": 0.3}}, deliver=deliver)
+    assert loop.trace["limit"][bad_block] == wire.NOT_FINITE
+    for field in (
+        "score",
+        "force_rate",
+        "burst_mps2",
+        "drive_velocity_mps",
+        "vibration_velocity_mps",
+        "time_to_slip_s",
+    ):
+        assert np.isfinite(loop.trace[field]).all(), field
+    assert loop.slips(0.0) == 0
+    assert loop.ratio(2.0).min() > 1.15
+
+
+@pytest.mark.parametrize("pause_blocks", [1, 2, 3])
+def test_lost_blocks_do_not_disturb_the_measured_velocity(pause_blocks: int) -> None:
+    """At 2600 Hz a block holds 2.6 periods: a lost one must turn the demodulator on."""
+
+    def deliver(block: int, payload: bytes) -> bytes | None:
+        return None if block > 1000 and block % 100 < pause_blocks else payload
+
+    loop = close_the_loop(3.0, deliver=deliver)
+    assert loop.trace["gap_blocks"].max() == pause_blocks
+    assert loop.ratio(1.0).min() > 1.15
+    assert loop.ratio(1.0).max() < 1.25
+    assert loop.slips(0.0) == 0
