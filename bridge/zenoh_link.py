@@ -61,6 +61,10 @@ class Inbox:
         else:
             self._queue.put(received)
 
+    def keep(self, received: Received) -> None:
+        """As `push`, but never dropped: for what is rare and must not be missed."""
+        self._queue.put(received)
+
     def get(self, timeout_s: float) -> Received | None:
         """The oldest message, or None when none came within `timeout_s`."""
         try:

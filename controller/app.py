@@ -28,7 +28,7 @@ def run(
 ) -> None:
     """Answer every block on the bus until the plant ends its run or `stop` is set.
 
-    Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE.
+    Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG.
     """
     node = ControllerNode(config)
     node.warm_up()
@@ -58,8 +58,9 @@ class _Process:
         """Take one's place on the bus."""
         for topic in (COMMAND, TRACE, STATE, SNAPSHOT, CONTROLLER_EVENT):
             self._send[topic.name] = self._bus.publisher(topic)
-        for topic in (SENSORS, PLANT_EVENT, OPERATOR):
-            self._bus.listen(topic, self._inbox.push)
+        self._bus.listen(SENSORS, self._inbox.push)
+        for topic in (PLANT_EVENT, OPERATOR):
+            self._bus.listen(topic, self._inbox.keep)
 
     def event(self, code: str, text: str) -> None:
         """Tell the bus."""
@@ -77,38 +78,43 @@ class _Process:
         started = False
         stale = False
         while not stop.is_set() and not self._ended:
-            received = self._inbox.get(self._stale_after_s)
+            # the slew limit is one a step: once stale, a step every block ramps as fast as with blocks
+            received = self._inbox.get(self._block_s if stale else self._stale_after_s)
             if received is None:
                 self._mind_the_plant(heard_s)
                 if started and not self._lockstep:
+                    silent_blocks = 1 if stale else round(self._stale_after_s / self._block_s)
                     if not stale:
                         self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
                     stale = True
-                    self._send[COMMAND.name](node.stale(round(self._stale_after_s / self._block_s)).payload)
+                    self._send[COMMAND.name](node.stale(silent_blocks).payload)
                     self._send_rest(0)
                 continue
             heard_s = time.monotonic()
-            if stale and received.topic is SENSORS:
+            answered = self._consume(received)
+            if stale and answered:
                 self.event("FRESH", "blocks arrive again")
                 stale = False
-            self._consume(received)
             if received.topic is SENSORS and not started:
                 started = True
                 if not self._lockstep:  # not before: the plant waits with its first block until the recorder listens
                     self.event("START", granted)
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
 
-    def _consume(self, received: Received) -> None:
+    def _consume(self, received: Received) -> bool:
+        """Take one message. Returns whether it was a block that got an answer."""
         node = self._node
         if received.topic is SENSORS:
             command = node.block(received.payload)
             if command is not None:
                 self._send[COMMAND.name](command.payload)
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
-        elif received.topic is OPERATOR:
+            return command is not None
+        if received.topic is OPERATOR:
             self._obey(received.payload)
         elif parsed(wire.Event, received.payload, PLANT_EVENT.name).code == "END":
             self._ended = True
+        return False
 
     def _obey(self, payload: bytes) -> None:
         """Take an operator's word; one that makes no sense must not stop the control."""

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from bridge import stickslip_pb2 as wire
+from bridge.faults import Fault
 from bridge.messages import COMMAND as COMMAND_LAYOUT
 from bridge.messages import STATE as STATE_LAYOUT
 from bridge.messages import TRACE as TRACE_LAYOUT
@@ -17,10 +18,14 @@ from controller.records import LAYOUT_ID, build
 
 _STATE_EVERY = 10  # steps: 100 Hz
 _SNAPSHOT_EVERY = 1000  # steps: once a second
+_LATEST_BLOCKS = 256  # as many as the inbox holds: what is further behind was not delayed, its numbers began anew
 
 
 class ControllerNode:
-    """The controller, stepped frame by frame. Raises Fault BAD_MESSAGE for blocks that cannot be read."""
+    """The controller, stepped frame by frame.
+
+    Raises Fault BAD_MESSAGE for blocks that cannot be read or do not count up, CONFIG for blocks of another length.
+    """
 
     def __init__(self, config: ControllerConfig) -> None:
         self.duplicates = 0
@@ -36,6 +41,8 @@ class ControllerNode:
         self._lateness_ns = self._trace["lateness_ns"]
         self._plotted = STATE_LAYOUT.blank()
         self._expected = 0
+        self._block_t_ns = 0  # of the last block
+        self._length_checked = False
         self._operator_events = 0
 
     def warm_up(self) -> None:
@@ -63,15 +70,27 @@ class ControllerNode:
         """
         payload = self._layout.canonical(payload, SENSORS.name)
         sequence, t_ns = sequence_and_time(payload, SENSORS.message)
+        if sequence + _LATEST_BLOCKS < self._expected:
+            line = f"{SENSORS.name}: block {sequence} after block {self._expected - 1}: must count up"
+            raise Fault("BAD_MESSAGE", f"{line}; if the rig began anew, restart the controller too")
         if sequence < self._expected:
             self.duplicates += 1  # late or repeated: what it would have told is already in a gap
             return None
         gap_blocks = sequence - self._expected if self.steps else 0
+        if self.steps and not gap_blocks and not self._length_checked:
+            self._check_length(t_ns - self._block_t_ns)
         self._expected = sequence + 1
-        self.t_ns = t_ns
+        self._block_t_ns = self.t_ns = t_ns
         sensors = self._layout.read(payload, SENSORS.name)
         events = BLOCK | (GAP if gap_blocks else 0) | self._operator_events
         return self._step(sensors, events, gap_blocks)
+
+    def _check_length(self, apart_ns: int) -> None:
+        """Rates, filters and slopes count in blocks: those of another length would all be wrong."""
+        if abs(apart_ns - self._block_ns) > 0.01 * self._block_ns:
+            line = f"{SENSORS.name}: blocks are {apart_ns * 1e-6:g} ms apart: must be block_s = {self._block_ns * 1e-9:g} s"
+            raise Fault("CONFIG", f"{line}; set block_s of rig and controller alike")
+        self._length_checked = True
 
     def stale(self, silent_blocks: int) -> Outgoing:
         """Step without a block, `silent_blocks` periods after the last frame: the command ramps to zero."""

@@ -44,7 +44,7 @@ def close_the_loop(
     controller: dict[str, Any] | None = None,
     pair: str = "C45-C45 @ 0.063",
     seed: int = 1,
-    deliver: Callable[[int, bytes], bytes | None] = lambda block, payload: payload,
+    deliver: Callable[[int, bytes], bytes | None] = lambda _, payload: payload,
 ) -> Loop:
     """Run the loop in lockstep for `seconds`; `deliver` says what becomes of each block on its way, None for lost."""
     plant = PlantNode(validate(RigConfig, {"contact": {"pair": pair}} | (rig or {}), "rig"), seed)
