@@ -56,7 +56,8 @@ FAULTS = {
             "BAD_MESSAGE",
             8,
             "A message on the bus does not follow bridge/PROTOCOL.md: wrong length, undecodable bytes, another number of "
-            "samples than configured, or blocks whose numbers go back. The line names the topic. Compare the client with PROTOCOL.md.",
+            "samples than configured, or blocks whose numbers go back. The line names the topic. Compare the client with "
+            "PROTOCOL.md.",
         ),
         FaultKind(
             "LOCKSTEP_STALLED",

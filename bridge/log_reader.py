@@ -47,7 +47,7 @@ class Damage(NamedTuple):
     cut_bytes: int  # from the first record that is not whole to the end of the file
     bad_chunks: int  # whole, but their checksum is wrong
     closed: bool  # the file has its footer
-    bad_records: int = 0  # definitions, tables or stretches of bytes that make no sense
+    bad_records: int = 0  # definitions, tables, messages or stretches of bytes that make no sense
 
 
 class LogReader:
@@ -62,6 +62,11 @@ class LogReader:
         self.metadata: dict[str, dict[str, str]] = {}
         self.size_bytes = 0
         self.position_bytes = 0  # how far the pass has come
+
+    def count_bad_messages(self, count: int) -> None:
+        """Messages that are whole but are none of their topic."""
+        if count:
+            self._count(bad_records=count)
 
     def topic(self, channel_id: int) -> str:
         """Topic of a channel; where its definition was damaged, the one that every log of this version gives it."""

@@ -1,6 +1,8 @@
 """A run log, whole or cut: its topics as arrays, at once or chunk by chunk; and recovery of what a kill left."""
 
+import contextlib
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -46,7 +48,8 @@ class Piece(NamedTuple):
 def iter_pieces(reader: LogReader) -> Iterator[Piece]:
     """Every message of a log, chunk by chunk, in memory that does not grow with the log.
 
-    Raises Fault BAD_LOG when it is no run log of this project, BAD_MESSAGE where bytes are no message of their topic.
+    A streaming message that is none of its topic is left out and counted in the reader's damage. Raises Fault BAD_LOG when
+    it is no run log of this project.
     """
     layouts: dict[str, Layout] = dict(_LAYOUTS)
     for data, rows in reader.messages():
@@ -56,9 +59,10 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
             log_time_ns = mine[:, LOG_TIME].copy()
             if topic in STREAMING:
                 if topic not in layouts:
-                    layouts[topic] = sensor_block(_samples(data[mine[0, START] : mine[0, END]].tobytes()))
-                records = np.frombuffer(_stacked(data, mine, layouts[topic], "/" + topic), layouts[topic].dtype)
-                yield Piece(topic, log_time_ns, records, [])
+                    layouts[topic] = sensor_block(_samples(data, mine))
+                stacked, kept = _stacked(data, mine, layouts[topic], "/" + topic)
+                reader.count_bad_messages(len(mine) - len(kept))
+                yield Piece(topic, log_time_ns[kept], np.frombuffer(stacked, layouts[topic].dtype), [])
             else:
                 payloads = [data[row[START] : row[END]].tobytes() for row in mine]
                 yield Piece(topic, log_time_ns, np.empty(0), payloads)
@@ -71,9 +75,14 @@ def iter_tables(path: Path) -> Iterator[tuple[str, Records]]:
             yield piece.topic, piece.records
 
 
-def _samples(payload: bytes) -> int:
-    """How many samples a channel the sensor blocks of a log have, as its first one says."""
-    return len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES
+def _samples(data: Bytes, rows: MessageRows) -> int:
+    """How many samples a channel the sensor blocks of a log have, as most of its first chunk say: one may be odd."""
+    found: Counter[int] = Counter()
+    for row in rows:
+        with contextlib.suppress(Fault):
+            block = parsed(wire.SensorBlock, data[row[START] : row[END]].tobytes(), "/sensors")
+            found[len(block.drive_force_N) or _DEFAULT_SAMPLES] += 1
+    return found.most_common(1)[0][0] if found else _DEFAULT_SAMPLES
 
 
 @kernel
@@ -90,8 +99,8 @@ def _gather(data: Bytes, starts: npt.NDArray[np.int64], template: Bytes, fixed: 
     return True
 
 
-def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> bytes:
-    """The payloads of one topic, one behind the other, each with every field written and in order."""
+def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> tuple[bytes, npt.NDArray[np.int64]]:
+    """The readable payloads of one topic with every field written and in order, and which rows they are."""
     if (rows[:, END] - rows[:, START] == layout.size).all():
         template = np.frombuffer(layout.blank().tobytes(), np.uint8)
         fixed = np.ones(layout.size, np.uint8)
@@ -99,8 +108,14 @@ def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> byte
             fixed[field[1] : field[1] + field[0].itemsize] = 0
         out = np.empty(len(rows) * layout.size, np.uint8)
         if _gather(data, np.ascontiguousarray(rows[:, START]), template, fixed, out):
-            return out.tobytes()
-    return b"".join(layout.canonical(data[row[START] : row[END]].tobytes(), topic) for row in rows)
+            return out.tobytes(), np.arange(len(rows))
+    good: list[bytes] = []
+    kept: list[int] = []
+    for index, row in enumerate(rows):
+        with contextlib.suppress(Fault):
+            good.append(layout.canonical(data[row[START] : row[END]].tobytes(), topic))
+            kept.append(index)
+    return b"".join(good), np.array(kept, np.int64)
 
 
 def block_period_ns(sensors: Records) -> float:

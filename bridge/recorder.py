@@ -1,5 +1,6 @@
 """The recorder process: everything on the bus into one log."""
 
+import math
 import threading
 import time
 from pathlib import Path
@@ -16,6 +17,7 @@ _INBOX_LIMIT = 1 << 16  # 15 s of a run at 4100 messages/s
 _HEADERS_WAIT_S = 30.0  # a first start compiles kernels
 _QUIET_S = 0.3  # after the last END: nothing more is under way
 _PLANT_LOST_S = 1.0
+_STOP_S = 3.0  # after a stop the plant fades out within 1 s; a rig that goes on must not hold up the end
 
 
 def run(
@@ -62,7 +64,12 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
     ended: set[str] = set()
     heard_s = time.monotonic()
     started = False
+    until_s = math.inf
     while True:
+        if stop.is_set():
+            until_s = min(until_s, time.monotonic() + _STOP_S)
+        if time.monotonic() > until_s:
+            return False
         received = inbox.get(0.05)
         if received is not None:
             heard_s = time.monotonic()

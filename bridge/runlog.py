@@ -15,6 +15,7 @@ from bridge.topics import RECORDER_EVENT, TOPICS, Topic
 
 FLUSH_PERIOD_S = 0.1  # a kill loses at most the open chunk: this, and never more than 0.25 s
 LARGEST_CHUNK_BYTES = 1 << 20  # a run in one process fills more than this in 0.1 s
+_LATEST_MESSAGES = 256  # what is further behind was not delayed: its sender began anew
 LIBRARY = f"stickslip schema {SCHEMA_VERSION}"
 
 
@@ -42,9 +43,13 @@ class RunLog:
             self._file = path.open("wb")
         except OSError as error:
             raise Fault("LOG_WRITE", f"{path}: cannot be written: {error.strerror}; choose another --log") from None
+        self._channels: dict[str, int] = {}
+        self._guarded(self._begin)
+
+    def _begin(self) -> None:
+        """Write header, schemas and channels."""
         self._writer = ChunkWriter(self._file, LIBRARY)
         schema_data = file_descriptor_set()
-        self._channels: dict[str, int] = {}
         schemas: dict[str, int] = {}
         for topic in TOPICS:
             if topic.logged:
@@ -72,11 +77,17 @@ class RunLog:
     def write(self, topic: Topic, payload: bytes) -> None:
         """Keep one message, and note a gap in its sequence. Raises Fault LOG_WRITE."""
         sequence, t_ns = sequence_and_time(payload, topic.message)
+        if t_ns < 0:
+            line = f"{topic.name}: t_ns = {t_ns}: must be 0 or more; count it from the start of the run"
+            raise Fault("BAD_MESSAGE", line)
         expected = self._next.get(topic.name, sequence if topic.rate_Hz else 0)
         if sequence > expected:
             self.lost[topic.name] += sequence - expected
             self.add_event("GAP", f"/{topic.name}: {sequence - expected} lost before {sequence}", t_ns)
-        self._next[topic.name] = sequence + 1
+        if sequence + _LATEST_MESSAGES < expected:
+            self.add_event("RESTART", f"/{topic.name}: {sequence} after {expected - 1}: its sender began anew", t_ns)
+            expected = 0
+        self._next[topic.name] = max(expected, sequence + 1)
         self._last_t_ns = max(self._last_t_ns, t_ns)
         self._add(topic, payload, sequence, t_ns)
         self.flush_when_due()

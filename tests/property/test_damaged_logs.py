@@ -1,7 +1,10 @@
 """Cut and damaged logs: what lies before the damage is read, what can be saved is, and only a Fault is ever raised."""
 
 import contextlib
+import threading
+import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,8 +12,13 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
+from bridge import recorder
 from bridge.faults import Fault
 from bridge.logfile import LogReader, read_run, recover
+from bridge.messages import sensor_block
+from bridge.runlog import RunLog
+from bridge.topics import SENSORS
+from bridge.zenoh_link import Received
 from tests.logs import doctored, short_log
 
 TABLES = ("sensors", "applied", "command", "trace", "state")
@@ -130,7 +138,6 @@ def test_a_clock_that_goes_back_is_read_as_it_is(tmp_path: Path) -> None:
 def test_messages_without_their_zeros_are_all_read(tmp_path: Path) -> None:
     """A client that leaves zeros out sends messages of one length too: they are many, not one."""
     from bridge import stickslip_pb2 as wire
-    from bridge.runlog import RunLog
     from bridge.topics import COMMAND
 
     path = tmp_path / "sparse.mcap"
@@ -141,3 +148,65 @@ def test_messages_without_their_zeros_are_all_read(tmp_path: Path) -> None:
     command = read_run(path).command
     assert command["sequence"].tolist() == list(range(1, 11))
     assert (command["frequency_Hz"] == 1500.0).all()
+
+
+def block(number: int, samples: int = 20, t_ns: int | None = None) -> bytes:
+    sensors = sensor_block(samples).blank()
+    sensors["sequence"], sensors["t_ns"] = number, (number + 1) * 1_000_000 if t_ns is None else t_ns
+    return sensors.tobytes()
+
+
+@pytest.mark.parametrize("odd", [0, 600])
+def test_an_odd_block_costs_only_itself(tmp_path: Path, odd: int) -> None:
+    log = RunLog(tmp_path / "odd.mcap", lockstep=True)
+    for number in range(1000):
+        log.write(SENSORS, block(number, 19 if number == odd else 20))
+    log.close()
+    run = read_run(tmp_path / "odd.mcap")
+    assert run.sensors["sequence"].tolist() == [number for number in range(1000) if number != odd]
+    assert run.damage.bad_records == 1
+
+
+def test_a_time_before_the_start_and_a_full_disk_are_faults(tmp_path: Path) -> None:
+    log = RunLog(tmp_path / "run.mcap", lockstep=False)
+    with pytest.raises(Fault, match=r"BAD_MESSAGE: sensors: t_ns = -1: must be 0 or more; count"):
+        log.write(SENSORS, block(0, t_ns=-1))
+    log.close()
+    with pytest.raises(Fault, match="LOG_WRITE: /dev/full"):
+        RunLog(Path("/dev/full"), lockstep=False)
+
+
+def test_a_late_block_is_no_loss_and_a_new_start_is_said(tmp_path: Path) -> None:
+    log = RunLog(tmp_path / "run.mcap", lockstep=True)
+    for number in [*range(4), 1, *range(4, 300), *range(3)]:
+        log.write(SENSORS, block(number))
+    log.close()
+    assert log.lost["sensors"] == 0
+    events = read_run(tmp_path / "run.mcap").events
+    assert [(event.code, event.text) for event in events] == [
+        ("RESTART", "/sensors: 0 after 299: its sender began anew")
+    ]
+
+
+def test_a_stop_ends_the_record_of_a_rig_that_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Endless:
+        """An inbox that is never empty, for 5 s at most."""
+
+        def __init__(self) -> None:
+            self.began_s = time.monotonic()
+            self.count = 0
+
+        def get(self, _: float) -> Received:
+            assert time.monotonic() < self.began_s + 5.0
+            self.count += 1
+            return Received(SENSORS, block(self.count), 0)
+
+    monkeypatch.setattr(recorder, "_STOP_S", 0.1, raising=False)
+    log = RunLog(tmp_path / "run.mcap", lockstep=False)
+    stop = threading.Event()
+    stop.set()
+    bus: Any = None
+    inbox: Any = Endless()
+    assert recorder._record(log, bus, inbox, stop) is False
+    assert inbox.count > 0
+    log.close()

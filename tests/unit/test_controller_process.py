@@ -33,7 +33,7 @@ class FakeBus:
     def listen(self, topic: Topic, receive: Callable[[Received], None]) -> None:
         self.receive[topic.name] = receive
 
-    def alive(self, role: str) -> bool:
+    def alive(self, _: str) -> bool:
         return True
 
     def say(self, topic: Topic, payload: bytes) -> None:
