@@ -23,12 +23,14 @@ T = TypeVar("T", bound=Strict)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read one TOML file. Raises Fault CONFIG when it is missing or is not TOML."""
+    """Read one TOML file. Raises Fault CONFIG when it cannot be read or is not TOML."""
     try:
         with path.open("rb") as file:
             return tomllib.load(file)
     except FileNotFoundError:
         raise Fault("CONFIG", f"{path}: no such file; give the path of a TOML file") from None
+    except OSError as error:
+        raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}") from None
 

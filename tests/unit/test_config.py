@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.config import validate, with_overrides
+from bridge.config import read_toml, validate, with_overrides
 from bridge.faults import Fault
 from cockpit.scenario import load_rig, load_scenario, rig_setting
 from controller.config import ControllerConfig, candidate_frequencies_Hz
@@ -48,6 +48,8 @@ def test_unknown_scenario_names_the_known_ones(name: str) -> None:
 def test_missing_and_broken_files(tmp_path: Path) -> None:
     with pytest.raises(Fault, match="no such file"):
         load_rig(str(tmp_path / "none.toml"), [])
+    with pytest.raises(Fault, match="cannot be read: Is a directory"):
+        read_toml(tmp_path)
     broken = tmp_path / "broken.toml"
     broken.write_text("a = = 1")
     with pytest.raises(Fault, match="not valid TOML"):
