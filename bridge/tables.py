@@ -1,6 +1,7 @@
 """Measured data of other programs as columns: CSV, Parquet, MATLAB v5 and TDMS. Every error names file, column and row."""
 
 import json
+import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -66,7 +67,9 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
     except NotImplementedError:  # what scipy raises for the HDF5 of MATLAB v7.3
         line = f"{path.name}: a MATLAB v7.3 file: must be v5 to v7; save it in MATLAB with -v7"
         raise Fault("BAD_TABLE", line) from None
-    except (pa.ArrowException, MatReadError, OSError, ValueError, KeyError, TypeError, IndexError, EOFError) as error:
+    except (
+        pa.ArrowException, MatReadError, zlib.error, OSError, ValueError, KeyError, TypeError, IndexError, EOFError,
+    ) as error:  # fmt: skip
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         line = f"{path.name}: cannot be read as {path.suffix[1:]}: {reason}; take another copy, or export it again"
         raise Fault("BAD_TABLE", line) from None
@@ -158,7 +161,7 @@ def _numbers(values: Any, where: str, decimal: str) -> Floats:
                     line = f"{where}: row {row} = {text!r}: must be a number; remove the row or name another column"
                     raise Fault("BAD_TABLE", line)
         try:
-            return np.asarray(column.cast(pa.float64()).to_numpy(), np.float64)
+            return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), np.float64)
         except pa.ArrowException:
             raise Fault("BAD_TABLE", f"{where}: is {column.type}: must be numbers; name another column") from None
     array = np.asarray(values)

@@ -143,15 +143,17 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     best = verdict.named or retuned
     unseen = [run for run in runs if run.holdout]
     held_out: HeldOut | None = None
+    gone: Fit | None = None  # what won, and is refuted
     if unseen:
         problem = Problem(evidence.rig, unseen)
         held_out = HeldOut(problem, fitter.nuisances, best, retuned, roughness, jobs)
         if verdict.named is not None and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
-            verdict, best = judge(retuned, singles, pairs, expected_chi2, random, refuted=True), retuned
+            gone, best = best, retuned
+            verdict = judge(retuned, singles, pairs, expected_chi2, random, refuted=True)
     if any(finding.kind == PICK_UP for finding in evidence.findings):
         verdict = although_outside(verdict)
     progress(f"verdict: {verdict.kind}", 0.8)
-    return _assembled(evidence, runs, fitter, retuned, best, singles, verdict, tried, held_out, began, jobs)
+    return _assembled(evidence, runs, fitter, retuned, best, gone, singles, verdict, tried, held_out, began, jobs)
 
 
 def _may_scatter(verdict: Verdict, retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> bool:
@@ -241,6 +243,7 @@ def _assembled(
     fitter: Fitter,
     retuned: Fit,
     best: Fit,
+    gone: Fit | None,
     singles: list[Fit],
     verdict: Verdict,
     tried: list[Trial],
@@ -253,7 +256,7 @@ def _assembled(
     judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
     if held_out is not None:
         cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
-        judged = _judged(fitter, held_out, retuned, best, verdict, tried, jobs)
+        judged = _judged(fitter, held_out, retuned, best, gone, verdict, tried, jobs)
     cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
@@ -302,15 +305,29 @@ def _assembled(
     return done._replace(summary=summary(done))
 
 
+def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
+    """What is judged on the runs kept aside: what is named, or was until they refuted it (`gone`), then the runner-up."""
+    first, second = verdict.named or gone, verdict.runner_up
+    if first is None or second is None:
+        return [fit for fit in (first, second) if fit is not None]
+    again = first.form.effects == second.form.effects and not is_random(first.form)
+    return [first] if again else [first, second]
+
+
 def _judged(
-    fitter: Fitter, held_out: HeldOut, retuned: Fit, best: Fit, verdict: Verdict, tried: list[Trial], jobs: int
+    fitter: Fitter,
+    held_out: HeldOut,
+    retuned: Fit,
+    best: Fit,
+    gone: Fit | None,
+    verdict: Verdict,
+    tried: list[Trial],
+    jobs: int,
 ) -> Gap:
     closed = held_out.closed_by(best)
-    compared: list[Shrinkage] = []
-    if verdict.named is not None:
-        compared.append(_shrinkage(" and ".join(best.form.effects), closed))
-    if verdict.runner_up is not None:
-        compared.append(_shrinkage(" and ".join(verdict.runner_up.form.effects), held_out.closed_by(verdict.runner_up)))
+    compared = [
+        _shrinkage(" and ".join(fit.form.effects), held_out.closed_by(fit)) for fit in compared_fits(verdict, gone)
+    ]
     compared.append(_shrinkage("parameters alone", held_out.closed_by(retuned)))
     blend = flexible_differences(fitter, retuned, tried, held_out, jobs)
     compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))

@@ -117,6 +117,11 @@ class Diagnosis(NamedTuple):
     elapsed_s: float
 
 
+def _name(run: str) -> str:
+    """A run's file, with its folder inside the evidence, without its suffix."""
+    return str(PurePath(run).with_suffix(""))
+
+
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """The JSON object of the contract, with `summary`, `rig` and `findings` besides; without the pictures.
 
@@ -130,12 +135,11 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "candidates": [_candidate(candidate) for candidate in diagnosis.candidates],
         "not_distinguishable": [list(group) for group in diagnosis.not_distinguishable],
         "where": [
-            {**cell._asdict(), "band_Hz": list(cell.band_Hz), "run": PurePath(cell.run).stem}
-            for cell in diagnosis.where
+            {**cell._asdict(), "band_Hz": list(cell.band_Hz), "run": _name(cell.run)} for cell in diagnosis.where
         ],
         "gap": {
             **diagnosis.gap._asdict(),
-            "runs": [PurePath(run).stem for run in diagnosis.gap.runs],
+            "runs": [_name(run) for run in diagnosis.gap.runs],
             "interval_90": _listed(diagnosis.gap.interval_90),
             "compared": [{**one._asdict(), "interval_90": _listed(one.interval_90)} for one in diagnosis.gap.compared],
         },

@@ -5,10 +5,9 @@ import math
 from diagnosis.phases import has_own_phases
 from diagnosis.pick_up import PICK_UP
 from diagnosis.result import Diagnosis
-from diagnosis.wording import EFFECT_WORDS, estimate_in_words, percent, signal_name, times
+from diagnosis.wording import EFFECT_WORDS, cannot_tell, estimate_in_words, percent, signal_name, times
 
 _SMALL_SHARE = 0.05
-_FAR_FOR_NO_GAP = 2.0  # floors on the held-out runs; evidence without a gap shows 0.8 to 1.7
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -16,7 +15,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     gap = diagnosis.gap
     sentences: list[str] = []
     if diagnosis.verdict == "no-gap":
-        if gap.runs and gap.retuned > _FAR_FOR_NO_GAP:
+        if cannot_tell(diagnosis):
             sentences.append(
                 "These runs cannot tell: nothing beyond the stated tolerances shows in those that were fitted, yet what was "
                 f"kept aside is {times(gap.retuned)} noise floors off."
@@ -32,9 +31,10 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         if gap.refuted:
             names = " and ".join(gap.refuted)
             with_it = next(one.gap for one in gap.compared if one.who == names)
+            explain, it = ("explains", "it") if len(gap.refuted) == 1 else ("explain", "them")
             sentences.append(
-                f"{names} explains the runs that were fitted, but not {', '.join(gap.runs)}, kept aside: "
-                f"there the gap is {times(with_it)} noise floors with it, {times(gap.retuned)} without."
+                f"{names} {explain} the runs that were fitted, but not {', '.join(gap.runs)}, kept aside: "
+                f"there the gap is {times(with_it)} noise floors with {it}, {times(gap.retuned)} without."
             )
         nearest = next((one for one in diagnosis.candidates if one.effect not in ("none", "unexplained")), None)
         if nearest is not None and nearest.form == "random":
@@ -75,7 +75,12 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
     if gap.runs and math.isfinite(gap.retuned):
         kept = ", ".join(gap.runs)
-        if gap.shrinkage is not None:
+        if gap.shrinkage is not None and gap.with_effect > gap.retuned:
+            sentences.append(
+                f"On {kept}, kept aside, the gap grows from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
+                "nothing of it is closed there."
+            )
+        elif gap.shrinkage is not None:
             low, high = gap.interval_90 or (math.nan, math.nan)
             between = f" (90 %: {percent(low)} to {percent(high)})" if math.isfinite(low) else ""
             sentences.append(

@@ -37,6 +37,7 @@ EFFECT_WORDS: Final = {
     "none": "the rig as described, inside its tolerances, is enough",
     "unexplained": "there is a gap, and nothing in the library closes it",
 }
+_FAR_FOR_NO_GAP = 2.0  # floors on the held-out runs; evidence without a gap shows 0.8 to 1.7
 _UNIT = re.compile(r"^(?:(.*?)_)?((?:Ns2|Ns|N|mps2|mps|m2|m|s|kg|Hz|rad)(?:_per_(?:N|m2|m|s))?|per_s)$")
 _SYMBOLS = {"mps2": "m/s²", "mps": "m/s", "Ns2": "N s²", "Ns": "N s", "m2": "m²", "per": "1"}
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
@@ -48,9 +49,17 @@ def headline(diagnosis: Diagnosis) -> str:
     return f"{diagnosis.verdict}: {answer(diagnosis)}"
 
 
+def cannot_tell(diagnosis: Diagnosis) -> bool:
+    """Whether the fitted runs show no gap, and those kept aside do."""
+    gap = diagnosis.gap
+    return diagnosis.verdict == "no-gap" and bool(gap.runs) and gap.retuned > _FAR_FOR_NO_GAP
+
+
 def answer(diagnosis: Diagnosis) -> str:
     """What the verdict means here, in one line."""
     if diagnosis.verdict == "no-gap":
+        if cannot_tell(diagnosis):
+            return f"these runs cannot tell, what was kept aside is {times(diagnosis.gap.retuned)} noise floors off"
         return "the rig as described explains these runs"
     if diagnosis.verdict == "unexplained":
         return "these runs differ from the rig as described, and no known effect accounts for it"
@@ -114,7 +123,9 @@ def percent(share: float | None) -> str:
         return "< 0.1 %"
     if 0.999 < share < 1.0:
         return "> 99.9 %"
-    return f"{100.0 * share:.1f} %" if 0.0 < share < 0.01 or 0.99 < share < 1.0 else f"{100.0 * share:.0f} %"
+    if 0.0 < share < 0.01 or 0.99 < share < 1.0:
+        return f"{100.0 * share:.1f} %"
+    return f"{round(100.0 * share)} %"
 
 
 def times(value: float | None) -> str:

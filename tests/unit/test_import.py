@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from bridge.export import export
 from bridge.faults import Fault
 from bridge.logfile import read_run
+from bridge.tables import read_table
 from cockpit.log_commands import log_app
 from diagnosis.evidence import load_evidence
 from diagnosis.importing import import_file
@@ -225,6 +226,23 @@ def test_a_file_may_have_any_name(tmp_path: Path) -> None:
     odd = source.rename(tmp_path / "Läufe \U0001f600.csv")
     import_file(odd, channel_map, tmp_path / "evidence")
     assert load_evidence(tmp_path / "evidence").runs[0].file == "Läufe \U0001f600.parquet"
+
+
+def test_a_time_of_any_clock_is_read(tmp_path: Path) -> None:
+    """Nanoseconds since 1970 need more digits than a float has whole ones."""
+    path = tmp_path / "epoch.parquet"
+    pq.write_table(pa.table({"timestamp_ns": np.int64(1_700_000_000_123_456_789) + np.arange(5) * 500_000}), path)
+    assert np.diff(read_table(path).column("timestamp_ns")) == pytest.approx(500_000, abs=256)
+
+
+def test_a_damaged_compressed_file_of_matlab_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    scipy.io.savemat(path, {"force": np.random.default_rng(1).normal(size=4000)}, do_compression=True)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(data)
+    with pytest.raises(Fault, match=r"run.mat: cannot be read as mat: .*take another copy"):
+        read_table(path).column("force")
 
 
 def test_the_command(tmp_path: Path) -> None:

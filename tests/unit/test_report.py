@@ -10,7 +10,7 @@ from diagnosis import wording
 from diagnosis.findings import Finding
 from diagnosis.pick_up import PICK_UP
 from diagnosis.report import rig_row, where_map, write_report
-from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Parameter, Picture, Shrinkage
+from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Parameter, Picture, Shrinkage, to_json
 from diagnosis.summary import summary
 from tests import made_up
 
@@ -173,6 +173,26 @@ def test_what_scatters_at_random_says_what_else_would(form, said):
     made = made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest)
     told = " ".join(summary(made))
     assert ("as normal-load-fluctuation at random would (probability 30 %)" in told) is said
+
+
+def test_words_fit_what_the_runs_kept_aside_say():
+    made = made_up.diagnosis()
+    far = made._replace(verdict="no-gap", effects=(), gap=made.gap._replace(retuned=3.4))
+    assert "these runs cannot tell, what was kept aside is 3.4 noise floors off" in wording.headline(far)
+    worse = made._replace(gap=made.gap._replace(retuned=2.9, with_effect=3.6, shrinkage=-0.37))
+    assert "the gap grows from 2.9 to 3.6 noise floors" in " ".join(summary(worse))
+    two = ("coulomb-level", "drive-backlash")
+    gap = made.gap._replace(refuted=two, compared=(Shrinkage(" and ".join(two), 5.0, 0.1, None),))
+    told = " ".join(summary(made._replace(verdict="unexplained", effects=(), gap=gap)))
+    assert "coulomb-level and drive-backlash explain the runs that were fitted" in told
+    assert "5 noise floors with them" in told
+    assert wording.percent(-0.003) == "0 %"
+
+
+def test_runs_of_two_folders_keep_their_names_apart():
+    made = made_up.diagnosis()
+    cells = [cell._replace(run=run) for cell, run in zip(made.where, ("a/1.csv", "b/1.csv"), strict=False)]
+    assert [cell["run"] for cell in to_json(made._replace(where=tuple(cells)))["where"]] == ["a/1", "b/1"]
 
 
 def test_a_force_that_vibrates_is_in_the_summary_with_its_runs():

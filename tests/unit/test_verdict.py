@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagnosis.diagnose import compared_fits
 from diagnosis.random_friction import Scattered
 from diagnosis.refit import NOTHING, Axis, Fit, Form
 from diagnosis.verdict import JITTER, although_outside, judge
@@ -160,6 +161,17 @@ def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind
     verdict = judge(fit(1000.0), [fit(single, "coulomb-level")], [], EXPECTED, [scatter])
     assert verdict.kind == kind
     assert sorted(verdict.named.form.effects if verdict.named else []) == effects
+
+
+def test_what_was_refuted_is_compared_on_the_runs_kept_aside_also_where_it_scatters():
+    singles, scatter = [fit(900.0, "coulomb-level")], [Scatter(50.0, 100.0, effect=TRACK)]
+    gone = judge(fit(1000.0), singles, [], EXPECTED, scatter).named
+    verdict = judge(fit(1000.0), singles, [], EXPECTED, scatter, refuted=True)
+    assert verdict.refuted == (TRACK,)
+    assert [one.form.effects for one in compared_fits(verdict, gone)] == [(TRACK,), ("coulomb-level",)]
+    named = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED).named
+    refuted = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED, refuted=True)
+    assert [one.form.effects for one in compared_fits(refuted, named)] == [("coulomb-level",)]
 
 
 def test_what_varies_at_random_over_time_may_be_no_load():
