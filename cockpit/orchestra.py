@@ -1,5 +1,6 @@
 """A run of several processes: starts plant, controller and recorder, watches them, ends them, leaves nobody behind."""
 
+import socket
 import subprocess
 import sys
 import threading
@@ -43,8 +44,24 @@ class Child:
         return next((line for line in reversed(self._lines) if line.strip()), "")
 
 
+def _check_free(endpoint: str) -> None:
+    """Raise Fault ENDPOINT_BUSY where the plant could not listen.
+
+    Asked before anything starts: recorder and controller would meet whoever listens there already, overwrite the log of
+    that run and command its rig.
+    """
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        socket.create_server((host.strip("[]"), int(port)), family=family).close()
+    except (OSError, OverflowError) as error:
+        line = f"{endpoint}: cannot listen there ({error})"
+        raise Fault("ENDPOINT_BUSY", f"{line}; end the process that holds it or choose another --endpoint") from None
+
+
 def run_processes(
     arguments: list[str],
+    endpoint: str,
     log: Path,
     lockstep: bool,
     watch: Callable[[threading.Event], None],
@@ -53,11 +70,14 @@ def run_processes(
 
     Args:
         arguments: the command line that makes the same scenario in a child.
+        endpoint: where they meet; nobody may listen there yet.
         watch: follows the run on the bus until its event is set; runs in a thread of its own.
 
-    Raises the Fault of the child that failed first, PEER_DIED when one was killed, KeyboardInterrupt after Ctrl-C.
+    Raises Fault ENDPOINT_BUSY, the Fault of the child that failed first, PEER_DIED when one was killed, KeyboardInterrupt
+    after Ctrl-C.
 
     """
+    _check_free(endpoint)
     more = ["--lockstep"] if lockstep else []
     children: list[Child] = []
     over = threading.Event()

@@ -49,7 +49,7 @@ def run_scenario(
             from cockpit.orchestra import run_processes
 
             arguments = ["--scenario", name, *(part for setting in settings for part in ("--set", setting))]
-            run_processes(arguments, path, lockstep, follower(scenario.bus, scenario.duration_s))
+            run_processes(arguments, scenario.bus.endpoint, path, lockstep, follower(scenario.bus, scenario.duration_s))
     except KeyboardInterrupt:
         interrupted = True
     from bridge.logfile import read_run

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 
@@ -205,6 +206,27 @@ def test_busy_endpoint(tmp_path: Path) -> None:
     assert result.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
     assert endpoint in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_a_second_run_leaves_the_first_alone(tmp_path: Path, runs: list[Run]) -> None:
+    endpoint = free_endpoint()
+    first = Run(tmp_path / "run.mcap", "--endpoint", endpoint)
+    runs.append(first)
+    first.wait_until_recording()
+    result = call("run", "--set", "duration_s=1.0", "--endpoint", endpoint, "--log", str(first.log))
+    assert result.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
+    assert f"{endpoint}: cannot listen there" in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not gone(first.process.pid)
+    first.process.send_signal(signal.SIGINT)
+    status, _, _ = first.end()
+    assert status == 130
+    data = read_run(first.log)
+    assert data.damage.closed
+    assert data.sensors["sequence"][0] == 0
+    assert len(data.sensors) + told_lost(data, "sensors") == data.sensors["sequence"][-1] + 1
+    # one controller answered: a second one would have counted from 0 again
+    assert np.all(np.diff(data.command["sequence"].astype(np.int64)) > 0)
 
 
 def test_bad_configuration_starts_nothing(tmp_path: Path) -> None:
