@@ -159,21 +159,53 @@ class RigConfig(Strict):
                 f"solver.block_s = {solver.block_s:g}: must hold a whole number of steps between its "
                 f"{solver.samples_per_block} samples; with step_s = {solver.step_s:g} there are {steps:g}"
             )
+        # k_t dt^2 / m: 1.3 is still right, at 1.9 friction swings by itself, 6.5 shows no stick-slip
+        lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
+        if self.slide.mass_kg < lightest_kg:
+            longest_s = math.sqrt(self.slide.mass_kg / self.contact.stiffness_N_per_m)
+            raise ValueError(
+                f"slide.mass_kg = {self.slide.mass_kg:g}: must be at least contact.stiffness_N_per_m x solver.step_s^2, here "
+                f"{lightest_kg:.2g} kg; shorten solver.step_s to {longest_s:.2g} or less"
+            )
+        return self
+
+    def _of(self, effect: str, key: str) -> float:
+        """A parameter of an effect, 0 where the rig does not have it."""
+        return float(self.effects.get(effect, {}).get(key, 0.0))
+
+    @model_validator(mode="after")
+    def _friction_is_left(self) -> "RigConfig":
+        ageing = self.effects.get("static-friction-ageing")
+        if ageing is None:
+            return self
+        ratio, rested_s = float(ageing["ratio"]), float(ageing["rested_s"])
+        if ageing["form"] == "log":
+            growth = math.log1p(rested_s / float(ageing["age_scale_s"]))
+        elif ageing["form"] == "power":
+            growth = rested_s ** float(ageing["exponent"])
+        else:
+            growth = 1.0 - math.exp(-rested_s / float(ageing["settling_s"]))
+        if ratio * growth >= 1.0:
+            raise ValueError(
+                f"effects.static-friction-ageing.rested_s = {rested_s:g}: with ratio = {ratio:g} the contact would have gained "
+                f"{ratio * growth:.3g} times its static force by then; must be below 1, or none is left of it at an age of 0; "
+                "lower one of the two"
+            )
         return self
 
     @model_validator(mode="after")
     def _effects_fit(self) -> "RigConfig":
         solver = self.solver
         longest_s = LONGEST_DELAY * solver.block_s / solver.samples_per_block
-        delay_s = float(self.effects.get("force-sensor-delay", {}).get("delay_s", 0.0))
+        delay_s = self._of("force-sensor-delay", "delay_s")
         if delay_s > longest_s * (1.0 + 1e-9):
             raise ValueError(
                 f"effects.force-sensor-delay.delay_s = {delay_s:g}: must not be above {LONGEST_DELAY} samples, here "
                 f"{longest_s:g}; shorten it or lower solver.samples_per_block"
             )
-        base = self.effects.get("base-compliance", {})
-        compliance_m_per_N, frequency_Hz = base.get("compliance_m_per_N", 0.0), base.get("frequency_Hz", 0.0)
-        per_kg = float(compliance_m_per_N) * (2.0 * math.pi * float(frequency_Hz)) ** 2
+        base = "base-compliance"
+        compliance_m_per_N, frequency_Hz = self._of(base, "compliance_m_per_N"), self._of(base, "frequency_Hz")
+        per_kg = compliance_m_per_N * (2.0 * math.pi * frequency_Hz) ** 2
         # the bristle between two masses is stable up to four times this
         lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
         if per_kg * lightest_kg > 1.0:
@@ -181,6 +213,18 @@ class RigConfig(Strict):
                 f"effects.base-compliance.frequency_Hz = {frequency_Hz:g}: with compliance_m_per_N = "
                 f"{compliance_m_per_N:g} the base weighs {1.0 / per_kg:.2g} kg, 1 / (compliance (2 pi f)^2); must be at least "
                 f"{lightest_kg:.2g} kg with solver.step_s = {solver.step_s:g}; lower one of the three"
+            )
+        ratio, frequency_Hz = self._of("frame-compliance", "ratio"), self._of("frame-compliance", "frequency_Hz")
+        # stiffnesses over that of the frame: the drive's spring, and beside it the one that a relaxing damper hangs on
+        stiffer = ratio
+        if relaxation_s := self._of("drive-damping", "relaxation_s"):
+            k_d = self.drive.stiffness_N_per_m * (1.0 + self._of("drive-stiffness", "ratio"))
+            stiffer += ratio * self._of("drive-damping", "damping_Ns_per_m") / (relaxation_s * k_d)
+        highest_Hz = 1.0 / (2.0 * math.pi * solver.step_s * math.sqrt(1.0 + stiffer))
+        if frequency_Hz > highest_Hz:  # its leapfrog is stable up to twice this
+            raise ValueError(
+                f"effects.frame-compliance.frequency_Hz = {frequency_Hz:g}: with ratio = {ratio:g} between the frame and "
+                f"the drive's springs must be at most {highest_Hz:.3g} Hz with solver.step_s = {solver.step_s:g}; lower one"
             )
         return self
 

@@ -1,7 +1,10 @@
 """The rig as a participant of the bus: commands in, sensor blocks and what was applied out."""
 
+import math
+
 import numpy as np
 
+from bridge.faults import Fault
 from bridge.messages import APPLIED as APPLIED_LAYOUT
 from bridge.messages import COMMAND as COMMAND_LAYOUT
 from bridge.messages import sensor_block
@@ -11,6 +14,7 @@ from plant.records import CHANNELS, NO_COMMAND, TRUTH, build
 from plant.simulate import drive_velocity_mps
 from plant.step import step
 
+_VELOCITY = TRUTH.index("true_velocity_mps")
 _BATCH_BLOCKS = 64  # noise and drive velocity are drawn for this many blocks at once
 
 
@@ -50,7 +54,8 @@ class PlantNode:
     ) -> tuple[Outgoing, Outgoing]:
         """One block of the rig under the newest of `commands`: the sensor block, then what was applied.
 
-        Raises Fault BAD_MESSAGE when the command cannot be read.
+        Raises Fault BAD_MESSAGE when the command cannot be read, CONFIG when the rig cannot be stepped: the state is no
+        number any more.
         """
         if commands:
             self._command = COMMAND_LAYOUT.read(commands[-1], COMMAND.name)
@@ -63,6 +68,13 @@ class PlantNode:
             self._params, self._state, self._velocity_mps[at], self._command, len(commands), self._noise[at],
             commands_late, round_trip_ns, late_ns, self._analogue, self.truth, self._sensors, self._applied,
         )  # fmt: skip
+        if not math.isfinite(self.truth[_VELOCITY, -1]):  # whatever else is not reaches it within a step
+            t_s, step_s = (self.block + 1) * self.block_ns * 1e-9, self._config.solver.step_s
+            raise Fault(
+                "CONFIG",
+                f"{self._config.name}: the slide's velocity is no number at {t_s:.3f} s: this rig cannot be stepped with "
+                f"solver.step_s = {step_s:g}; shorten it, or weaken what is extreme",
+            )
         self.block += 1
         return Outgoing(SENSORS, self._sensors.tobytes()), Outgoing(APPLIED, self._applied.tobytes())
 

@@ -236,6 +236,16 @@ def test_bad_configuration_starts_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "run.mcap").exists()
 
 
+def test_a_rig_whose_numbers_run_away_is_no_quiet_one(tmp_path: Path) -> None:
+    endless = ["--set", "duration_s=0.1", "--set", "rig.drive.stiffness_N_per_m=1e12"]
+    for more in (["--in-process"], ["--endpoint", free_endpoint()]):
+        result = call("run", *endless, *more, "--log", str(tmp_path / "run.mcap"))
+        assert result.returncode == FAULTS["CONFIG"].exit_status
+        assert "paper-c45-c45: the slide's velocity is no number at 0.00" in result.stderr
+        assert "solver.step_s = 1e-05" in result.stderr
+        assert len(result.stderr.strip().splitlines()) == 1
+
+
 def test_unwritable_log(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     result = call("run", "--in-process", "--set", "duration_s=0.1", "--log", str(tmp_path / "file" / "run.mcap"))

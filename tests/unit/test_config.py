@@ -21,6 +21,10 @@ from plant.config import RigConfig
         (['rig.contact.pair="ice"'], ["ice", "unknown friction pair", "C45-C45 @ 0.063"]),
         (["rig.contact.pair=[1]"], ["pair = [1]", "unknown friction pair"]),
         (["rig.solver.step_s=2e-5"], ["step_s", "too coarse", "5000", "1e-05"]),
+        (
+            ["rig.slide.mass_kg=0.001"],
+            ["slide.mass_kg = 0.001", "at least", "0.0078 kg", "shorten solver.step_s to 3.6e-06"],
+        ),
         (["rig.contact.static_force_N=1.0"], ["static_force_N", "coulomb_force_N"]),
         (["controller.samples_per_block=25"], ["samples_per_block", "must equal"]),
         (["duration_s=200.0"], ["duration_s", "50 mm", "shorten"]),

@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bridge.faults import Fault
 from plant.config import load_rig
 from plant.effects import EFFECTS, checked, first_form
 from plant.records import build
+from plant.simulate import simulate
 
 # Data written by others names them so: a name is never changed.
 NAMES = [
@@ -99,6 +101,28 @@ def test_every_form_loads_with_its_defaults_and_at_its_bounds(name: str, tmp_pat
         ),
         ("[effects.base-compliance]\ncompliance_m_per_N = 1e-3\n", ["frequency_Hz = 150", "0.0011 kg", "0.0078 kg"]),
         (
+            '[effects.static-friction-ageing]\nform = "power"\nratio = 0.2\nexponent = 0.5\nrested_s = 100\n',
+            ["static-friction-ageing.rested_s = 100", "ratio = 0.2", "2 times its static force", "must be below 1"],
+        ),
+        (
+            "[effects.static-friction-ageing]\nratio = 0.1\nage_scale_s = 1e-3\nrested_s = 100\n",
+            ["static-friction-ageing.rested_s = 100", "1.15 times"],
+        ),
+        (
+            '[effects.static-friction-ageing]\nform = "settling"\nratio = 1.0\nsettling_s = 1.0\nrested_s = 100\n',
+            ["static-friction-ageing.rested_s = 100", "1 times"],
+        ),
+        (
+            "[effects.frame-compliance]\nratio = 10\nfrequency_Hz = 2000\n"
+            "[solver]\nstep_s = 5e-5\n[piezo]\nfrequency_max_Hz = 1000\n",
+            ["frame-compliance.frequency_Hz = 2000", "ratio = 10", "at most 960 Hz", "step_s = 5e-05", "lower one"],
+        ),
+        (
+            "[effects.frame-compliance]\nratio = 10\nfrequency_Hz = 1000\n"
+            '[effects.drive-damping]\nform = "relaxing"\ndamping_Ns_per_m = 1000\nrelaxation_s = 1e-4\n',
+            ["frame-compliance.frequency_Hz = 1000", "at most 172 Hz", "step_s = 1e-05"],
+        ),
+        (
             "[effects.force-sensor-delay]\ndelay_s = 0.012\n[solver]\nsamples_per_block = 100\n",
             ["effects.force-sensor-delay.delay_s = 0.012", "254 samples", "0.00254"],
         ),
@@ -111,6 +135,21 @@ def test_a_bad_table_is_one_line_with_place_value_and_rule(text: str, words: lis
     for word in ["rig.toml", *words]:
         assert word in caught.value.line
     assert "\n" not in caught.value.line
+
+
+def test_rigs_at_the_edge_of_what_can_be_stepped_are_taken(tmp_path: Path):
+    assert loaded(tmp_path, "[slide]\nmass_kg = 0.0078\n").slide.mass_kg == 0.0078
+    for text in (
+        '[effects.static-friction-ageing]\nform = "power"\nratio = 0.99\nexponent = 0.5\nrested_s = 1.0\n',
+        "[effects.frame-compliance]\nratio = 10\nfrequency_Hz = 2000\n",
+        "[effects.frame-compliance]\nratio = 10\nfrequency_Hz = 950\n"
+        "[solver]\nstep_s = 5e-5\n[piezo]\nfrequency_max_Hz = 1000\n",
+        "[effects.frame-compliance]\nratio = 10\nfrequency_Hz = 170\n"
+        '[effects.drive-damping]\nform = "relaxing"\ndamping_Ns_per_m = 1000\nrelaxation_s = 1e-4\n',
+    ):
+        result = simulate(loaded(tmp_path, text), 0.3)
+        assert np.all(np.isfinite(result.drive_force_N))
+        assert np.abs(result.drive_force_N).max() < 20.0
 
 
 def test_effects_relative_to_a_level_see_the_level_whatever_the_order(tmp_path: Path):
