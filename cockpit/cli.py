@@ -37,7 +37,7 @@ Lockstep = Annotated[
     bool,
     typer.Option("--lockstep", help="Not paced: each block waits for its command. Repeatable to the bit."),
 ]
-ChildFlag = Annotated[bool, typer.Option("--child", hidden=True)]
+ChildOf = Annotated[int, typer.Option("--child", hidden=True)]  # the process that started this one, 0: a person
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 LogFile = Annotated[Path | None, typer.Option("--log", help="Where the log goes; runs/NAME.mcap if not given.")]
 DEFAULT_SCENARIO = "paper-c45-c45"
@@ -94,7 +94,7 @@ def plant(
     prefix: Prefix = None,
     lockstep: Lockstep = False,
     wait_for: Annotated[str, typer.Option(help="Roles that must be on the bus before the first block.")] = "controller",
-    child: ChildFlag = False,
+    child: ChildOf = 0,
 ) -> None:
     """Serve the stand-in rig of a scenario on the bus."""
 
@@ -118,7 +118,7 @@ def controller(
     endpoint: Endpoint = None,
     prefix: Prefix = None,
     lockstep: Lockstep = False,
-    child: ChildFlag = False,
+    child: ChildOf = 0,
 ) -> None:
     """Control the rig that is on the bus, with the controller of a scenario."""
 
@@ -141,7 +141,7 @@ def recorder(
     prefix: Prefix = None,
     lockstep: Lockstep = False,
     log: LogFile = None,
-    child: ChildFlag = False,
+    child: ChildOf = 0,
 ) -> None:
     """Record everything on the bus until the plant ends its run."""
 
@@ -303,7 +303,7 @@ def replay_command(
                     from_s,
                     everything,
                     ["controller", "recorder"] if wait else [],
-                    stop_event(child=False),
+                    stop_event(),
                 )
             return 0
         from cockpit import replaying

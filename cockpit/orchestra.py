@@ -1,5 +1,6 @@
 """A run of several processes: starts plant, controller and recorder, watches them, ends them, leaves nobody behind."""
 
+import os
 import socket
 import subprocess
 import sys
@@ -23,7 +24,7 @@ class Child:
         self.role = role
         # a session of its own: Ctrl-C reaches the parent alone, which ends the children in order
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "cockpit", role, *arguments, "--child"],
+            [sys.executable, "-m", "cockpit", role, *arguments, "--child", str(os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,

@@ -13,8 +13,14 @@ from bridge.faults import Fault
 _PARENT_CHECK_S = 0.25
 
 
-def stop_event(child: bool) -> threading.Event:
-    """An event that SIGINT and SIGTERM set, and for a child the death of its parent: no orphan keeps a rig running."""
+def stop_event(parent: int = 0) -> threading.Event:
+    """An event that SIGINT and SIGTERM set, and for a child the death of its parent: no orphan keeps a rig running.
+
+    Args:
+        parent: the process that started this one; asked for only here, it could be dead and another in its place. 0: nobody
+            watches.
+
+    """
     stop = threading.Event()
 
     def on_signal(_number: int, _frame: Any) -> None:
@@ -22,13 +28,12 @@ def stop_event(child: bool) -> threading.Event:
 
     signal.signal(signal.SIGINT, on_signal)
     signal.signal(signal.SIGTERM, on_signal)
-    if child:
-        parent = os.getppid()
+    if parent:
 
         def watch() -> None:
-            while not stop.wait(_PARENT_CHECK_S):
-                if os.getppid() != parent:
-                    stop.set()
+            while os.getppid() == parent and not stop.wait(_PARENT_CHECK_S):
+                pass
+            stop.set()
 
         threading.Thread(target=watch, daemon=True, name="parent").start()
     return stop

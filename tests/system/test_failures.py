@@ -169,6 +169,27 @@ def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None
     assert read_run(run.log).damage.closed
 
 
+def test_a_parent_that_dies_at_once_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
+    run = Run(tmp_path / "run.mcap")
+    runs.append(run)
+    until_s = time.monotonic() + 30
+    roles = {"plant", "controller", "recorder"}
+    while set(run.children) != roles and time.monotonic() < until_s:
+        run.children = {role(pid): pid for pid in children_of(run.process.pid)}
+    assert set(run.children) == roles
+    os.kill(run.process.pid, signal.SIGKILL)  # while they still import
+    run.process.communicate(timeout=5)
+    try:
+        until_s = time.monotonic() + 20
+        while time.monotonic() < until_s and not all(gone(pid) for pid in run.children.values()):
+            time.sleep(0.05)
+        assert all(gone(pid) for pid in run.children.values())
+    finally:
+        for pid in run.children.values():
+            if not gone(pid):
+                os.kill(pid, signal.SIGKILL)
+
+
 def test_full_disk(tmp_path: Path, runs: list[Run]) -> None:
     log = tmp_path / "run.mcap"
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
