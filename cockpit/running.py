@@ -1,5 +1,6 @@
 """`stickslip run`: one scenario, one log, one verdict."""
 
+import contextlib
 import json
 import sys
 from pathlib import Path
@@ -25,12 +26,21 @@ def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
     }
 
 
+def _stamp(path: Path) -> tuple[int, int] | None:
+    """Tells a file from what it was before; None where there is none."""
+    if not path.is_file():
+        return None
+    now = path.stat()
+    return now.st_mtime_ns, now.st_size
+
+
 def run_scenario(
     name: str, settings: list[str], lockstep: bool, in_process: bool, log: Path | None, as_json: bool
 ) -> int:
     """Run a scenario and print its verdict; the exit status: 0 good, 1 when the run itself shows stick-slip or loss."""
     scenario = load_scenario(name, settings)
     path = log_path(log, scenario.name)
+    before = _stamp(path)
     interrupted = False
     try:
         if in_process:
@@ -56,7 +66,9 @@ def run_scenario(
     from cockpit.verdict import headline, in_words, judge, judge_run
 
     if interrupted:
-        if path.is_file():
+        if _stamp(path) == before:
+            return report(Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded"), as_json)
+        with contextlib.suppress(Fault):  # a log of a moment may hold nothing to judge
             print("\n".join(in_words(judge(path))), file=sys.stderr)
         return report(Fault("INTERRUPTED", "stopped by Ctrl-C; the log is closed"), as_json)
     run = read_run(path)

@@ -16,6 +16,7 @@ from mcap.reader import make_reader
 
 from bridge.faults import FAULTS
 from bridge.logfile import RunData, read_run, recover
+from tests.logs import short_log
 from tests.system.ports import free_endpoint
 
 pytestmark = pytest.mark.realtime
@@ -88,6 +89,14 @@ class Run:
             time.sleep(0.02)
         pytest.fail(f"the run never began: {self.process.communicate(timeout=5)}")
 
+    def wait_until_started(self) -> None:
+        """Until its children are there, which have recorded nothing yet."""
+        until_s = time.monotonic() + 30
+        roles = {"plant", "controller", "recorder"}
+        while set(self.children) != roles and time.monotonic() < until_s:
+            self.children = {role(pid): pid for pid in children_of(self.process.pid)}
+        assert set(self.children) == roles
+
     def end(self) -> tuple[int, str, str]:
         """Status, stdout and stderr; nobody may be left."""
         out, err = self.process.communicate(timeout=30)
@@ -156,6 +165,23 @@ def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[
     assert data.applied["amplitude_m"][-1] == 0.0
 
 
+@pytest.mark.parametrize("there", ["nothing", "an empty file", "an older log"])
+def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list[Run], there: str) -> None:
+    log = tmp_path / "run.mcap"
+    older = {"nothing": None, "an empty file": b"", "an older log": short_log()}[there]
+    if older is not None:
+        log.write_bytes(older)
+    run = Run(log)
+    runs.append(run)
+    run.wait_until_started()
+    run.process.send_signal(signal.SIGINT)
+    status, _, err = run.end()
+    assert status == 130
+    assert err.strip() == "stickslip: INTERRUPTED: stopped by Ctrl-C before anything was recorded"
+    if older is not None:
+        assert log.read_bytes() == older
+
+
 def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap")
     runs.append(run)
@@ -172,11 +198,7 @@ def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None
 def test_a_parent_that_dies_at_once_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap")
     runs.append(run)
-    until_s = time.monotonic() + 30
-    roles = {"plant", "controller", "recorder"}
-    while set(run.children) != roles and time.monotonic() < until_s:
-        run.children = {role(pid): pid for pid in children_of(run.process.pid)}
-    assert set(run.children) == roles
+    run.wait_until_started()
     os.kill(run.process.pid, signal.SIGKILL)  # while they still import
     run.process.communicate(timeout=5)
     try:
