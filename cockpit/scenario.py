@@ -14,7 +14,7 @@ from bridge.config import Strict, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.messages import SCHEMA_VERSION
 from bridge.zenoh_link import BusConfig
-from controller.config import ControllerConfig
+from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 
 
@@ -36,6 +36,19 @@ class Scenario(Strict):
             theirs, ours = getattr(solver, name), getattr(controller, name)
             if theirs != ours:
                 raise ValueError(f"controller.{name} = {ours}: must equal rig.solver.{name} = {theirs}")
+        # a frequency that the rig holds at its own limit is another than the one whose v_a the controller measures
+        candidates_Hz, piezo = candidate_frequencies_Hz(controller), self.rig.piezo
+        lowest_Hz, highest_Hz = candidates_Hz[0], candidates_Hz[-1]
+        for name, commanded_Hz, beyond in (
+            ("frequency_min_Hz", lowest_Hz, lowest_Hz < piezo.frequency_min_Hz),
+            ("frequency_max_Hz", highest_Hz, highest_Hz > piezo.frequency_max_Hz),
+        ):
+            theirs_Hz, ours_Hz = getattr(piezo, name), getattr(controller.limits, name)
+            if beyond:
+                raise ValueError(
+                    f"controller.limits.{name} = {ours_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
+                    f"rig.piezo.{name} = {theirs_Hz:g}; set it to {theirs_Hz:g} as well"
+                )
         times_s = np.arange(0.0, self.duration_s, solver.block_s)
         profile = np.array(self.rig.drive.profile)
         travel_m = float(np.interp(times_s, profile[:, 0], profile[:, 1]).sum()) * solver.block_s

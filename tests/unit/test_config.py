@@ -27,6 +27,19 @@ from plant.config import RigConfig
         ),
         (["rig.contact.static_force_N=1.0"], ["static_force_N", "coulomb_force_N"]),
         (["controller.samples_per_block=25"], ["samples_per_block", "must equal"]),
+        (
+            ["rig.piezo.frequency_max_Hz=2000.0"],
+            [
+                "controller.limits.frequency_max_Hz = 5000",
+                "4500 Hz",
+                "rig.piezo.frequency_max_Hz = 2000",
+                "set it to 2000",
+            ],
+        ),
+        (
+            ["rig.piezo.frequency_min_Hz=2650.0"],
+            ["controller.limits.frequency_min_Hz = 500", "2600 Hz", "rig.piezo.frequency_min_Hz = 2650"],
+        ),
         (["duration_s=200.0"], ["duration_s", "50 mm", "shorten"]),
         (["controller.limits.forbidden_Hz=[[0.0, 9000.0]]"], ["forbidden_Hz", "no frequency is left"]),
         (["controller.onset.window_s=1.0"], ["window_s", "128"]),
@@ -86,6 +99,11 @@ def test_frequencies_keep_away_from_resonance_and_forbidden_bands() -> None:
     assert min(candidates) >= 2.2 * 1144.0
     assert max(candidates) == 5000.0
     assert not any(3000.0 <= frequency <= 3500.0 for frequency in candidates)
+
+
+def test_a_controller_within_the_frequencies_of_its_rig_is_taken() -> None:
+    for limit in ("frequency_max_Hz=2000.0", "frequency_min_Hz=2650.0"):
+        assert load_scenario("paper-c45-c45", [f"rig.piezo.{limit}", f"controller.limits.{limit}"])
 
 
 def test_every_rig_and_scenario_that_comes_along_is_valid() -> None:
