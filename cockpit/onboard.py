@@ -20,7 +20,7 @@ def run_onboard(
     progress: Callable[[float], None] | None = None,
     changes: Sequence[Change] = (),
 ) -> None:
-    """Run a scenario and write its log. Raises Fault LOG_WRITE.
+    """Run a scenario and write its log, with a duration of 0 until Ctrl-C. Raises Fault LOG_WRITE.
 
     Args:
         progress: called now and then with the simulated time [s].
@@ -35,7 +35,7 @@ def run_onboard(
     log.add_metadata("run", about)
     for role in ("controller", "plant"):
         log.add_header(header(scenario, role, lockstep=True))
-    blocks = round(scenario.duration_s / scenario.rig.solver.block_s)
+    blocks = round(scenario.duration_s / scenario.rig.solver.block_s) if scenario.duration_s > 0 else 2**62
     log.write(PLANT_EVENT, _event("plant", 0, 0, "START", "lockstep"))
     commands: list[bytes] = []
     ahead = list(changes)

@@ -134,11 +134,14 @@ def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> in
     run = read_run(path)
     changes = changes_of(run, settings)
     plant = run.configuration("plant")
-    missing = [key for key in ("rig", "seed", "duration_s") if key not in plant]
+    missing = [key for key in ("rig", "seed") if key not in plant]
     if missing:
         line = f"{path}: its plant says nothing of {', '.join(missing)}: only the log of our own plant can be simulated again"
         raise Fault("BAD_LOG", line)
-    table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": plant["duration_s"]}
+    if not len(run.sensors) or not len(run.trace):
+        raise Fault("BAD_LOG", f"{path}: holds no block with what the controller did; there is nothing to compare with")
+    # what was recorded, not what was planned: a run may have been interrupted, or have had no end
+    table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": int(run.sensors["t_ns"][-1]) * 1e-9}
     table["controller"] = changes[0].config.model_dump(mode="json")
     scenario = validate(Scenario, table, path.name)
     run_onboard(scenario, log, {"closed_loop_of": str(path), "settings": settings}, changes=changes[1:])

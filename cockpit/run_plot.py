@@ -41,7 +41,8 @@ def plot_run(path: Path, out: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     upper.plot(t_s, force_N, color=_INK, linewidth=1.0)
     upper.set_ylabel("drive force F_d [N]")
-    upper.legend(loc="lower right", frameon=True)
+    if upper.get_legend_handles_labels()[0]:
+        upper.legend(loc="lower right", frameon=True)
     lower.plot(
         trace_s, 1e3 * trace["vibration_velocity_mps"], color=_BLUE, linewidth=1.2, label="v_a, vibration, measured"
     )
@@ -50,11 +51,13 @@ def plot_run(path: Path, out: Path) -> None:
     lower.set_ylim(bottom=0.0)
     lower.set_xlabel("time [s]")
     lower.legend(loc="lower right", frameon=True)
-    figure.savefig(out, dpi=110)
+    figure.savefig(out, dpi=110, format="png")
 
 
 def _shade(axes: Any, t_s: Any, mode: Any) -> None:
     """Colour the background by mode, each mode once in the legend."""
+    if not len(mode):
+        return
     edges = [0, *(np.flatnonzero(np.diff(mode.astype(int))) + 1).tolist(), len(mode) - 1]
     named: set[int] = set()
     for start, end in pairwise(edges):

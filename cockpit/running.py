@@ -50,7 +50,7 @@ def run_scenario(
             from cockpit.onboard import run_onboard
 
             with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bar:
-                task = bar.add_task("simulating", total=scenario.duration_s)
+                task = bar.add_task("simulating", total=scenario.duration_s or None)
                 run_onboard(
                     scenario, path, about_run(scenario, lockstep=True), lambda t_s: bar.update(task, completed=t_s)
                 )

@@ -49,9 +49,9 @@ class Scenario(Strict):
                     f"controller.limits.{name} = {ours_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
                     f"rig.piezo.{name} = {theirs_Hz:g}; set it to {theirs_Hz:g} as well"
                 )
-        times_s = np.arange(0.0, self.duration_s, solver.block_s)
         profile = np.array(self.rig.drive.profile)
-        travel_m = float(np.interp(times_s, profile[:, 0], profile[:, 1]).sum()) * solver.block_s
+        corners_s = np.unique(np.clip([0.0, *profile[:, 0], self.duration_s], 0.0, self.duration_s))
+        travel_m = float(np.trapezoid(np.interp(corners_s, profile[:, 0], profile[:, 1]), corners_s))
         range_m = self.rig.sensors.position_range_m
         if travel_m > range_m:
             raise ValueError(

@@ -86,3 +86,13 @@ def doctored(folder: Path, change: Callable[[Tables], None], name: str = "doctor
     out = folder / name
     write(out, tables, run)
     return out
+
+
+def empty_log(folder: Path) -> Path:
+    """A log of a run that ended before its first block."""
+
+    def change(tables: Tables) -> None:
+        for name, table in tables.items():
+            tables[name] = table[:0]
+
+    return doctored(folder, change, "empty.mcap")

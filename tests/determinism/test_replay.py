@@ -20,6 +20,7 @@ from cockpit.scenario import Scenario, header, load_scenario
 from controller.node import ControllerNode
 from controller.replay import replay
 from plant.node import PlantNode
+from tests.logs import empty_log, tables_of, write
 from tests.system.ports import free_endpoint
 
 pytestmark = pytest.mark.realtime
@@ -142,6 +143,24 @@ def test_closed_loop_compares_both(log: Path, tmp_path: Path) -> None:
     changed = json.loads(CliRunner().invoke(app, ["replay", str(log), *arguments]).stdout)
     assert changed["now"]["vibration_dose_mm2_per_s"] < changed["was"]["vibration_dose_mm2_per_s"]
     assert changed["now"]["velocity_ratio_min"] < 1.15 < changed["was"]["velocity_ratio_min"]
+
+
+def test_closed_loop_of_a_run_that_was_cut_short_takes_as_long_as_was_recorded(log: Path, tmp_path: Path) -> None:
+    run, cut, out = read_run(log), tmp_path / "cut.mcap", tmp_path / "again.mcap"
+    write(cut, {name: table[:2500] for name, table in tables_of(run).items()}, run)
+    figures = json.loads(
+        CliRunner().invoke(app, ["replay", str(cut), "--closed-loop", "--json", "--log", str(out)]).stdout
+    )
+    assert figures["was"] == figures["now"]
+    assert len(read_run(out).trace) == 2500
+
+
+def test_closed_loop_of_a_log_without_a_block_is_refused(tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        app, ["replay", str(empty_log(tmp_path)), "--closed-loop", "--log", str(tmp_path / "a.mcap")]
+    )
+    assert result.exit_code == 7
+    assert "empty.mcap: holds no block" in result.stderr
 
 
 def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path, tmp_path: Path) -> None:

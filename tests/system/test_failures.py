@@ -182,6 +182,29 @@ def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list
         assert log.read_bytes() == older
 
 
+def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped(tmp_path: Path) -> None:
+    log = tmp_path / "run.mcap"
+    run = subprocess.Popen(
+        [*COMMAND, "run", "--in-process", "--set", "duration_s=0", "--log", str(log)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        until_s = time.monotonic() + 60
+        while (not log.exists() or log.stat().st_size < 200_000) and run.poll() is None and time.monotonic() < until_s:
+            time.sleep(0.02)
+        run.send_signal(signal.SIGINT)
+        _, err = run.communicate(timeout=30)
+    finally:
+        run.kill()
+    assert run.returncode == 130
+    assert "INTERRUPTED" in err.strip().splitlines()[-1]
+    data = read_run(log)
+    assert data.damage.closed
+    assert len(data.sensors) > 100
+
+
 def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap")
     runs.append(run)

@@ -1,5 +1,6 @@
 """Bad configuration is one clear line: place, value, rule, remedy."""
 
+import contextlib
 import re
 from pathlib import Path
 
@@ -41,6 +42,7 @@ from plant.config import RigConfig
             ["controller.limits.frequency_min_Hz = 500", "2600 Hz", "rig.piezo.frequency_min_Hz = 2650"],
         ),
         (["duration_s=200.0"], ["duration_s", "50 mm", "shorten"]),
+        (["duration_s=1e9"], ["duration_s = 1e+09", "500000000.0 mm", "shorten"]),
         (["controller.limits.forbidden_Hz=[[0.0, 9000.0]]"], ["forbidden_Hz", "no frequency is left"]),
         (["controller.onset.window_s=1.0"], ["window_s", "128"]),
         (["bus.endpoint=here"], ["bus.endpoint", "here"]),
@@ -99,6 +101,14 @@ def test_frequencies_keep_away_from_resonance_and_forbidden_bands() -> None:
     assert min(candidates) >= 2.2 * 1144.0
     assert max(candidates) == 5000.0
     assert not any(3000.0 <= frequency <= 3500.0 for frequency in candidates)
+
+
+@pytest.mark.parametrize(("peak_mps", "fits"), [(0.0110, True), (0.0112, False)])
+def test_the_travel_of_a_changing_drive_is_counted(peak_mps: float, fits: bool) -> None:
+    """A triangle of 8 s before a stop and one cut off at half its height: 4.5 s of its peak, of 50 mm."""
+    profile = f"rig.drive.profile=[[0.0, 0.0], [4.0, {peak_mps}], [8.0, 0.0], [12.0, 0.0], [16.0, {peak_mps}]]"
+    with contextlib.nullcontext() if fits else pytest.raises(Fault, match="beyond the transducers' 50 mm"):
+        load_scenario("paper-c45-c45", [profile, "duration_s=14.0"])
 
 
 def test_a_controller_within_the_frequencies_of_its_rig_is_taken() -> None:
