@@ -295,16 +295,11 @@ def replay_command(
             from cockpit.to_bus import publish_log
 
             bus = load_scenario(DEFAULT_SCENARIO, _settings([], None, endpoint, prefix)).bus
+            roles = ["controller", "recorder"] if wait else []
+            stop = stop_event()
             for path in logs:
-                publish_log(
-                    path,
-                    bus,
-                    speed,
-                    from_s,
-                    everything,
-                    ["controller", "recorder"] if wait else [],
-                    stop_event(),
-                )
+                if not stop.is_set():
+                    publish_log(path, bus, speed, from_s, everything, roles, stop)
             return 0
         from cockpit import replaying
 

@@ -18,13 +18,12 @@ from rich.live import Live
 from rich.text import Text
 
 from bridge import stickslip_pb2 as wire
-from bridge.faults import Fault
 from bridge.logfile import RunData, read_run
 from bridge.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS, STATE, TRACE, Topic
 from bridge.zenoh_link import Bus, BusConfig
+from plant.app import wait_for_peers
 
 _GOODBYE_S = 1.0
-_PEER_TIMEOUT_S = 30.0
 _KEY_LOOK_S = 0.05
 
 
@@ -45,7 +44,6 @@ def publish_log(
         speed: times real time.
         from_s: start here.
         everything: the controller's topics as well; otherwise a live controller may answer.
-
         wait_for: roles that must be on the bus first.
 
     Raises Fault BAD_LOG, ENDPOINT_BUSY, NO_PEER.
@@ -70,11 +68,7 @@ def publish_log(
         send = {topic.name: bus.publisher(topic) for topic, _ in tables}
         send_event = bus.publisher(PLANT_EVENT)
         bus.announce()
-        missing = bus.wait_for(wait_for, _PEER_TIMEOUT_S)
-        if missing:
-            raise Fault(
-                "NO_PEER", f"{bus_config.endpoint}: no {' and no '.join(sorted(missing))} within {_PEER_TIMEOUT_S:g} s"
-            )
+        wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
         send_event(_event("START", f"replay of {path.name} at {speed:g} times real time"))
         _play(schedule, tables, send, speed, pause, stop)
         send_event(_event("END", f"blocks={len(run.sensors)}"))

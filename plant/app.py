@@ -42,12 +42,7 @@ def run(
         bus.serve_header(header)
         process = _Process(node, bus)
         bus.announce()
-        missing = _wait(bus, wait_for, stop)
-        if missing:
-            raise Fault(
-                "NO_PEER",
-                f"{bus_config.endpoint}: no {' and no '.join(sorted(missing))} within {PEER_TIMEOUT_S:g} s",
-            )
+        wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
         granted = realtime.claim(0)
         if lockstep:
             process.event("START", "lockstep")  # the same text everywhere: the same run gives the same log
@@ -59,12 +54,14 @@ def run(
         bus.wait_until_alone(_GOODBYE_S)  # the others are relayed by this process: it leaves last
 
 
-def _wait(bus: Bus, roles: list[str], stop: threading.Event) -> set[str]:
+def wait_for_peers(bus: Bus, endpoint: str, roles: list[str], stop: threading.Event) -> None:
+    """Wait until all `roles` are on the bus, or `stop` is set. Raises Fault NO_PEER."""
     until_s = time.monotonic() + PEER_TIMEOUT_S
     missing = bus.wait_for(roles, 0.0)
     while missing and time.monotonic() < until_s and not stop.is_set():
         missing = bus.wait_for(roles, 0.2)
-    return set() if stop.is_set() else missing
+    if missing and not stop.is_set():
+        raise Fault("NO_PEER", f"{endpoint}: no {' and no '.join(sorted(missing))} within {PEER_TIMEOUT_S:g} s")
 
 
 class _Process:

@@ -51,3 +51,35 @@ def test_pause_and_go_on() -> None:
         if player.poll() is None:
             player.kill()
             player.wait()
+
+
+@pytest.mark.parametrize("wait", [[], ["--wait"]], ids=["while it plays", "while it waits"])
+def test_ctrl_c_ends_it_and_begins_no_other_log(wait: list[str]) -> None:
+    log, endpoint = str(FOLDER / "from-the-start.mcap"), free_endpoint()
+    player = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "cockpit",
+            "replay",
+            log,
+            log,
+            "--to-bus",
+            "--speed",
+            "0.05",
+            *wait,
+            "--endpoint",
+            endpoint,
+        ]
+    )
+    try:
+        with Bus(BusConfig(endpoint=endpoint), "viewer", lockstep=False) as bus:
+            assert not bus.wait_for({"plant"}, 30.0)
+            player.send_signal(signal.SIGINT)
+            began_s = time.monotonic()
+            assert player.wait(60) == 0
+        assert time.monotonic() - began_s < 15.0  # of the 30 s of a log at this speed, and of waiting
+    finally:
+        if player.poll() is None:
+            player.kill()
+            player.wait()
