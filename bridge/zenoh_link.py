@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Annotated, Any, NamedTuple, Self
 
 import zenoh
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from bridge import stickslip_pb2 as wire
 from bridge.config import Strict
@@ -28,8 +28,15 @@ _CONNECT_S = 30.0  # a first start of the plant compiles before it listens: long
 class BusConfig(Strict):
     """Where the processes of one rig meet."""
 
-    endpoint: Annotated[str, Field(pattern=r"^(tcp|tls|quic)/.+:\d+$")] = "tcp/127.0.0.1:7447"
+    endpoint: Annotated[str, Field(pattern=r"^tcp/.+:\d{1,5}$")] = "tcp/127.0.0.1:7447"
     prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
+
+    @field_validator("endpoint")
+    @classmethod
+    def _port_exists(cls, endpoint: str) -> str:
+        if not 1 <= int(endpoint.rpartition(":")[2]) <= 65535:
+            raise ValueError(f"{endpoint!r}: the port must be from 1 to 65535; choose another, for example 7447")
+        return endpoint
 
 
 class Received(NamedTuple):

@@ -1,10 +1,8 @@
 """The `stickslip` command. Each command imports what it needs when it runs, so that `--help` is quick."""
 
-import contextlib
 import json
 import os
 import sys
-from collections.abc import Generator
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +13,7 @@ from cockpit.blind_command import blind_app
 from cockpit.diagnose_command import diagnose
 from cockpit.log_commands import log_app
 from cockpit.processes import guarded, stop_event
+from cockpit.writing import check_writable, writing
 
 app = typer.Typer(
     help="Real-time control against stick-slip: run a rig or its stand-in, replay, recover and judge its logs.",
@@ -186,14 +185,11 @@ def operator_stop(
     sys.exit(guarded(work))
 
 
-@contextlib.contextmanager
-def _writing(out: Path) -> Generator[None]:
-    """Make the folder of `out`; a failure to write is one clear line."""
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        yield
-    except OSError as error:
-        raise Fault("LOG_WRITE", f"{out}: cannot be written: {error.strerror}; choose another --out") from None
+def _check_out(out: Path) -> None:
+    """Raise Fault LOG_WRITE where `out` cannot become a file: at the start of a command, not at its end."""
+    if out.is_dir():
+        raise Fault("LOG_WRITE", f"--out {out}: is a folder; give the name of a file in it")
+    check_writable("--out", out)
 
 
 @app.command()
@@ -206,7 +202,9 @@ def reproduce(
     def work() -> int:
         from cockpit.reproduce import reproduce as redo
 
-        with _writing(out):
+        _check_out(out)
+        with writing(out):
+            out.parent.mkdir(parents=True, exist_ok=True)
             result = redo(out, progress=True)
         print(json.dumps(result.as_json()) if as_json else f"{result.verdict}\nreport   {out}")
         return 0 if result.passed else 1
@@ -232,8 +230,11 @@ def stability(
         from cockpit.scenario import load_rig
         from cockpit.stability_map import stability_map
 
-        with _writing(out):
-            result = stability_map(load_rig(rig, settings), out)
+        made = load_rig(rig, settings)
+        _check_out(out)
+        with writing(out):
+            out.parent.mkdir(parents=True, exist_ok=True)
+            result = stability_map(made, out)
         print(json.dumps(result._asdict()) if as_json else f"{result.answer}\npicture  {out}")
 
     sys.exit(guarded(work, as_json))
@@ -249,7 +250,9 @@ def plot(
     def work() -> None:
         from cockpit.run_plot import plot_run
 
-        with _writing(out):
+        _check_out(out)
+        with writing(out):
+            out.parent.mkdir(parents=True, exist_ok=True)
             plot_run(log, out)
         print(f"picture  {out}")
 
@@ -286,10 +289,9 @@ def replay_command(
     """Feed a log to today's controller: the same bits (exit 0), or the first difference (exit 1)."""
 
     def work() -> int:
-        try:
-            from_s = float(start.removesuffix("s"))
-        except ValueError:
-            raise Fault("CONFIG", f"--from {start}: no time; write for example 12.5s") from None
+        from cockpit import replaying
+
+        from_s = replaying.time_s(f"--from {start}", start, "12.5s")
         if to_bus:
             from cockpit.scenario import load_scenario
             from cockpit.to_bus import publish_log
@@ -301,8 +303,6 @@ def replay_command(
                 if not stop.is_set():
                     publish_log(path, bus, speed, from_s, everything, roles, stop)
             return 0
-        from cockpit import replaying
-
         if closed_loop:
             if len(logs) != 1:
                 raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")

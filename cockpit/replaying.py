@@ -1,6 +1,7 @@
 """`stickslip replay`: is it the same, what if, and a log back on the bus."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +14,20 @@ from cockpit.verdict import judge_run
 from controller.config import ControllerConfig
 from controller.replay import Change, Replay, replay
 
+_LATEST_S = 1e9  # 32 years; a log counts nanoseconds in 64 bits, 1.8e10 s
+
+
+def time_s(option: str, text: str, example: str) -> float:
+    """The seconds of a time in an option. Raises Fault CONFIG."""
+    try:
+        t_s = float(text.removesuffix("s"))
+    except ValueError:
+        t_s = math.nan
+    if not 0.0 <= t_s <= _LATEST_S:
+        line = f"{option}: {text!r} is no time; must be from 0 to {_LATEST_S:g} s; write for example {example}"
+        raise Fault("CONFIG", line)
+    return t_s
+
 
 def changes_of(run: RunData, settings: list[str]) -> list[Change]:
     """The log's own configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
@@ -23,12 +38,7 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
         plain, _, time = setting.rpartition("@")
         t_ns = 0
         if plain:
-            try:
-                t_ns = round(float(time.removesuffix("s")) * 1e9)
-            except ValueError:
-                raise Fault(
-                    "CONFIG", f"--set {setting}: {time!r} is no time; write for example key=value@20s"
-                ) from None
+            t_ns = round(time_s(f"--set {setting}", time, "key=value@20s") * 1e9)
         timed.setdefault(t_ns, []).append((plain or setting).removeprefix("controller."))
     changes: list[Change] = []
     for t_ns in sorted(timed):

@@ -19,13 +19,13 @@ def check_writable(option: str, path: Path) -> None:
 
 
 @contextmanager
-def writing() -> Generator[None]:
-    """Turn what the operating system refuses into a Fault LOG_WRITE."""
+def writing(path: Path | None = None) -> Generator[None]:
+    """Turn what the operating system refuses into a Fault LOG_WRITE, of `path` where it does not say of what."""
     try:
         yield
     except BrokenPipeError:
         raise
     except OSError as error:
-        where = str(error.filename).removesuffix(".part")
+        where = str(error.filename or path).removesuffix(".part")
         line = f"{where}: cannot be written: {error.strerror}; choose another place or free space"
         raise Fault("LOG_WRITE", line) from None

@@ -46,6 +46,9 @@ from plant.config import RigConfig
         (["controller.limits.forbidden_Hz=[[0.0, 9000.0]]"], ["forbidden_Hz", "no frequency is left"]),
         (["controller.onset.window_s=1.0"], ["window_s", "128"]),
         (["bus.endpoint=here"], ["bus.endpoint", "here"]),
+        (["bus.endpoint=tls/127.0.0.1:7447"], ["bus.endpoint", "tls/127.0.0.1:7447", "tcp/"]),
+        (["bus.endpoint=tcp/127.0.0.1:99999"], ["bus.endpoint", "tcp/127.0.0.1:99999", "from 1 to 65535"]),
+        (["bus.endpoint=tcp/127.0.0.1:0"], ["bus.endpoint", "from 1 to 65535"]),
         (["rig.drive.profile=[[1.0, 0.1], [0.5, 0.1]]"], ["profile", "must increase"]),
     ],
 )
