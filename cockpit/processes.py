@@ -51,11 +51,18 @@ def report(fault: Fault, as_json: bool) -> int:
 def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
     """Run a command's work; its exit status, faults and Ctrl-C included."""
     try:
+        status = _status(work, as_json)
+        sys.stdout.flush()  # here, where a closed pipe can still be told
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    return status
+
+
+def _status(work: Callable[[], int | None], as_json: bool) -> int:
+    try:
         return work() or 0
     except Fault as fault:
         return report(fault, as_json)
     except KeyboardInterrupt:
         return report(Fault("INTERRUPTED", "stopped by Ctrl-C"), as_json)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0

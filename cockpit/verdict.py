@@ -74,12 +74,11 @@ def judge_run(run: RunData) -> Verdict:
     controller = run.configuration("controller")
     block_s = float(controller["block_s"])
     blocks = len(run.sensors)
-    sequence = run.sensors["sequence"].astype(np.int64)
-    lost_blocks = int(sequence[-1] - sequence[0] + 1 - blocks) if blocks else 0
     t_s = run.sensors["t_ns"] * 1e-9
     force_N = run.sensors["drive_force_N"].astype(np.float64)
     enabled_from_s = float(controller["policy"]["enabled_from_s"])
     seconds = float(t_s[-1]) if blocks else 0.0
+    began_s = max(float(t_s.min()) - block_s, 0.0) if blocks else 0.0  # a log may begin late
     in_charge_s = enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
     samples = force_N.shape[1] if blocks else 1
     sample_s = (t_s[:, None] + (np.arange(samples) + 1 - samples) * (block_s / samples)).ravel()
@@ -95,11 +94,11 @@ def judge_run(run: RunData) -> Verdict:
         log=str(run.path),
         seconds=seconds,
         blocks=blocks,
-        lost_blocks=lost_blocks,
-        lost_messages=_lost(run),
+        lost_blocks=_lost(run.sensors),
+        lost_messages=sum(map(_lost, (run.sensors, run.applied, run.command, run.trace, run.state))),
         enabled_from_s=enabled_from_s,
-        before=_phase(cycles, t_s, mean_N, 0.0, min(enabled_from_s, seconds)),
-        after=_phase(cycles, t_s, mean_N, in_charge_s, seconds),
+        before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds)),
+        after=_phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds),
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
         latency=_latency(run),
@@ -115,13 +114,12 @@ def _vibrating(trace: Any, block_s: float) -> Any:
     return excited & (since * block_s > _RAMP_S)
 
 
-def _lost(run: RunData) -> int:
-    lost = 0
-    for table in (run.sensors, run.applied, run.command, run.trace, run.state):
-        if len(table):
-            sequence = table["sequence"].astype(np.int64)
-            lost += int(sequence[-1] - sequence[0] + 1 - len(np.unique(sequence)))
-    return lost
+def _lost(table: Any) -> int:
+    """Messages that are missing between the first and the last number, whatever the order they came in."""
+    if not len(table):
+        return 0
+    sequence = table["sequence"].astype(np.int64)
+    return int(sequence.max() - sequence.min() + 1 - len(np.unique(sequence)))
 
 
 def _phase(cycles: Cycles | None, t_s: Any, mean_N: Any, from_s: float, to_s: float) -> Phase | None:

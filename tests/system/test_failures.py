@@ -331,11 +331,11 @@ def test_every_fault_is_explained(code: str) -> None:
     assert len(result.stdout) > 100
 
 
-@pytest.mark.parametrize("status", ["0", "1"])
+@pytest.mark.parametrize("status", ["0", "1", "141"])
 def test_every_exit_status_is_explained(status: str) -> None:
     from typer.testing import CliRunner
 
     from cockpit.cli import app
 
     assert f"exit status {status}: " in CliRunner().invoke(app, ["explain", status]).stdout
-    assert f" {status}  " in CliRunner().invoke(app, ["explain"]).stdout
+    assert f"{status:>3}  " in CliRunner().invoke(app, ["explain"]).stdout
