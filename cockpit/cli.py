@@ -293,6 +293,10 @@ def replay_command(
 
         from_s = replaying.time_s(f"--from {start}", start, "12.5s")
         if to_bus:
+            for option, given in (("--closed-loop", closed_loop), ("--json", as_json), ("--set", bool(settings))):
+                if given:
+                    line = f"{option}: not with --to-bus, which plays the log as it is; leave one of them out"
+                    raise Fault("CONFIG", line)
             from cockpit.scenario import load_scenario
             from cockpit.to_bus import publish_log
 
@@ -306,6 +310,12 @@ def replay_command(
         if closed_loop:
             if len(logs) != 1:
                 raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")
+            if from_s > 0.0:
+                line = f"--from {start}: not with --closed-loop, which simulates the run from its start; leave it out"
+                raise Fault("CONFIG", line)
+            if out.resolve() == logs[0].resolve():
+                line = f"--log {out}: is the recorded run, which the new one would replace; choose another file"
+                raise Fault("CONFIG", line)
             return replaying.closed_loop(logs[0], settings, out, as_json)
         return replaying.replay_logs(logs, from_s, settings, as_json)
 
@@ -316,6 +326,8 @@ _NO_FAULTS = {
     "0": "all is well; a diagnosis that was made is, whatever it says",
     "1": "the command did its work, and the run, the log or the comparison is not as it should be; or, with a traceback, "
     "an error of the program: please report it",
+    "141": "whoever read the output closed it before its end, as `| head` does; what the command would have ended with is not "
+    "known",
 }
 
 
@@ -326,39 +338,48 @@ def explain(
     ] = "",
 ) -> None:
     """Say what a fault code or an exit status means and what to do."""
-    if not code:
-        rows = [(kind.exit_status, kind.code) for kind in FAULTS.values()]
-        for status, meaning in sorted((*rows, *((int(status), said) for status, said in _NO_FAULTS.items()))):
-            print(f"{status:>3}  {meaning}")
-        return
-    if code in _NO_FAULTS:
-        print(f"exit status {code}: {_NO_FAULTS[code]}")
-        return
-    kinds = [kind for kind in FAULTS.values() if code.upper() in {kind.code, str(kind.exit_status)}]
-    if not kinds:
-        statuses = ", ".join(sorted({*_NO_FAULTS, *(str(kind.exit_status) for kind in FAULTS.values())}, key=int))
-        print(f"stickslip: {code}: unknown; known: {', '.join(FAULTS)}; exit statuses {statuses}", file=sys.stderr)
-        sys.exit(2)
-    print("\n\n".join(f"{kind.code} (exit status {kind.exit_status})\n{kind.help}" for kind in kinds))
+
+    def work() -> int:
+        if not code:
+            rows = [(kind.exit_status, kind.code) for kind in FAULTS.values()]
+            for status, meaning in sorted((*rows, *((int(status), said) for status, said in _NO_FAULTS.items()))):
+                print(f"{status:>3}  {meaning}")
+            return 0
+        if code in _NO_FAULTS:
+            print(f"exit status {code}: {_NO_FAULTS[code]}")
+            return 0
+        kinds = [kind for kind in FAULTS.values() if code.upper() in {kind.code, str(kind.exit_status)}]
+        if not kinds:
+            statuses = ", ".join(sorted({*_NO_FAULTS, *(str(kind.exit_status) for kind in FAULTS.values())}, key=int))
+            print(f"stickslip: {code}: unknown; known: {', '.join(FAULTS)}; exit statuses {statuses}", file=sys.stderr)
+            return 2
+        print("\n\n".join(f"{kind.code} (exit status {kind.exit_status})\n{kind.help}" for kind in kinds))
+        return 0
+
+    sys.exit(guarded(work))
 
 
 @app.command()
 def scenarios(as_json: Json = False) -> None:
     """List the scenarios and rigs that come with the project."""
-    from bridge.config import read_toml
-    from cockpit.scenario import deploy_folder
 
-    found = {
-        path.stem: str(read_toml(path).get("description", ""))
-        for path in sorted(deploy_folder().glob("scenarios/*.toml"))
-    }
-    rigs = [path.stem for path in sorted(deploy_folder().glob("rigs/*.toml"))]
-    if as_json:
-        print(json.dumps({"scenarios": found, "rigs": rigs}))
-        return
-    for name, description in found.items():
-        print(f"{name:<24} {description}")
-    print("rigs: " + ", ".join(rigs))
+    def work() -> None:
+        from bridge.config import read_toml
+        from cockpit.scenario import deploy_folder
+
+        found = {
+            path.stem: str(read_toml(path).get("description", ""))
+            for path in sorted(deploy_folder().glob("scenarios/*.toml"))
+        }
+        rigs = [path.stem for path in sorted(deploy_folder().glob("rigs/*.toml"))]
+        if as_json:
+            print(json.dumps({"scenarios": found, "rigs": rigs}))
+            return
+        for name, description in found.items():
+            print(f"{name:<24} {description}")
+        print("rigs: " + ", ".join(rigs))
+
+    sys.exit(guarded(work, as_json))
 
 
 app.command()(diagnose)

@@ -1,12 +1,17 @@
 """Commands that read a log or draw: what comes of logs and options that are not as usual."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from bridge.logfile import read_run
 from cockpit.cli import app
-from tests.logs import empty_log, short_log
+from cockpit.verdict import judge_run
+from tests.logs import doctored, empty_log, short_log
 
 PNG = b"\x89PNG"
 
@@ -59,3 +64,59 @@ def test_a_rig_that_cannot_be_read_is_no_picture_that_cannot_be_written(tmp_path
     result = call("map", "--rig", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "map.png"))
     assert result.exit_code != 0
     assert "LOG_WRITE" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("options", "place", "remedy"),
+    [
+        (["--to-bus", "--closed-loop"], "--closed-loop: not with --to-bus", "leave one"),
+        (["--to-bus", "--json"], "--json: not with --to-bus", "leave one"),
+        (["--to-bus", "--set", "limits.v_ratio=1.1"], "--set: not with --to-bus", "leave one"),
+        (["--closed-loop", "--from", "0.1s"], "--from 0.1s: not with --closed-loop", "leave it out"),
+        (["--closed-loop", "--log", "{log}"], "--log {log}: is the recorded run", "choose another"),
+    ],
+)
+def test_options_that_a_replay_would_not_follow_are_refused(
+    log: Path, options: list[str], place: str, remedy: str
+) -> None:
+    before = log.read_bytes()
+    result = call("replay", str(log), *(option.format(log=log) for option in options))
+    assert log.read_bytes() == before
+    words = result.output + result.stderr
+    assert result.exit_code == 2, words
+    assert place.format(log=log) in words
+    assert remedy in words
+
+
+def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> None:
+    def begin_late(tables):
+        for name, table in tables.items():
+            tables[name] = table[table["t_ns"] > 150_000_000]
+
+    run = read_run(doctored(tmp_path, begin_late))
+    verdict = judge_run(run)
+    assert verdict.before is not None
+    assert verdict.before.seconds == pytest.approx(0.25)
+    assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
+
+
+def test_messages_out_of_order_are_not_lost(tmp_path: Path) -> None:
+    def exchange(tables):
+        for table in tables.values():
+            table[[0, 30]] = table[[30, 0]]
+
+    verdict = judge_run(read_run(doctored(tmp_path, exchange)))
+    assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
+
+
+@pytest.mark.parametrize("arguments", [["log", "check", "bad.mcap"], ["explain"], ["explain", "CONFIG"], ["scenarios"]])
+def test_a_reader_that_leaves_is_no_success(tmp_path: Path, arguments: list[str]) -> None:
+    """`stickslip ... | head` with a reader that is gone before the first word."""
+    (tmp_path / "bad.mcap").write_bytes(short_log()[:-2000])
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as closed:
+        command = [sys.executable, "-m", "cockpit", *arguments]
+        result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False)
+    assert result.returncode == 141
+    assert result.stderr == ""
