@@ -18,7 +18,8 @@ FAULTS = {
             "CONFIG",
             2,
             "A configuration or scenario file has a key that is unknown, missing or out of range. The line names the "
-            "file, the key, its value, the rule and the remedy. Nothing was started.",
+            "file, the key, its value, the rule and the remedy. Nothing was started; but where a rig's numbers ran away, the "
+            "run ended there.",
         ),
         FaultKind(
             "ENDPOINT_BUSY",
