@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.faults import Fault
 from bridge.kernel import kernel
 from bridge.logfile import RunData
 from bridge.messages import COMMAND, TRACE, Layout, Records
@@ -83,6 +84,8 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
         changes: configurations in order of time; the first holds from the start.
         from_s: only steps from this time on are compared and returned.
 
+    Raises Fault BAD_LOG where two controllers answered, whose steps cannot be told apart.
+
     """
     trace = run.trace
     order = np.argsort(trace["sequence"], kind="stable")
@@ -91,6 +94,11 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
     events = trace["events"][order].astype(np.int64)
     t_ns = trace["t_ns"][order].astype(np.int64)
     gaps = trace["gap_blocks"][order].astype(np.int64)
+    twice = np.flatnonzero((np.diff(sequence) == 0) & (np.diff(t_ns) != 0))
+    if len(twice):
+        at_s, again_s = 1e-9 * t_ns[twice[0]], 1e-9 * t_ns[twice[0] + 1]
+        line = f"/trace: step {sequence[twice[0]]} is there at {at_s:.3f} s and again at {again_s:.3f} s"
+        raise Fault("BAD_LOG", f"{line}: the controller was started again; record every controller in a log of its own")
     rows = _rows(run.sensors, block, events)
     sensors = _writable(run.sensors)
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from bridge.faults import Fault
 from bridge.logfile import RunData, read_run
 from bridge.runlog import RunLog
 from bridge.topics import SENSORS
@@ -110,6 +111,17 @@ def test_a_recorder_that_lost_blocks_costs_only_until_the_next_snapshot(log: Pat
     result = replay(run._replace(sensors=run.sensors[keep]), changes_of(run, []))
     assert result.identical
     assert result.skipped == 500  # 1500 to 1999: the memory is known again after step 1999
+
+
+def test_a_controller_that_was_started_again_is_refused(log: Path) -> None:
+    run = read_run(log)
+    again = run.trace[:100].copy()
+    again["t_ns"] += 600_000_000
+    restarted = run._replace(trace=np.concatenate([run.trace[:500], again]))
+    with pytest.raises(
+        Fault, match=r"/trace: step 0 is there at 0.001 s and again at 0.601 s: the controller was started"
+    ):
+        replay(restarted, changes_of(run, []))
 
 
 def test_what_if_names_the_change_and_says_what_it_cannot_know(log: Path) -> None:
