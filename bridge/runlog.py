@@ -75,7 +75,7 @@ class RunLog:
         self._guarded(lambda: self._writer.add_metadata(name, text))
 
     def write(self, topic: Topic, payload: bytes) -> None:
-        """Keep one message, and note a gap in its sequence. Raises Fault LOG_WRITE."""
+        """Keep one message, and note a gap in its sequence. Raises Fault BAD_MESSAGE, LOG_WRITE."""
         sequence, t_ns = sequence_and_time(payload, topic.message)
         if t_ns < 0:
             line = f"{topic.name}: t_ns = {t_ns}: must be 0 or more; count it from the start of the run"

@@ -1,8 +1,10 @@
 """The `stickslip` command. Each command imports what it needs when it runs, so that `--help` is quick."""
 
+import contextlib
 import json
 import os
 import sys
+from collections.abc import Generator
 from pathlib import Path
 from typing import Annotated
 
@@ -185,11 +187,15 @@ def operator_stop(
     sys.exit(guarded(work))
 
 
-def _check_out(out: Path) -> None:
-    """Raise Fault LOG_WRITE where `out` cannot become a file: at the start of a command, not at its end."""
+@contextlib.contextmanager
+def _written(out: Path) -> Generator[None]:
+    """The work that ends with writing `out`. Raises Fault LOG_WRITE where it cannot, at its start if that is known then."""
     if out.is_dir():
         raise Fault("LOG_WRITE", f"--out {out}: is a folder; give the name of a file in it")
     check_writable("--out", out)
+    with writing(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        yield
 
 
 @app.command()
@@ -202,9 +208,7 @@ def reproduce(
     def work() -> int:
         from cockpit.reproduce import reproduce as redo
 
-        _check_out(out)
-        with writing(out):
-            out.parent.mkdir(parents=True, exist_ok=True)
+        with _written(out):
             result = redo(out, progress=True)
         print(json.dumps(result.as_json()) if as_json else f"{result.verdict}\nreport   {out}")
         return 0 if result.passed else 1
@@ -231,9 +235,7 @@ def stability(
         from cockpit.stability_map import stability_map
 
         made = load_rig(rig, settings)
-        _check_out(out)
-        with writing(out):
-            out.parent.mkdir(parents=True, exist_ok=True)
+        with _written(out):
             result = stability_map(made, out)
         print(json.dumps(result._asdict()) if as_json else f"{result.answer}\npicture  {out}")
 
@@ -250,9 +252,7 @@ def plot(
     def work() -> None:
         from cockpit.run_plot import plot_run
 
-        _check_out(out)
-        with writing(out):
-            out.parent.mkdir(parents=True, exist_ok=True)
+        with _written(out):
             plot_run(log, out)
         print(f"picture  {out}")
 

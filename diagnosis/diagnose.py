@@ -25,7 +25,6 @@ from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
 from diagnosis.phases import is_phase
 from diagnosis.phases_by_run import starts_by_run
-from diagnosis.pick_up import PICK_UP, pick_up
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction, is_random
@@ -150,7 +149,7 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         if verdict.named is not None and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
             gone, best = best, retuned
             verdict = judge(retuned, singles, pairs, expected_chi2, random, refuted=True)
-    if any(finding.kind == PICK_UP for finding in evidence.findings):
+    if any(run.pick_up for run in evidence.runs):
         verdict = although_outside(verdict)
     progress(f"verdict: {verdict.kind}", 0.8)
     return _assembled(evidence, runs, fitter, retuned, best, gone, singles, verdict, tried, held_out, began, jobs)
@@ -364,7 +363,7 @@ def _cells(floor: Floor, z: Floats) -> list[Cell]:
 
 def _vibrating(evidence: Evidence) -> list[Cell]:
     """Cells of forces that vibrate as no spring does, in what is ordinary, as the others are in floors."""
-    found = [(run.file, pick_up(evidence.rig, run.t_s, run.columns)) for run in evidence.runs]
+    found = [(run.file, run.pick_up) for run in evidence.runs]
     return [Cell("drive_force_N", "steady", one.band_Hz, file, one.limits**2 - 1.0) for file, one in found if one]
 
 

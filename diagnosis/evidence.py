@@ -17,7 +17,7 @@ from diagnosis.evidence_checks import Columns, checked
 from diagnosis.findings import Finding
 from diagnosis.log_evidence import columns_of_log
 from diagnosis.manifest import MANIFEST, STANDARD, ChannelMap, Manifest, RigTable, RunTable, read_manifest
-from diagnosis.pick_up import PICK_UP, pick_up
+from diagnosis.pick_up import PICK_UP, PickUp, pick_up
 
 Floats = npt.NDArray[np.float64]
 _ALIKE = 0.85  # of two names, by `difflib`: a letter or the case is another
@@ -47,6 +47,7 @@ class Run(NamedTuple):
     ]  # by standard name: limits that the sensor could not pass, infinite where none showed
     drive_velocity_mps: float | None
     holdout: bool
+    pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
 
 
 class Evidence(NamedTuple):
@@ -112,9 +113,10 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
     ]
     t_s = usable.pop("t_s")
     findings += [Finding(kind, f"{table.file}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
-    if vibrates := pick_up(rig, t_s, usable):
+    vibrates = pick_up(rig, t_s, usable)
+    if vibrates:
         findings.append(Finding(PICK_UP, f"{table.file}: drive_force_N", vibrates.text))
-    return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout), findings
+    return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates), findings
 
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:

@@ -53,6 +53,13 @@ def test_it_is_found_with_its_size(force_N):
     assert told.spring_N == pytest.approx(11700.0 / (2.0 * np.pi * FREQUENCY_HZ) ** 2, rel=0.05)
 
 
+@pytest.mark.parametrize("frequency_Hz", [400.0, 1200.0, 8000.0])
+def test_it_is_found_above_the_slips_and_below_what_the_sampling_shows(frequency_Hz):
+    told = found(columns(1.0, frequency_Hz=frequency_Hz), RIG.model_copy(update={"drive_stiffness_N_per_m": 1000.0}))
+    assert told is not None
+    assert told.force_N == pytest.approx(1.0, rel=0.05)
+
+
 @pytest.mark.parametrize("missing", ["mass_accel_mps2", "vibration_amplitude_m", "drive_force_N"])
 def test_nothing_is_said_of_what_cannot_be_known(missing):
     data = columns(1.0)
