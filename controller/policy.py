@@ -37,7 +37,7 @@ _RELAXED_STEPS = 500  # no slip came: the drive slowed down
 _FREE_STEPS_TO_TRIM = 10  # the measurement's filter and delay must have seen the unlimited command
 _LEAST_SHARE_TO_TRIM = 0.02  # of the set point: less means a dead accelerometer, not a weak piezo
 _LARGEST_LOG_GAIN = 3.4  # a factor of 30 either way: a lightly damped mount amplifies 10 to 25 times
-_WEAK_STEPS = 50
+_WEAK_STEPS = 50  # in a row, to be called weak and to be called so no longer: noise around 1.05 must not switch it
 _ALARM_RATIO = 1.05  # 1.00 fails, 1.05 passes
 
 
@@ -127,6 +127,15 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float) -> None:
 
 
 @kernel
+def _judge_piezo(s: Record, weak: bool) -> None:
+    s.weak_steps = max(s.weak_steps, 0) + 1 if weak else min(s.weak_steps, 0) - 1
+    if s.weak_steps > _WEAK_STEPS:
+        s.reason = PIEZO_WEAK
+    elif s.weak_steps < -_WEAK_STEPS and s.reason == PIEZO_WEAK:
+        s.reason = HELD
+
+
+@kernel
 def want(p: Record, s: Record) -> None:
     """Turn the wanted velocity into frequency and amplitude, trimmed until the measured v_a is what was wanted.
 
@@ -135,7 +144,7 @@ def want(p: Record, s: Record) -> None:
     velocity_mps = s.wanted_velocity_mps
     if velocity_mps <= 0.0:
         s.wanted_m = 0.0
-        s.weak_steps = 0
+        _judge_piezo(s, weak=False)
         return
     trusted = s.vibration_velocity_mps > _LEAST_SHARE_TO_TRIM * velocity_mps
     settled = s.free_steps > _FREE_STEPS_TO_TRIM
@@ -150,6 +159,4 @@ def want(p: Record, s: Record) -> None:
             s.wanted_Hz = higher_Hz
             s.wanted_m = velocity_mps * math.exp(s.log_gain) / (TWO_PI * higher_Hz)
     weak = s.vibration_velocity_mps < _ALARM_RATIO * s.drive_velocity_mps and s.wanted_m > p.amplitude_max_m
-    s.weak_steps = s.weak_steps + 1 if weak else 0
-    if s.weak_steps > _WEAK_STEPS:
-        s.reason = PIEZO_WEAK
+    _judge_piezo(s, weak)

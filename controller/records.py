@@ -81,7 +81,7 @@ STATE = np.dtype(
         ("wanted_velocity_mps", "f8"),
         ("wanted_Hz", "f8"),
         ("wanted_m", "f8"),
-        ("weak_steps", "i8"),
+        ("weak_steps", "i8"),  # in a row that the piezo was too weak; below 0: that it was not
         # limits
         ("allowed_Hz", "f8"),
         ("allowed_m", "f8"),

@@ -62,6 +62,14 @@ def test_a_piezo_that_is_too_weak_is_said() -> None:
     assert set(loop.trace["limit"][loop.t_s > 2.0]) == {wire.RANGE}
 
 
+def test_a_piezo_that_suffices_again_is_weak_no_longer() -> None:
+    profile = [(0.0, 1e-3), (2.0, 1e-3), (2.2, 3e-4)]
+    loop = close_the_loop(5.0, rig={"drive": {"profile": profile}, "piezo": {"delivered_ratio": 0.3}})
+    assert set(loop.trace["reason"][(loop.t_s > 1.0) & (loop.t_s < 2.0)]) == {wire.PIEZO_WEAK}
+    assert loop.ratio(3.5).min() > 1.05
+    assert set(loop.trace["reason"][loop.t_s > 3.5]) == {wire.HELD}
+
+
 def test_velocity_ratio_holds_while_the_drive_speeds_up_and_slows_down() -> None:
     profile = [(0.0, 5e-4), (3.0, 5e-4), (3.1, 1e-3), (5.0, 1e-3), (5.1, 3e-4), (8.0, 3e-4)]
     loop = close_the_loop(8.0, rig={"drive": {"profile": profile}})
