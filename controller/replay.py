@@ -166,7 +166,10 @@ def _start(run: RunData, sequence: Any, from_ns: int, memory: Any) -> int:
     """Index of the first step to replay, its memory restored."""
     usable = [s for s in run.snapshots if s.layout == LAYOUT_ID and s.t_ns < from_ns]
     if usable:
-        return _restore(sequence, usable[-1], memory)
+        after = _restore(sequence, usable[-1], memory)
+        if after is not None:
+            return after
+        return _resume(run, sequence, int(np.searchsorted(sequence, usable[-1].step + 1)), memory)
     if len(sequence) and sequence[0] == 0:
         return 0
     return _resume(run, sequence, 0, memory)
@@ -178,13 +181,19 @@ def _resume(run: RunData, sequence: Any, at: int, memory: Any) -> int:
         return at
     for snapshot in run.snapshots:
         if snapshot.layout == LAYOUT_ID and snapshot.step >= sequence[at]:
-            return _restore(sequence, snapshot, memory)
+            after = _restore(sequence, snapshot, memory)
+            if after is not None:
+                return after
     return len(sequence)
 
 
-def _restore(sequence: Any, snapshot: Any, memory: Any) -> int:
+def _restore(sequence: Any, snapshot: Any, memory: Any) -> int | None:
+    """Index of the step after a snapshot, its memory restored; None when that step is not in the log."""
+    after = int(np.searchsorted(sequence, snapshot.step + 1))
+    if after == len(sequence) or sequence[after] != snapshot.step + 1:
+        return None
     memory[:] = np.frombuffer(snapshot.memory, STATE)
-    return int(np.searchsorted(sequence, snapshot.step + 1))
+    return after
 
 
 def _first_difference(run: RunData, rows: Any, steps: Any, command: Records, trace: Records) -> Difference | None:

@@ -113,6 +113,19 @@ def test_a_recorder_that_lost_blocks_costs_only_until_the_next_snapshot(log: Pat
     assert result.skipped == 500  # 1500 to 1999: the memory is known again after step 1999
 
 
+@pytest.mark.parametrize("from_s", [0.0, 2.5])
+def test_a_recorder_that_lost_the_steps_after_a_snapshot_costs_only_until_the_next_one(
+    log: Path, from_s: float
+) -> None:
+    run = read_run(log)
+    lost = (run.trace["sequence"] >= 2000) & (run.trace["sequence"] < 2010)  # the memory is that of step 1999
+    if from_s == 0.0:  # a resume at step 2000 as well
+        lost |= run.trace["sequence"] == 1500
+    result = replay(run._replace(trace=run.trace[~lost]), changes_of(run, []), from_s)
+    assert result.identical, result.difference
+    assert result.compared == np.count_nonzero(run.trace["sequence"] >= 3000) + (1500 if from_s == 0.0 else 0)
+
+
 def test_a_controller_that_was_started_again_is_refused(log: Path) -> None:
     run = read_run(log)
     again = run.trace[:100].copy()
