@@ -259,6 +259,13 @@ def plot(
     sys.exit(guarded(work))
 
 
+def _only_with(mode: str, given: dict[str, bool]) -> None:
+    """Refuse options that only another kind of replay follows. Raises Fault CONFIG."""
+    for option, is_given in given.items():
+        if is_given:
+            raise Fault("CONFIG", f"{option}: only with {mode}; add that, or leave it out")
+
+
 @app.command("replay")
 def replay_command(
     logs: Annotated[list[Path], typer.Argument(help="Run logs, .mcap.")],
@@ -272,16 +279,18 @@ def replay_command(
         bool, typer.Option("--closed-loop", help="Simulate the run again from the log's own plant and seed.")
     ] = False,
     to_bus: Annotated[bool, typer.Option("--to-bus", help="Publish the log on the bus again, paced.")] = False,
-    speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="With --to-bus: times real time.")] = 1.0,
+    speed: Annotated[
+        float | None, typer.Option(min=0.01, max=1000.0, help="With --to-bus: times real time; 1 if not given.")
+    ] = None,
     everything: Annotated[
         bool, typer.Option("--all", help="With --to-bus: the controller's topics too, for viewers.")
     ] = False,
     wait: Annotated[
         bool, typer.Option("--wait", help="With --to-bus: begin when a controller and a recorder are on the bus.")
     ] = False,
-    out: Annotated[Path, typer.Option("--log", help="With --closed-loop: the new log.")] = Path(
-        "runs/closed-loop.mcap"
-    ),
+    log: Annotated[
+        Path | None, typer.Option("--log", help="With --closed-loop: the new log; runs/closed-loop.mcap if not given.")
+    ] = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
     as_json: Json = False,
@@ -292,6 +301,12 @@ def replay_command(
         from cockpit import replaying
 
         from_s = replaying.time_s(f"--from {start}", start, "12.5s")
+        if not to_bus:
+            paced = {"--speed": speed is not None, "--all": everything, "--wait": wait}
+            meeting = {"--endpoint": endpoint is not None, "--prefix": prefix is not None}
+            _only_with("--to-bus, which plays the log on the bus", paced | meeting)
+        if not closed_loop:
+            _only_with("--closed-loop, whose new run goes there", {"--log": log is not None})
         if to_bus:
             for option, given in (("--closed-loop", closed_loop), ("--json", as_json), ("--set", bool(settings))):
                 if given:
@@ -305,9 +320,10 @@ def replay_command(
             stop = stop_event()
             for path in logs:
                 if not stop.is_set():
-                    publish_log(path, bus, speed, from_s, everything, roles, stop)
+                    publish_log(path, bus, speed or 1.0, from_s, everything, roles, stop)
             return 0
         if closed_loop:
+            out = log or Path("runs/closed-loop.mcap")
             if len(logs) != 1:
                 raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")
             if from_s > 0.0:
