@@ -31,7 +31,7 @@ def time_s(option: str, text: str, example: str) -> float:
 
 def changes_of(run: RunData, settings: list[str]) -> list[Change]:
     """The log's own configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
-    table = run.configuration("controller")
+    recorded = table = run.configuration("controller")
     source = f"{run.path.name} with --set"
     timed: dict[int, list[str]] = {0: []}
     for setting in settings:
@@ -43,6 +43,10 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
     changes: list[Change] = []
     for t_ns in sorted(timed):
         table = with_overrides(table, timed[t_ns])
+        for name in ("block_s", "samples_per_block"):
+            if table.get(name) != recorded.get(name):
+                line = f"{source}: {name} = {table[name]}: must be {recorded.get(name)}, as recorded; leave it out"
+                raise Fault("CONFIG", line)
         changes.append(Change(t_ns, validate(ControllerConfig, table, source)))
     return changes
 

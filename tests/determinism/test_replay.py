@@ -159,6 +159,19 @@ def test_bad_what_if(log: Path, setting: str) -> None:
     assert setting.split("=", maxsplit=1)[0].split(".", maxsplit=1)[0] in result.stderr
 
 
+@pytest.mark.parametrize("more", [[], ["--closed-loop"]], ids=["replay", "closed loop"])
+@pytest.mark.parametrize("setting", ["samples_per_block=40", "samples_per_block=40@3s", "controller.block_s=0.002@3s"])
+def test_what_if_cannot_change_the_blocks_that_were_recorded(
+    log: Path, tmp_path: Path, setting: str, more: list[str]
+) -> None:
+    keep = ["--log", str(tmp_path / "again.mcap")] if more else []
+    result = CliRunner().invoke(app, ["replay", str(log), "--set", setting, *more, *keep])
+    assert result.exit_code == 2, result.output
+    key, value = setting.removeprefix("controller.").removesuffix("@3s").split("=")
+    recorded = {"samples_per_block": "20", "block_s": "0.001"}[key]
+    assert f"run.mcap with --set: {key} = {value}: must be {recorded}, as recorded; leave it out" in result.stderr
+
+
 def test_closed_loop_compares_both(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "again.mcap"
     same = CliRunner().invoke(app, ["replay", str(log), "--closed-loop", "--json", "--log", str(out)])
