@@ -92,10 +92,18 @@ class ControllerConfig(Strict):
         for low, high in limits.forbidden_Hz:
             if high <= low:
                 raise ValueError(f"limits.forbidden_Hz: [{low}, {high}]: the second must be above the first")
+        lowest_Hz, from_where = _lowest_candidate(self)
+        step_Hz = _candidate_step_Hz(self)
+        above_Hz = step_Hz * math.ceil(lowest_Hz / step_Hz)
+        if above_Hz > limits.frequency_max_Hz:
+            raise ValueError(
+                f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g}: no multiple of {step_Hz:g} Hz lies between "
+                f"{from_where} and it; raise it to {above_Hz:g} or more"
+            )
         if not candidate_frequencies_Hz(self):
             raise ValueError(
-                "limits.forbidden_Hz: no frequency is left between limits.frequency_min_Hz = "
-                f"{limits.frequency_min_Hz:g} and limits.frequency_max_Hz = {limits.frequency_max_Hz:g}; narrow the bands"
+                f"limits.forbidden_Hz: no frequency is left: every multiple of {step_Hz:g} Hz between {from_where} and "
+                f"limits.frequency_max_Hz = {limits.frequency_max_Hz:g} is forbidden; narrow the bands"
             )
         for name, window_s in (("window_s", onset.window_s), ("velocity_window_s", onset.velocity_window_s)):
             blocks = window_s / self.block_s
@@ -112,20 +120,37 @@ class ControllerConfig(Strict):
 
 MOST_CANDIDATES = 64
 _ABOVE_RESONANCE = 2.2  # from about twice the contact resonance up the edge is at v_a / v_d = 1.05 whatever the damping
+_LEAST_GAP_HZ = 2.0  # a frequency in a band is moved to 1 Hz beside it, which must not be in the next one
+
+
+def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:
+    """The forbidden bands from low to high; those that overlap, or all but do, are one."""
+    bands: list[tuple[float, float]] = []
+    for low, high in sorted(limits.forbidden_Hz):
+        if bands and low < bands[-1][1] + _LEAST_GAP_HZ:
+            bands[-1] = (bands[-1][0], max(bands[-1][1], high))
+        else:
+            bands.append((low, high))
+    return bands
+
+
+def _lowest_candidate(config: ControllerConfig) -> tuple[float, str]:
+    """From where on there are candidates [Hz], and in words."""
+    limits = config.limits
+    above_Hz = _ABOVE_RESONANCE * config.contact_resonance_Hz
+    if limits.frequency_min_Hz < above_Hz < limits.frequency_max_Hz:
+        return above_Hz, f"{above_Hz:g} Hz, {_ABOVE_RESONANCE:g} x contact_resonance_Hz,"
+    return limits.frequency_min_Hz, f"limits.frequency_min_Hz = {limits.frequency_min_Hz:g}"
+
+
+def _candidate_step_Hz(config: ControllerConfig) -> float:
+    range_Hz = config.limits.frequency_max_Hz - _lowest_candidate(config)[0]
+    return 100.0 * max(1, math.ceil(range_Hz / (100.0 * (MOST_CANDIDATES - 1))))
 
 
 def candidate_frequencies_Hz(config: ControllerConfig) -> list[float]:
     """Frequencies to choose from, lowest first: above the contact resonance where the band allows, none forbidden."""
-    limits = config.limits
-    lowest_Hz = limits.frequency_min_Hz
-    above_Hz = _ABOVE_RESONANCE * config.contact_resonance_Hz
-    if above_Hz < limits.frequency_max_Hz:
-        lowest_Hz = max(lowest_Hz, above_Hz)
-    step_Hz = 100.0 * max(1, math.ceil((limits.frequency_max_Hz - lowest_Hz) / (100.0 * (MOST_CANDIDATES - 1))))
-    first = math.ceil(lowest_Hz / step_Hz)
-    last = math.floor(limits.frequency_max_Hz / step_Hz)
-    return [
-        step_Hz * n
-        for n in range(first, last + 1)
-        if not any(low <= step_Hz * n <= high for low, high in limits.forbidden_Hz)
-    ]
+    bands, step_Hz = forbidden_bands_Hz(config.limits), _candidate_step_Hz(config)
+    first = math.ceil(_lowest_candidate(config)[0] / step_Hz)
+    last = math.floor(config.limits.frequency_max_Hz / step_Hz)
+    return [step_Hz * n for n in range(first, last + 1) if not any(low <= step_Hz * n <= high for low, high in bands)]

@@ -24,11 +24,12 @@ TWO_PI = 2.0 * math.pi
 def _allowed_frequency(p: Record, frequency_Hz: float) -> float:
     """The nearest frequency inside the band and outside every forbidden one, upwards first [Hz]."""
     result = min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz)
-    for _ in range(p.bands):  # a push may land in the next band
-        for i in range(p.bands):
-            low, high = p.band_Hz[i, 0], p.band_Hz[i, 1]
-            if low <= result <= high:
-                result = high + 1.0 if high + 1.0 <= p.frequency_max_Hz else low - 1.0
+    for i in range(p.bands):  # 2 Hz or more apart: 1 Hz beside one is in no other
+        low, high = p.band_Hz[i, 0], p.band_Hz[i, 1]
+        if low <= result <= high:
+            if high < p.frequency_max_Hz:
+                return min(high + 1.0, p.frequency_max_Hz)
+            return max(low - 1.0, p.frequency_min_Hz)
     return result
 
 

@@ -14,6 +14,7 @@ from controller.config import (
     MOST_CANDIDATES,
     ControllerConfig,
     candidate_frequencies_Hz,
+    forbidden_bands_Hz,
 )
 
 _PARAMS_FLOATS = (
@@ -131,7 +132,8 @@ def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]
     candidates = candidate_frequencies_Hz(config)
     p.candidates = len(candidates)
     p.candidate_Hz[: len(candidates)] = candidates
-    p.bands = len(limits.forbidden_Hz)
-    for row, band in enumerate(limits.forbidden_Hz):
+    bands = forbidden_bands_Hz(limits)
+    p.bands = len(bands)
+    for row, band in enumerate(bands):
         p.band_Hz[row] = band
     return params, record(STATE)

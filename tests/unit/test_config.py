@@ -44,6 +44,27 @@ from plant.config import RigConfig
         (["duration_s=200.0"], ["duration_s", "50 mm", "shorten"]),
         (["duration_s=1e9"], ["duration_s = 1e+09", "500000000.0 mm", "shorten"]),
         (["controller.limits.forbidden_Hz=[[0.0, 9000.0]]"], ["forbidden_Hz", "no frequency is left"]),
+        (
+            ["controller.limits.forbidden_Hz=[[2600.0, 4000.0], [3900.0, 5000.0]]"],
+            [
+                "forbidden_Hz",
+                "every multiple of 100 Hz",
+                "2516.8 Hz, 2.2 x contact_resonance_Hz",
+                "frequency_max_Hz = 5000",
+            ],
+        ),
+        (
+            ["controller.limits.frequency_max_Hz=2550.0"],
+            [
+                "limits.frequency_max_Hz = 2550: no multiple of 100 Hz lies between",
+                "2516.8 Hz, 2.2 x contact_resonance_Hz,",
+                "raise it to 2600 or more",
+            ],
+        ),
+        (
+            ["controller.limits.frequency_min_Hz=2420.0", "controller.limits.frequency_max_Hz=2490.0"],
+            ["limits.frequency_max_Hz = 2490", "limits.frequency_min_Hz = 2420", "raise it to 2500 or more"],
+        ),
         (["controller.onset.window_s=1.0"], ["window_s", "128"]),
         (["bus.endpoint=here"], ["bus.endpoint", "here"]),
         (["bus.endpoint=tls/127.0.0.1:7447"], ["bus.endpoint", "tls/127.0.0.1:7447", "tcp/"]),

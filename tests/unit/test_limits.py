@@ -3,11 +3,12 @@
 import math
 from typing import Any
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge import stickslip_pb2 as wire
 from bridge.config import validate
+from bridge.faults import Fault
 from controller.codes import BLOCK, RESET, STALE, STOP
 from controller.config import ControllerConfig
 from controller.limits import allow
@@ -37,6 +38,31 @@ def test_every_command_is_inside_the_limits(wants: list[tuple[int, float, float]
             assert not any(low <= s.allowed_Hz <= high for low, high in CONFIG.limits.forbidden_Hz)
             assert 2 * math.pi * s.allowed_Hz * s.allowed_m <= CONFIG.limits.velocity_max_mps * (1 + 1e-9)
         last_m = s.allowed_m
+
+
+BANDS = st.lists(
+    st.tuples(st.floats(400.0, 5100.0), st.floats(0.5, 2000.0)).map(lambda band: (band[0], band[0] + band[1])),
+    min_size=1,
+    max_size=8,
+)
+
+
+@given(BANDS, st.floats(400.0, 5100.0))
+@example([(4600.0, 5000.0), (4500.0, 4700.0)], 4800.0)
+@example([(4600.0, 5000.0), (4000.0, 4599.5)], 4800.0)
+@example([(500.0, 4999.5)], 600.0)
+def test_no_frequency_is_inside_a_forbidden_band_however_the_bands_lie(
+    bands: list[tuple[float, float]], wanted_Hz: float
+) -> None:
+    try:
+        config = validate(ControllerConfig, {"contact_resonance_Hz": 0.0, "limits": {"forbidden_Hz": bands}}, "test")
+    except Fault:  # nothing is left
+        return
+    params, state = build(config)
+    allow(params[0], state[0], BLOCK, wanted_Hz, 2e-8)
+    allowed_Hz = state[0].allowed_Hz
+    assert 500.0 <= allowed_Hz <= 5000.0
+    assert not any(low <= allowed_Hz <= high for low, high in bands)
 
 
 def _settle(p: Any, s: Any, events: int, wanted_Hz: float, wanted_m: float, steps: int = 200) -> None:
