@@ -303,7 +303,7 @@ def test_bad_configuration_starts_nothing(tmp_path: Path) -> None:
 
 
 def test_a_rig_whose_numbers_run_away_is_no_quiet_one(tmp_path: Path) -> None:
-    endless = ["--set", "duration_s=0.1", "--set", "rig.drive.stiffness_N_per_m=1e12"]
+    endless = ["--set", "duration_s=0.1", "--set", "rig.contact.stribeck_velocity_mps=1e-320"]
     for more in (["--in-process"], ["--endpoint", free_endpoint()]):
         result = call("run", *endless, *more, "--log", str(tmp_path / "run.mcap"))
         assert result.returncode == FAULTS["CONFIG"].exit_status

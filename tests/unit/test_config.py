@@ -26,6 +26,20 @@ from plant.config import RigConfig
             ["rig.slide.mass_kg=0.001"],
             ["slide.mass_kg = 0.001", "at least", "0.0078 kg", "shorten solver.step_s to 3.6e-06"],
         ),
+        (
+            ["rig.drive.stiffness_N_per_m=1e10"],
+            [
+                "drive.stiffness_N_per_m = 1e+10",
+                "at most",
+                "1.48e+09 N/m",
+                "20 steps",
+                "shorten solver.step_s to 3.8e-06 or less",
+            ],
+        ),
+        (
+            ["rig.drive.stiffness_N_per_m=1e9", "rig.effects.drive-stiffness.ratio=9.0"],
+            ["drive.stiffness_N_per_m = 1e+09 with effects.drive-stiffness.ratio = 9", "1.48e+08 N/m", "to 3.8e-06"],
+        ),
         (["rig.contact.static_force_N=1.0"], ["static_force_N", "coulomb_force_N"]),
         (["controller.samples_per_block=25"], ["samples_per_block", "must equal"]),
         (

@@ -139,6 +139,9 @@ def test_a_bad_table_is_one_line_with_place_value_and_rule(text: str, words: lis
 
 def test_rigs_at_the_edge_of_what_can_be_stepped_are_taken(tmp_path: Path):
     assert loaded(tmp_path, "[slide]\nmass_kg = 0.0078\n").slide.mass_kg == 0.0078
+    stiff = simulate(loaded(tmp_path, "[drive]\nstiffness_N_per_m = 1.48e9\n"), 0.3).drive_force_N
+    # it swings about the Coulomb force, undamped, by v_d sqrt(k m) = 23.6 N at first
+    assert np.std(stiff[len(stiff) // 2 :]) * np.sqrt(2.0) == pytest.approx(5e-4 * np.sqrt(1.48e9 * 1.5), rel=0.1)
     for text in (
         '[effects.static-friction-ageing]\nform = "power"\nratio = 0.99\nexponent = 0.5\nrested_s = 1.0\n',
         "[effects.frame-compliance]\nratio = 10\nfrequency_Hz = 2000\n",

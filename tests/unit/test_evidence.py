@@ -78,6 +78,11 @@ def test_a_good_folder(tmp_path: Path) -> None:
         ),
         ("mass_kg = 1.5", "mass_kg = 1e-5", "mass_kg = 1e-05: swings at 2.78e+06 rad/s: must be 90000 at most"),
         ("mass_kg = 1.5", "mass_kg = 0.009", "mass_kg = 0.009: swings at 9.28e+04 rad/s: must be 90000 at most"),
+        (
+            "drive_stiffness_N_per_m = 11700.0",
+            "drive_stiffness_N_per_m = 1.4e9",
+            "drive_stiffness_N_per_m = 1.4e+09 on mass_kg = 1.5: swings at 3.06e+04 rad/s: must be 30000 at most; check",
+        ),
         ("run-01.parquet", "../run-01.parquet", "file = '../run-01.parquet': must lie in the evidence folder"),
         ("run-01.parquet", "run-01.xlsx", "file = 'run-01.xlsx': must end in .parquet, .csv, .mat, .mcap"),
         ("run-01.parquet", "run-07.parquet", "run-07.parquet: no such file"),
