@@ -48,7 +48,7 @@ class Piece(NamedTuple):
 def iter_pieces(reader: LogReader) -> Iterator[Piece]:
     """Every message of a log, chunk by chunk, in memory that does not grow with the log.
 
-    A streaming message that is none of its topic is left out and counted in the reader's damage. Raises Fault BAD_LOG when
+    A message that is none of its topic is left out and counted in the reader's damage. Raises Fault BAD_LOG when
     it is no run log of this project.
     """
     layouts: dict[str, Layout] = dict(_LAYOUTS)
@@ -65,7 +65,9 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
                 yield Piece(topic, log_time_ns[kept], np.frombuffer(stacked, layouts[topic].dtype), [])
             else:
                 payloads = [data[row[START] : row[END]].tobytes() for row in mine]
-                yield Piece(topic, log_time_ns, np.empty(0), payloads)
+                kept = _readable(topic, payloads)
+                reader.count_bad_messages(len(mine) - len(kept))
+                yield Piece(topic, log_time_ns[kept], np.empty(0), [payloads[index] for index in kept])
 
 
 def iter_tables(path: Path) -> Iterator[tuple[str, Records]]:
@@ -116,6 +118,18 @@ def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> tupl
             good.append(layout.canonical(data[row[START] : row[END]].tobytes(), topic))
             kept.append(index)
     return b"".join(good), np.array(kept, np.int64)
+
+
+def _readable(topic: str, payloads: list[bytes]) -> list[int]:
+    """Which of the payloads are messages of their topic; of a topic that this version does not know, all."""
+    if topic not in BY_NAME:
+        return list(range(len(payloads)))
+    kept: list[int] = []
+    for index, payload in enumerate(payloads):
+        with contextlib.suppress(Fault):
+            parsed(BY_NAME[topic].message, payload, "/" + topic)
+            kept.append(index)
+    return kept
 
 
 def block_period_ns(sensors: Records) -> float:

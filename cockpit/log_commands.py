@@ -60,7 +60,7 @@ def _lost(damage: "Damage") -> str:
     """What could not be read, in words; empty when all could."""
     parts = [f"{damage.cut_bytes} bytes of an open chunk at the end"] if damage.cut_bytes else []
     parts += [f"{damage.bad_chunks} damaged chunks"] if damage.bad_chunks else []
-    parts += [f"{damage.bad_records} damaged definitions or stretches"] if damage.bad_records else []
+    parts += [f"{damage.bad_records} damaged definitions, messages or stretches"] if damage.bad_records else []
     return "lost: " + ", ".join(parts) if parts else ""
 
 

@@ -5,6 +5,8 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
 from bridge.logfile import RunData, read_run
@@ -136,7 +138,8 @@ def outcome(run: RunData) -> Outcome:
     verdict = judge_run(run)
     trace = run.trace
     block_s = float(run.configuration("controller")["block_s"])
-    work_J = float((trace["drive_force_N"] * trace["drive_velocity_mps"]).sum()) * block_s
+    power_W = trace["drive_force_N"] * trace["drive_velocity_mps"]
+    work_J = float(power_W[np.isfinite(power_W)].sum()) * block_s  # the verdict counts the blocks that are no number
     dose = float((trace["vibration_velocity_mps"] ** 2).sum()) * block_s * 1e6
     slips = int(trace["slips"][-1])
     swing_N = verdict.after.swing_N if verdict.after else 0.0

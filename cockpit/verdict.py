@@ -81,15 +81,23 @@ def judge_run(run: RunData) -> Verdict:
     began_s = max(float(t_s.min()) - block_s, 0.0) if blocks else 0.0  # a log may begin late
     in_charge_s = enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
     samples = force_N.shape[1] if blocks else 1
+    finite = np.isfinite(force_N).all(axis=1)
+    t_s, force_N = t_s[finite], force_N[finite]
     sample_s = (t_s[:, None] + (np.arange(samples) + 1 - samples) * (block_s / samples)).ravel()
-    cycles = find_cycles(sample_s, force_N.ravel()) if blocks else None
-    mean_N = force_N.mean(axis=1) if blocks else force_N
+    cycles = find_cycles(sample_s, force_N.ravel()) if len(t_s) else None
+    mean_N = force_N.mean(axis=1)
     trace = run.trace
     excited = _vibrating(trace, block_s) & (trace["t_ns"] * 1e-9 > in_charge_s)
     ratio = trace["vibration_velocity_mps"][excited] / np.maximum(trace["drive_velocity_mps"][excited], 1e-9)
     faults = [
         f"{event.code}: {event.text}" for event in run.events if event.code in {"GAP", "DROPPED", "PLANT_LOST", "STALE"}
     ]
+    if not finite.all():
+        where, first = (
+            f"/sensors drive_force_N: {np.count_nonzero(~finite)} blocks",
+            run.sensors["sequence"][~finite][0],
+        )
+        faults.append(f"NOT_FINITE: {where} hold a sample that is no number, first {first}; they were left out")
     return Verdict(
         log=str(run.path),
         seconds=seconds,
@@ -129,7 +137,8 @@ def _phase(cycles: Cycles | None, t_s: Any, mean_N: Any, from_s: float, to_s: fl
     slips = cycles.between(from_s, to_s).slips
     seconds = to_s - from_s
     # the first ramp of a run starts from an unloaded spring: no part of the swing of what follows
-    steady = inside & (t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
+    later = inside & (t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
+    steady = later if later.any() else inside
     swing_N = float(np.ptp(mean_N[steady]))
     return Phase(seconds, slips, 60.0 * slips / seconds, swing_N, float(mean_N[steady].mean()))
 

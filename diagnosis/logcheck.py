@@ -84,17 +84,11 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
         raise Fault("BAD_LOG", f"{path}: no such file")
     reader = LogReader(path)
     seen = _Pass()
-    findings: list[Finding] = []
-    try:
-        for piece in iter_pieces(reader):
-            seen.add(piece)
-            if progress is not None:
-                progress(reader.position_bytes / max(reader.size_bytes, 1))
-    except Fault as fault:
-        if fault.kind.code != "BAD_MESSAGE":
-            raise
-        findings.append(Finding("bad-message", path.name, f"{fault.line}; nothing behind it was checked"))
-    findings += _of_file(path, reader, seen)
+    for piece in iter_pieces(reader):
+        seen.add(piece)
+        if progress is not None:
+            progress(reader.position_bytes / max(reader.size_bytes, 1))
+    findings = _of_file(path, reader, seen)
     for watch in seen.topics.values():
         findings += watch.findings()
     plant = _table(reader, "plant", "configuration")
@@ -137,7 +131,7 @@ def damage_findings(damage: Damage, path: Path) -> list[Finding]:
             Finding("damaged", path.name, f"{damage.bad_chunks} chunks are damaged; {remedy}", damage.bad_chunks)
         )
     if damage.bad_records:
-        text = f"{damage.bad_records} definitions or stretches of bytes make no sense; {remedy}"
+        text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense; {remedy}"
         found.append(Finding("damaged", path.name, text, damage.bad_records))
     return found
 

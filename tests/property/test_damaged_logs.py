@@ -17,8 +17,9 @@ from bridge.faults import Fault
 from bridge.logfile import LogReader, read_run, recover
 from bridge.messages import sensor_block
 from bridge.runlog import RunLog
-from bridge.topics import SENSORS
+from bridge.topics import CONTROLLER_EVENT, PLANT_EVENT, SENSORS, SNAPSHOT, Topic
 from bridge.zenoh_link import Received
+from diagnosis.logcheck import check_log
 from tests.logs import doctored, short_log
 
 TABLES = ("sensors", "applied", "command", "trace", "state")
@@ -165,6 +166,27 @@ def test_an_odd_block_costs_only_itself(tmp_path: Path, odd: int) -> None:
     run = read_run(tmp_path / "odd.mcap")
     assert run.sensors["sequence"].tolist() == [number for number in range(1000) if number != odd]
     assert run.damage.bad_records == 1
+
+
+@pytest.mark.parametrize("topic", [PLANT_EVENT, CONTROLLER_EVENT, SNAPSHOT], ids=lambda topic: topic.name)
+def test_an_event_or_a_snapshot_that_cannot_be_read_costs_only_itself(tmp_path: Path, topic: Topic) -> None:
+    path, saved = tmp_path / "odd.mcap", tmp_path / "saved.mcap"
+    log = RunLog(path, lockstep=True)
+    said = topic.message(sequence=0, t_ns=7).SerializeToString()
+    log.write(topic, said)
+    log._add(topic, b"\x09rubbish", 1, 8)
+    for number in range(1000):
+        log.write(SENSORS, block(number))
+    log.close()
+    recover(path, saved)
+    for one in (path, saved):
+        run = read_run(one)
+        assert [message.t_ns for message in [*run.events, *run.snapshots]] == [7]
+        assert len(run.sensors) == 1000
+        assert run.damage.bad_records == 1
+        kinds = {finding.kind for finding in check_log(one).findings}
+        assert "damaged" in kinds
+        assert "bad-message" not in kinds
 
 
 def test_a_time_before_the_start_and_a_full_disk_are_faults(tmp_path: Path) -> None:

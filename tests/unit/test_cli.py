@@ -5,11 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from bridge.logfile import read_run
 from cockpit.cli import app
+from cockpit.replaying import outcome
 from cockpit.verdict import judge_run
 from tests.logs import doctored, empty_log, short_log
 
@@ -105,6 +107,37 @@ def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> N
     assert verdict.before is not None
     assert verdict.before.seconds == pytest.approx(0.25)
     assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value: float) -> None:
+    def spoil(tables):
+        tables["sensors"]["drive_force_N"][[100, 250], 3] = value
+        tables["trace"]["drive_force_N"][[100, 250]] = value
+
+    (tmp_path / "sound.mcap").write_bytes(short_log())
+    sound, spoilt = read_run(tmp_path / "sound.mcap"), read_run(doctored(tmp_path, spoil))
+    before, was = judge_run(spoilt).before, judge_run(sound).before
+    assert before is not None
+    assert was is not None
+    assert before.slips == was.slips
+    assert before.swing_N == pytest.approx(was.swing_N, rel=0.02)
+    assert before.mean_force_N == pytest.approx(was.mean_force_N, rel=0.02)
+    assert judge_run(spoilt).faults == [
+        "NOT_FINITE: /sensors drive_force_N: 2 blocks hold a sample that is no number, first 100; they were left out"
+    ]
+    assert outcome(spoilt).drive_work_J == pytest.approx(outcome(sound).drive_work_J, rel=0.02)
+
+
+@pytest.mark.parametrize("from_block", [0, 100])
+def test_a_force_that_is_no_number_any_more_is_no_error(tmp_path: Path, from_block: int) -> None:
+    def spoil(tables):
+        tables["sensors"]["drive_force_N"][from_block:] = np.nan
+
+    verdict = judge_run(read_run(doctored(tmp_path, spoil)))
+    assert (verdict.before is None) == (from_block == 0)
+    assert verdict.before is None or np.isfinite(verdict.before.swing_N)
+    assert not verdict.good
 
 
 def test_messages_out_of_order_are_not_lost(tmp_path: Path) -> None:
