@@ -30,8 +30,8 @@ FAULTS = {
         FaultKind(
             "NO_PEER",
             4,
-            "A process waited for its peer on the bus and nobody came, or the peer went away. Check that the plant runs, "
-            "that every process names the same --endpoint and --prefix, and look at the peer's own last line. With "
+            "A process waited for its peer on the bus and nobody came, or the peer went away or did not answer. Check that the "
+            "plant runs, that every process names the same --endpoint and --prefix, and look at the peer's own last line. With "
             "--cluster: no Dask scheduler answers at that address, or it has no worker.",
         ),
         FaultKind(

@@ -3,6 +3,7 @@
 cli, log_commands                the commands
 scenario, running, verdict       what a run is made of, one run, what came of it
 orchestra, processes, live       a run of several processes, how each behaves, its progress line
+operator_word                    a person's stop or reset on its way
 onboard                          a run in one process
 replaying, to_bus                a log replayed, a log back on the bus
 run_plot, stability_map          pictures

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import os
 import sys
 from collections.abc import Generator
 from pathlib import Path
@@ -168,21 +167,15 @@ def operator_stop(
     endpoint: Endpoint = None,
     prefix: Prefix = None,
 ) -> None:
-    """Tell a running controller to ramp the vibration down and keep it down, until --reset."""
+    """Tell a running controller to ramp the vibration down and keep it down, until --reset; exit status 4: nobody obeyed."""
 
     def work() -> None:
         from bridge import stickslip_pb2 as wire
-        from bridge.topics import OPERATOR
-        from bridge.zenoh_link import Bus
+        from cockpit.operator_word import tell
         from cockpit.scenario import load_scenario
 
         made = load_scenario(scenario, _settings([], None, endpoint, prefix))
-        action = wire.Operator.RESET if reset else wire.Operator.STOP
-        with Bus(made.bus, "operator", lockstep=True) as bus:
-            send = bus.publisher(OPERATOR)
-            if bus.wait_for(["controller"], 2.0):
-                raise Fault("NO_PEER", f"{made.bus.endpoint}: no controller on the bus; nothing to tell")
-            send(wire.Operator(action=action, who=os.environ.get("USER", "")).SerializeToString())
+        tell(made.bus, wire.Operator.RESET if reset else wire.Operator.STOP)
 
     sys.exit(guarded(work))
 
