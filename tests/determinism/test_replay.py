@@ -201,26 +201,48 @@ def test_closed_loop_of_a_log_without_a_block_is_refused(tmp_path: Path) -> None
     assert "empty.mcap: holds no block" in result.stderr
 
 
-def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path, tmp_path: Path) -> None:
-    endpoint, again = free_endpoint(), tmp_path / "again.mcap"
+def to_a_live_controller(log: Path, again: Path) -> list[int]:
+    """Play a log to a controller and a recorder; how the three ended."""
+    endpoint = free_endpoint()
     # on a busy machine the player may pause for 20 ms, which the controller would rightly call stale
     patient = ["--set", "controller.limits.stale_after_s=5.0"]
     arguments = ["--endpoint", endpoint, "--set", "controller.policy.enabled_from_s=0.5", *patient]
-    player = subprocess.Popen(
-        [*COMMAND, "replay", str(log), "--to-bus", "--from", "0s", "--endpoint", endpoint, "--wait"]
-    )
-    others = [
-        subprocess.Popen([*COMMAND, "controller", *arguments]),
-        subprocess.Popen([*COMMAND, "record", *arguments, "--log", str(again)]),
+    started = [
+        subprocess.Popen([*COMMAND, *command])
+        for command in (
+            ["replay", str(log), "--to-bus", "--from", "0s", "--endpoint", endpoint, "--wait"],
+            ["controller", *arguments],
+            ["record", *arguments, "--log", str(again)],
+        )
     ]
     try:
-        for process in [player, *others]:
-            assert process.wait(60) == 0
+        return [process.wait(120) for process in started]
     finally:
-        for process in [player, *others]:
+        for process in started:
             if process.poll() is None:
                 process.kill()
                 process.wait()
+
+
+def told_whole(run: RunData) -> bool:
+    """Whether the log says of nothing that it was lost, and of its controller that it came to its end."""
+    ends = [event.text for event in run.events if (event.source, event.code) == ("controller", "END")]
+    lost = {"GAP", "RESTART", "DROPPED", "STALE", "PLANT_LOST"} & {event.code for event in run.events}
+    return not lost and len(ends) == 1 and ends[0].endswith("dropped=0")
+
+
+def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again.mcap"
+    # whoever gets no processor for 0.1 to 0.3 s loses messages: that is what a live loop does, and it says so. What it then
+    # answers is still checked, bit for bit; only that nothing is lost may take another try
+    for _ in range(3):
+        statuses = to_a_live_controller(log, again)
+        if statuses == [0, 0, 0]:
+            now = read_run(again)
+            assert replay(now, changes_of(now, [])).identical
+            if told_whole(now):
+                break
+    assert statuses == [0, 0, 0]
     was, now = read_run(log), read_run(again)
     assert now.sensors.tobytes() == was.sensors.tobytes()
     for field in ("mode", "score", "wanted_amplitude_m", "vibration_velocity_mps"):
