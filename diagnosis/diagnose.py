@@ -21,6 +21,8 @@ from diagnosis.gap import (
 )
 from diagnosis.heldout import Closed, HeldOut
 from diagnosis.imitation import imitators
+from diagnosis.late_friction import EFFECT as LAG
+from diagnosis.late_friction import late_fits
 from diagnosis.library import Trial, trials
 from diagnosis.next_experiment import next_experiment
 from diagnosis.phases import is_phase
@@ -115,6 +117,8 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         if _varies(retuned, singles, expected_chi2):
             by_run = starts_by_run(fitter, retuned, tried, jobs)
             singles = _finished(fitter, _again(fitter, singles, by_run, jobs), expected_chi2, jobs)
+        if any(fit.form.effects == (LAG,) for fit in _close(retuned, singles)):
+            singles = _finished(fitter, _with(singles, late_fits(fitter, tried, jobs)), expected_chi2, jobs)
         if singles and much_left(singles[0], expected_chi2):
             progress(f"every effect gets a refit beside the best one, {singles[0].form.effects[0]}", 0.7)
             best_before = pairs[0].chi2 if pairs else math.inf
@@ -218,12 +222,16 @@ def _starts_of_contenders(retuned: Fit, contenders: list[Fit]) -> list[Start]:
     """
     if not contenders:
         return []
-    best, *others = contenders
-    least = _CONTENDS * (retuned.chi2 - best.chi2)
-    close = [fit for fit in others if retuned.chi2 - fit.chi2 > least]
+    best, *close = _close(retuned, contenders)
     nuisances = (np.zeros_like(retuned.deviations), retuned.deviations)
     starts = [(fit.form, deviations, fit.w) for fit in (best, *close) for deviations in nuisances]
     return starts + [(one.form, other.deviations, one.w) for fit in close for one, other in ((fit, best), (best, fit))]
+
+
+def _close(retuned: Fit, fits: list[Fit]) -> list[Fit]:
+    """The fits, best first, that close much of what the best one closes."""
+    least = _CONTENDS * max((retuned.chi2 - fit.chi2 for fit in fits[:1]), default=0.0)
+    return [fit for fit in fits if retuned.chi2 - fit.chi2 > least]
 
 
 def _again(fitter: Fitter, singles: list[Fit], starts: list[Start], jobs: int) -> list[Fit]:

@@ -63,6 +63,19 @@ class Floor(NamedTuple):
         """A noise-free prediction [features] as a rough and noisy rig would show it on average."""
         return _logarithms(predicted + self.bias, self.powers)
 
+    def of_features(self, own: npt.NDArray[np.bool_]) -> "Floor":
+        """The floor of some features [features], which are those of whole runs: runs are independent of each other."""
+        rows = own[self.compared]
+        return Floor(
+            bias=self.bias[own],
+            powers=self.powers[own],
+            scatter=self.scatter[own],
+            compared=self.compared[own],
+            whitening=self.whitening[np.ix_(rows, rows)],
+            cells=tuple(cell for cell, is_own in zip(self.cells, rows, strict=True) if is_own),
+            level=self.level,
+        )
+
 
 def compress(z: Floats, knee: float = KNEE) -> Floats:
     """T of the definition; fits begin with a larger knee."""

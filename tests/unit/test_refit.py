@@ -70,6 +70,16 @@ def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
     assert tried.chi2 == pytest.approx(refitted.chi2, rel=0.05)
 
 
+def test_single_numbers_lead_on_where_derivatives_lead_astray(tmp_path):
+    """Where friction is late by more than a third of a slip, chi2 is jagged in every number of the rig at once."""
+    late = {"frictional-lag": {"form": "dead-time", "delay_s": 5.5e-3, "share": 1.0}}
+    fitter = fitter_of(*prepared(tmp_path / "late", "ladder", late))
+    form = next(one.form for one in trials(fitter.problem) if one.form.forms == {"frictional-lag": "dead-time"})
+    described, w = np.zeros(len(fitter.nuisances)), np.log([5.5e-3, 1.0]) - np.log([axis.scale for axis in form.axes])
+    residual, _ = fitter.whitened(fitter.predicted(described, form.tables(w)))
+    assert fitter.refit(form, described, w).chi2 < 0.7 * (residual @ residual)  # without them, as much as there
+
+
 def predictions_and_fit(fitter, work):
     """How many predictions a fit takes, and the fit."""
     asked = []
