@@ -18,10 +18,11 @@ _STEPS_OF_RESOLUTION = 2.5  # a peak of a quantised signal ends in steps of 1 or
 
 # state: 0 samples, 1 last value, 2 run of equal values, 3 longest such run, 4 its end, 5 smallest step, 6 not finite,
 # 7 first sample not finite; then for the top and, mirrored, for the bottom: 8 extreme, 9 run, 10 step into the run,
-# 11 samples in runs, 12 largest overshoot; 18 longest run that counts
+# 11 samples in runs, 12 largest overshoot, 13 run that the signal begins with, 14 step out of it; 22 longest run that counts
 _SIDE = 8
-_PER_SIDE = 5
-_STATE_SIZE = _SIDE + 2 * _PER_SIDE + 1
+_PER_SIDE = 7
+_LONGEST = _SIDE + 2 * _PER_SIDE
+_STATE_SIZE = _LONGEST + 1
 
 
 class SignalLook(NamedTuple):
@@ -44,17 +45,24 @@ class SignalLook(NamedTuple):
 
 
 @kernel
-def _end_run(state: npt.NDArray[np.float64], side: int, step_out: float) -> None:
-    run = state[side + 1]
-    if run >= _SHORTEST_RUN:
-        step = min(state[side + 2], step_out)
-        if step >= _STEPS_OF_RESOLUTION * state[5]:
-            # a run at the very beginning or end has one flank only: counted by its step alone
-            one_flank = math.isinf(state[side + 2]) or math.isinf(step_out)
-            length = 4.0 if one_flank else min(run, state[18])
-            if math.isfinite(step):
-                state[side + 4] = max(state[side + 4], step * length / 4.0)
+def _count(state: npt.NDArray[np.float64], side: int, run: float, step: float, length: float) -> None:
+    if run >= _SHORTEST_RUN and step >= _STEPS_OF_RESOLUTION * state[5]:
+        if math.isfinite(step):
+            state[side + 4] = max(state[side + 4], step * length / 4.0)
         state[side + 3] += run
+
+
+@kernel
+def _end_run(state: npt.NDArray[np.float64], side: int, step_out: float) -> None:
+    run, step_in = state[side + 1], state[side + 2]
+    # a run at the very beginning or end has one flank only: counted by its step alone
+    if math.isinf(step_in) and math.isfinite(step_out):
+        # and at the beginning by what is known at the end: this step is the smallest so far
+        state[side + 5] = run
+        state[side + 6] = step_out
+    else:
+        one_flank = math.isinf(step_in) or math.isinf(step_out)
+        _count(state, side, run, min(step_in, step_out), 4.0 if one_flank else min(run, state[_LONGEST]))
     state[side + 1] = 0.0
 
 
@@ -81,7 +89,7 @@ def _look(values: npt.NDArray[Any], state: npt.NDArray[np.float64]) -> None:
             state[3] = state[2]
             state[4] = at
         for mirrored in range(2):
-            side = 8 + 5 * mirrored
+            side = _SIDE + _PER_SIDE * mirrored
             sign = 1.0 - 2.0 * mirrored
             v = sign * value
             if first or v > state[side]:
@@ -90,6 +98,7 @@ def _look(values: npt.NDArray[Any], state: npt.NDArray[np.float64]) -> None:
                 state[side + 2] = math.inf if first else v - sign * last
                 state[side + 3] = 0.0
                 state[side + 4] = 0.0
+                state[side + 5] = 0.0
             elif v == state[side]:
                 if state[side + 1] == 0.0:
                     state[side + 2] = v - sign * last
@@ -103,10 +112,11 @@ class Signal:
     """A signal being looked at, piece by piece; one that `dwells`, as a position does, may rest at its extremes."""
 
     def __init__(self, dwells: bool) -> None:
+        self._dwells = dwells
         self._state = np.zeros(_STATE_SIZE)
         self._state[5] = np.inf
         self._state[7] = -1.0
-        self._state[18] = _LONGEST_DWELL if dwells else np.inf
+        self._state[_LONGEST] = _LONGEST_DWELL if dwells else np.inf
 
     def add(self, values: npt.NDArray[Any]) -> None:
         """Look at the next samples, [samples]."""
@@ -118,6 +128,8 @@ class Signal:
         sides = (_SIDE, _SIDE + _PER_SIDE)
         for side in sides:
             _end_run(state, side, math.inf)
+            if not self._dwells:  # a position rests before it is moved
+                _count(state, side, float(state[side + 5]), float(state[side + 6]), 4.0)
         high, low = float(state[_SIDE]), -float(state[_SIDE + _PER_SIDE])
         limit = max(_OVERSHOOT_SHARE * (high - low), 0.0)
         clipped = [int(state[side + 3]) if high > low and state[side + 4] > limit else 0 for side in sides]

@@ -183,3 +183,21 @@ def test_a_misspelt_column_is_named(tmp_path: Path) -> None:
     misspelt(data)
     said = [one.text for one in load_evidence(folder(tmp_path, data)).findings if "mass_accel_mps2" in one.where]
     assert said[0] == 'not there, but mass_Accel_mps2 is: set channels.mass_accel_mps2.column = "mass_Accel_mps2"'
+
+
+@pytest.mark.parametrize("rows", [slice(0, 300), slice(-300, None)])
+def test_a_force_that_is_cut_off_where_a_run_begins_or_ends_is_told(tmp_path: Path, rows: slice) -> None:
+    data = columns()
+    data["drive_force_N"][rows] = 20.0
+    evidence = load_evidence(folder(tmp_path, data))
+    assert evidence.runs[0].clipped == {"drive_force_N": (-math.inf, 20.0)}
+    assert "300 samples at 20, first row" in kinds(evidence)["clipped"]
+
+
+def test_a_drive_that_rests_before_it_starts_is_not_cut_off(tmp_path: Path) -> None:
+    """Commanded, without noise: its step from rest is ten times that of the slow stretch at its end."""
+    data = columns()
+    velocity_mps = np.repeat([0.0, 0.001, 0.0001], [1000, 500, 2500])
+    data["drive_position_m"] = 0.01 + np.cumsum(velocity_mps) / 2000
+    manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "")
+    assert kinds(load_evidence(folder(tmp_path, data, manifest))) == {}
