@@ -1,17 +1,20 @@
 """`stickslip diagnose`: what makes a rig differ from its description; for one evidence folder or for many."""
 
 import json
+import os
 import signal
 import sys
 from collections.abc import Callable
 from contextlib import closing
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from bridge.faults import FAULTS, Fault
-from cockpit.processes import guarded
+from cockpit.processes import guarded, report
 from cockpit.writing import check_writable, writing
 
 if TYPE_CHECKING:
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
 
 _STDOUT = Path("-")
+_LONGEST_NAME_BYTES = 200  # of 255 that a disk takes; a number and `.html.part` follow
 
 
 class _Wishes(NamedTuple):
@@ -116,20 +120,29 @@ def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
         _tell(wishes, "rig file   not written: nothing explains the gap, there is no effect to apply")
     else:
         wanted.append(("rig file   ", wishes.apply, lambda path: write_rig(diagnosis, evidence, path)))
-    failed: list[str] = []
+    refused: list[Fault] = []
     for word, path, write in wanted:
-        if path is not None:
-            try:  # what one disk refuses the others may still get
-                with writing():
-                    write(path)
-            except Fault as fault:
-                failed.append(fault.line)
-                continue
-            if word:
-                _tell(wishes, f"{word}{path}")
-    if failed:
-        raise Fault("LOG_WRITE", "\n".join(failed))
-    return 0
+        if path is not None and _written(path, write, refused) and word:
+            _tell(wishes, f"{word}{path}")
+    return _told(refused)
+
+
+def _written(path: Path, write: Callable[[Path], None], refused: list[Fault]) -> bool:
+    """Whether it was; else one more of `refused`: what one disk refuses the others may still get."""
+    try:
+        with writing():
+            write(path)
+    except Fault as fault:
+        refused.append(fault)
+        return False
+    return True
+
+
+def _told(refused: list[Fault]) -> int:
+    """Exit status of all that could not be written. On stderr: stdout may have the JSON, which was."""
+    if not refused:
+        return 0
+    return report(Fault("LOG_WRITE", "\n".join(fault.line for fault in refused)), as_json=False)
 
 
 def _tell(wishes: _Wishes, line: str) -> None:
@@ -157,6 +170,8 @@ def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
     from diagnosis.report import write_report
 
     found: dict[str, Outcome] = {}
+    refused: list[Fault] = []
+    reports = _report_names([source.name for source in sources])
     with (
         watched() as progress,
         closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, many.real_diagnose)) as outcomes,
@@ -164,21 +179,20 @@ def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
         for outcome in outcomes:
             name = outcome.source.name
             if outcome.diagnosis is not None and wishes.report is not None:
-                with writing():
-                    write_report(outcome.diagnosis, name, wishes.report / f"{_file_name(name)}.html")
+                page = partial(write_report, outcome.diagnosis, name)
+                _written(wishes.report / reports[name], page, refused)
             found[name] = _without_pictures(outcome)
             progress(f"{len(found)} of {len(sources)}: {in_a_line(outcome)}", len(found) / len(sources))
     results = [found[source.name] for source in sources]
     if wishes.json is not None:
-        with writing():
-            _write_json(wishes.json, many_as_json(results))
+        _written(wishes.json, lambda path: _write_json(path, many_as_json(results)), refused)
     if wishes.json != _STDOUT:
         print("\n".join(in_a_line(outcome) for outcome in results))
         if wishes.report is not None and any(outcome.diagnosis is not None for outcome in results):
             print(f"reports    {wishes.report}")
-    codes = [outcome.fault[0] for outcome in results if outcome.fault is not None]
+    statuses = [FAULTS[outcome.fault[0]].exit_status for outcome in results if outcome.fault is not None]
     # bad evidence first: that is what the person who called can mend
-    return min((FAULTS[code].exit_status for code in codes), default=0)
+    return min((status for status in (*statuses, _told(refused)) if status), default=0)
 
 
 def _without_pictures(outcome: "Outcome") -> "Outcome":
@@ -186,9 +200,19 @@ def _without_pictures(outcome: "Outcome") -> "Outcome":
     return outcome._replace(diagnosis=outcome.diagnosis and outcome.diagnosis._replace(pictures=()))
 
 
-def _file_name(name: str) -> str:
-    """A name that is a path, because several folders have the same, as the name of a file."""
-    return name.strip("/").replace("/", "_")
+def _report_names(names: list[str]) -> dict[str, str]:
+    """A file name for the report of each; a name may be a path, because several folders have the same."""
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in names:
+        whole = name.strip("/").replace("/", "_")
+        while len(os.fsencode(whole)) > _LONGEST_NAME_BYTES:  # of a path the end tells most
+            whole = whole[1:]
+        tries = (whole if number == 1 else f"{whole}-{number}" for number in count(1))
+        one = next(one for one in tries if one.casefold() not in taken)  # some disks take a and A for the same
+        taken.add(one.casefold())
+        found[name] = f"{one}.html"
+    return found
 
 
 def _write_json(path: Path, value: dict[str, Any]) -> None:

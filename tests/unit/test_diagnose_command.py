@@ -229,3 +229,37 @@ def test_one_folder_given_twice_is_one(tmp_path):
     rig = folders(tmp_path, "rig") / "rig"
     assert diagnose(rig, rig, "--apply", tmp_path / "found.toml").exit_code == 0
     assert (tmp_path / "found.toml").is_file()
+
+
+def test_a_report_that_cannot_be_written_ends_no_other(tmp_path):
+    """A folder is where one report goes: the others, the JSON and the words are there, and the exit status tells."""
+    folders(tmp_path / "all", "a", "b", "c")
+    out = tmp_path / "out"
+    (out / "b.html").mkdir(parents=True)
+    (out / "b.html" / "full").touch()
+    result = diagnose(tmp_path / "all", "--json", "-", "--report", out, "--jobs", 1)
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert f"LOG_WRITE: {out / 'b.html'}: cannot be written" in result.stderr
+    assert files(out) == {"a.html", "b.html/full", "c.html"}
+    assert [one["evidence"] for one in json.loads(result.stdout)["results"]] == ["a", "b", "c"]
+
+
+def test_json_on_stdout_stays_one_whatever_else_cannot_be_written(tmp_path, monkeypatch):
+    def in_the_way(evidence, progress, jobs):
+        (tmp_path / "a.html").mkdir()
+        return made_up.quick(evidence, progress, jobs)
+
+    monkeypatch.setattr(many, "real_diagnose", in_the_way)
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--json", "-", "--report", tmp_path / "a.html")
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert json.loads(result.stdout)["effects"] == ["drive-backlash"]
+    assert "LOG_WRITE" in result.stderr
+
+
+def test_every_report_has_a_name_of_its_own_that_a_disk_takes(tmp_path):
+    long = "ä" * 120
+    folders(tmp_path, "a_b/rig", "a/b/rig", f"c/{long}", f"d/{long}")
+    given = [tmp_path / "a_b/rig", tmp_path / "a/b/rig", tmp_path / "c" / long, tmp_path / "d" / long]
+    result = diagnose(*given, "--report", tmp_path / "out", "--jobs", 1)
+    assert result.exit_code == 0
+    assert len(files(tmp_path / "out")) == 4
