@@ -1,5 +1,6 @@
 """Measured data of other programs as columns: CSV, Parquet, MATLAB v5 and TDMS. Every error names file, column and row."""
 
+import codecs
 import json
 import zlib
 from pathlib import Path
@@ -55,7 +56,7 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
         raise Fault("BAD_TABLE", line)
     try:
         if path.suffix == ".csv":
-            dialect = dialect or Dialect()
+            dialect = _as_it_says(path, dialect or Dialect())
             _check_dialect(path, dialect)
             return Table(path, _csv(path, dialect), decimal=dialect.decimal)
         if path.suffix == ".parquet":
@@ -75,12 +76,22 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
         raise Fault("BAD_TABLE", line) from None
 
 
+def _as_it_says(path: Path, dialect: Dialect) -> Dialect:
+    """The dialect, but with UTF-16 where the first two bytes of the file say that it is."""
+    with path.open("rb") as file:
+        mark = file.read(2)
+    wide = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+    return dialect._replace(encoding=wide.get(mark, dialect.encoding))
+
+
 def _check_dialect(path: Path, dialect: Dialect) -> None:
     """Refuse a file whose line of names is written in another way. Raises Fault BAD_TABLE."""
-    with path.open("rb") as file:
-        lines = [file.readline() for _ in range(dialect.skip_rows + 1)]
     how = "`stickslip log import` reads it with a map that has, under [source],"
+    lines: list[bytes] = []
     try:
+        after = len("\n".encode(dialect.encoding).rpartition(b"\n")[2])  # bytes of a line's end: 1 in UTF-16
+        with path.open("rb") as file:
+            lines = [file.readline() + file.read(after) for _ in range(dialect.skip_rows + 1)]
         names = lines[-1].decode(dialect.encoding)
     except UnicodeDecodeError as error:
         line = (
@@ -91,6 +102,9 @@ def _check_dialect(path: Path, dialect: Dialect) -> None:
         raise Fault(
             "BAD_TABLE", f"source.encoding = {dialect.encoding!r}: is none that Python knows; try latin-1"
         ) from None
+    if "\0" in names:
+        line = f"{path.name}: line {len(lines)}: has zero bytes: is not {dialect.encoding}"
+        raise Fault("BAD_TABLE", f'{line}; save it as UTF-8, or {how} encoding = "utf-16-le"')
     other = next((mark for mark in (";", "\t", ",") if mark in names), None)
     if dialect.delimiter not in names and other is not None:
         line = f"{path.name}: line {len(lines)}: the names are separated by {other!r}, not by {dialect.delimiter!r}"

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from bridge.export import export
 from bridge.faults import Fault
 from bridge.logfile import read_run
-from bridge.tables import read_table
+from bridge.tables import Dialect, read_table
 from cockpit.log_commands import log_app
 from diagnosis.evidence import load_evidence
 from diagnosis.importing import import_file
@@ -295,3 +295,19 @@ def test_a_csv_file_in_another_encoding(tmp_path: Path) -> None:
     source = SOURCE + 'encoding = "latin-1"\n'
     (tmp_path / "map.toml").write_text(source + GERMAN.replace('column = "F"', 'column = "F/µN"'), encoding="utf-8")
     assert import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out").rows == 4000
+
+
+@pytest.mark.parametrize("start", ["\ufeff", "\ufeffLog of the rig\n"])
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_a_csv_file_of_windows_says_itself_that_it_is_utf_16(tmp_path: Path, start: str, encoding: str) -> None:
+    (tmp_path / "a.csv").write_bytes((start + CSV).encode(encoding))
+    table = read_table(tmp_path / "a.csv", Dialect(";", ",", start.count("\n")))
+    assert list(table.columns) == ["Zeit", "F"]
+    assert table.column("F")[:2].tolist() == [9.5, 9.51]
+
+
+def test_a_csv_file_in_a_wide_encoding_that_does_not_say_so(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(CSV.encode("utf-16-le"))
+    with pytest.raises(Fault, match=r'a.csv: line 1: has zero bytes.* encoding = "utf-16-le"'):
+        read_table(tmp_path / "a.csv", Dialect(";", ","))
+    assert len(read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-16-le")).column("F")) == 4000
