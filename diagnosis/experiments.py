@@ -15,6 +15,7 @@ _LONGEST_S = 45.0
 _SHORTEST_S = 4.0
 _CYCLES = 5.0  # stick-slip cycles that a run should show
 _FARTHEST_M = 0.02
+_LEAST_S = 1.0  # of a run that can be diagnosed
 _HOLDS_S = (1.0, 10.0, 30.0)
 _WATCHED_S = 10.0
 _SHIFT_M = 3.7e-3  # no whole number of anything on a machine
@@ -56,11 +57,12 @@ def plans(problem: Problem) -> list[Plan]:
     cycle_m = _cycle_m(problem.rig, problem.scales)
     found: list[Plan] = []
     slowest, fastest = min(length_s), max(length_s)
+    seen_m = max(abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S for segment in used)
     for speed, beyond in ((0.2 * slowest, True), (0.5 * slowest, False), (2.0 * fastest, False), (5.0 * fastest, True)):
         travel_m = min(_travel_m(problem.scales, cycle_m), _FARTHEST_M)
-        seconds = max(travel_m / speed, min(_SHORTEST_S, _FARTHEST_M / speed))
-        if seconds <= _LONGEST_S:
-            what = f"Drag at {_speed(speed)} for {seconds:.0f} s without vibration."
+        seconds = max(travel_m / speed, min(_SHORTEST_S, _FARTHEST_M / speed), _LEAST_S)
+        if seconds <= _LONGEST_S and _LEAST_S * speed <= max(_FARTHEST_M, seen_m):
+            what = f"Drag at {_speed(speed)} for {seconds:.2g} s without vibration."
             found.append(Plan(what, (Step(seconds, speed),), beyond=beyond))
     some_s = max(_travel_m(problem.scales, 2.0 * cycle_m) / usual, 2.0)
     if some_s * 3.0 <= _LONGEST_S:
@@ -157,5 +159,5 @@ def _travel_m(scales: Scales, cycle_m: float) -> float:
 
 def _speed(speed_mps: float) -> str:
     if speed_mps >= 1e-4:
-        return f"{speed_mps * 1e3:.2g} mm/s"
+        return f"{float(f'{speed_mps * 1e3:.2g}'):g} mm/s"
     return f"{speed_mps * 1e6:.2g} µm/s"

@@ -60,9 +60,7 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
             if best is None
             else f"no run separates them by more than {best.separation:.1f} standard deviations"
         )
-        return Experiment(
-            advice(names, "spring"), f"{both} look alike: {most}.", None if best is None else best.separation
-        )
+        return Experiment(advice(names, "spring"), f"{both} look alike: {most}: this is a check by hand.", None)
     there = f"{best.separation:.1f} standard deviations, most in {_in_words(best.feature)}"
     if present > _DECISIVE:
         why = (
