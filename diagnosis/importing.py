@@ -169,6 +169,12 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
             line = f"{out / run.file}: is already a run of this folder; rename {path.name} or choose another --out"
             raise Fault("BAD_EVIDENCE", line)
         runs = [*before.run, run]
+    elif run.holdout:
+        line = (
+            f"{map_name}: run.holdout = true: must be false for the first run of a folder, which would have none to fit; "
+            "import a run without it first"
+        )
+        raise Fault("CONFIG", line)
     _check_free(out / run.file)
     findings = examine(columns, rig, run)[1]
     findings += [

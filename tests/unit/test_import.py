@@ -113,6 +113,16 @@ def test_a_second_run_is_added_to_its_rig_only(tmp_path: Path) -> None:
     assert sorted(path.name for path in out.iterdir()) == ["manifest.toml", "measured.parquet", "second.parquet"]
 
 
+def test_the_first_run_of_a_folder_is_none_that_is_kept_aside(tmp_path: Path) -> None:
+    """Such a folder could not be diagnosed, nor a run be added to it."""
+    source, channel_map = setup(tmp_path, ".csv", MAP + "holdout = true\n")
+    with pytest.raises(
+        Fault, match=r"map.toml: run.holdout = true: must be false for the first run .* import .* first"
+    ):
+        import_file(source, channel_map, tmp_path / "evidence")
+    assert not (tmp_path / "evidence").exists()
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".tdms"])
 def test_a_file_becomes_a_log(tmp_path: Path, suffix: str) -> None:
     source, channel_map = setup(tmp_path, suffix)
