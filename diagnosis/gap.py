@@ -71,7 +71,7 @@ class Floor(NamedTuple):
             powers=self.powers[own],
             scatter=self.scatter[own],
             compared=self.compared[own],
-            whitening=self.whitening[np.ix_(rows, rows)],
+            whitening=self.whitening[rows][:, rows],
             cells=tuple(cell for cell, is_own in zip(self.cells, rows, strict=True) if is_own),
             level=self.level,
         )
