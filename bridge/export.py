@@ -11,6 +11,7 @@ import pyarrow as pa
 from bridge.faults import Fault
 from bridge.logfile import STREAMING, Damage, LogReader, block_period_ns, iter_pieces, sample_times_s
 from bridge.messages import Records
+from bridge.reading import check_file
 from bridge.table_writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
 
 SUFFIXES = (".parquet", ".csv", ".mat")
@@ -53,8 +54,7 @@ def export(
     Raises Fault BAD_LOG, BAD_MESSAGE, BAD_TABLE, CONFIG, LOG_WRITE; nothing unfinished is left behind.
     """
     check_request(to, topics, from_s, until_s)
-    if not path.is_file():
-        raise Fault("BAD_LOG", f"{path}: no such file")
+    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
     reader = LogReader(path)
     owners: list[TableWriter | MatFile] = []
     finished = False

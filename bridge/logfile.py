@@ -25,6 +25,7 @@ from bridge.log_reader import (
 )
 from bridge.mcap_chunks import ChunkWriter
 from bridge.messages import APPLIED, COMMAND, STATE, TRACE, Layout, Records, file_descriptor_set, parsed, sensor_block
+from bridge.reading import check_file
 from bridge.runlog import LIBRARY
 from bridge.topics import BY_NAME
 
@@ -179,8 +180,7 @@ class RunData(NamedTuple):
 
 def read_run(path: Path) -> RunData:
     """Read a log, whole or cut. Raises Fault BAD_LOG when it is no run log of this project."""
-    if not path.is_file():
-        raise Fault("BAD_LOG", f"{path}: no such file")
+    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
     reader = LogReader(path)
     # joined as bytes: numpy's own way to join records leaves the tags between their fields behind
     stored: dict[str, list[memoryview]] = {name: [] for name in STREAMING}
@@ -261,8 +261,7 @@ class _Copy:
 
 def recover(path: Path, out: Path) -> Recovered:
     """Write every message of a cut or damaged log that can be read to `out`, with an index; `out` may be `path`."""
-    if not path.is_file():
-        raise Fault("BAD_LOG", f"{path}: no such file")
+    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
     reader = LogReader(path)
     beside = out.with_name(out.name + ".part")
     messages = 0

@@ -16,6 +16,7 @@ from nptdms import TdmsFile
 from scipy.io.matlab import MatReadError
 
 from bridge.faults import Fault
+from bridge.reading import check_file
 
 Floats = npt.NDArray[np.float64]
 SUFFIXES = (".csv", ".parquet", ".mat", ".tdms")
@@ -48,8 +49,7 @@ class Table(NamedTuple):
 
 def read_table(path: Path, dialect: Dialect | None = None) -> Table:
     """Read a table. Raises Fault BAD_TABLE when it cannot be read as what its name says."""
-    if not path.is_file():
-        raise Fault("BAD_TABLE", f"{path}: no such file; give the path of a file of measured data")
+    check_file(path, "BAD_TABLE", "give the path of a file of measured data")
     if path.suffix not in SUFFIXES:
         remedy = "rename it" if path.suffix.lower() in SUFFIXES else "convert it"
         line = f"{path}: ends in {path.suffix or 'nothing'}: must be one of {', '.join(SUFFIXES)}; {remedy}"

@@ -145,6 +145,6 @@ def _check_file(option: str, path: Path | None) -> None:
     """Refuse before the answers are opened what could not be written afterwards. Raises Fault."""
     if path is None:
         return
+    check_writable(option, path)
     if path.is_dir():
         raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")
-    check_writable(option, path)

@@ -183,9 +183,9 @@ def operator_stop(
 @contextlib.contextmanager
 def _written(out: Path) -> Generator[None]:
     """The work that ends with writing `out`. Raises Fault LOG_WRITE where it cannot, at its start if that is known then."""
+    check_writable("--out", out)
     if out.is_dir():
         raise Fault("LOG_WRITE", f"--out {out}: is a folder; give the name of a file in it")
-    check_writable("--out", out)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         yield

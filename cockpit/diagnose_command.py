@@ -82,6 +82,7 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["Source"]) -> 
     for option, path in (("--json", wishes.json), ("--report", wishes.report), ("--apply", wishes.apply)):
         if path is None or path == _STDOUT:
             continue
+        check_writable(option, path)
         whole = path.resolve()
         if whole in seen:
             raise Fault("CONFIG", f"{option} {path}: is where {seen[whole]} goes; choose another")
@@ -95,7 +96,6 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["Source"]) -> 
         if path.exists() and path.is_dir() != folder_wanted:
             rule = "must be a folder, one report for each evidence" if folder_wanted else "must be a file, not a folder"
             raise Fault("CONFIG", f"{option} {path}: {rule}; choose another")
-        check_writable(option, path)
 
 
 def _diagnose_one(source: "Source", wishes: _Wishes) -> int:

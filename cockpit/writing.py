@@ -10,9 +10,11 @@ from bridge.faults import Fault
 
 def check_writable(option: str, path: Path) -> None:
     """Raise Fault LOG_WRITE where a file, or the nearest folder above it, does not allow it."""
-    needed = [path] if path.exists() else []
-    if path.is_file() or not needed:  # it is written beside itself first
-        needed.append(next(parent for parent in path.absolute().parents if parent.exists()))
+    with writing(path):
+        Path(f"{path}.part").exists()  # it is written beside itself first: a name may be too long for that
+        needed = [path] if path.exists() else []
+        if path.is_file() or not needed:
+            needed.append(next(parent for parent in path.absolute().parents if parent.exists()))
     for place in needed:
         if not os.access(place, os.W_OK) or (place != path and not place.is_dir()):
             raise Fault("LOG_WRITE", f"{option} {path}: cannot be written: {place} does not allow it; choose another")

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 from bridge import stickslip_pb2 as wire
 from bridge.export import CHANNELS
-from bridge.faults import Fault
 from bridge.log_reader import Damage
 from bridge.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
 from bridge.messages import SCHEMA_VERSION, parsed
+from bridge.reading import check_file
 from bridge.topics import BY_NAME
 from diagnosis.findings import Finding
 from diagnosis.signal_checks import Signal, SignalLook
@@ -80,8 +80,7 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
 
     `progress` is called with the share of the log that was read, 0 to 1.
     """
-    if not path.is_file():
-        raise Fault("BAD_LOG", f"{path}: no such file")
+    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
     reader = LogReader(path)
     seen = _Pass()
     for piece in iter_pieces(reader):

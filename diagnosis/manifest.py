@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
+from bridge.reading import check_file
 
 FORMAT = "evidence/1"
 MANIFEST = "manifest.toml"
@@ -154,13 +155,15 @@ def check_channel_names(channels: dict[str, Any]) -> None:
 
 def read_manifest(folder: Path) -> Manifest:
     """Read and check `manifest.toml`. Raises Fault BAD_EVIDENCE, one line a problem."""
-    if not folder.is_dir():
-        what = "no folder" if folder.exists() else "no such folder"
+    try:
+        what = "" if folder.is_dir() else "no folder" if folder.exists() else "no such folder"
+    except OSError as error:
+        what = f"cannot be read: {error.strerror}"
+    if what:
         line = f"{folder}: {what}; evidence is a folder with {MANIFEST} and one data file a run"
         raise Fault("BAD_EVIDENCE", line)
     path = folder / MANIFEST
-    if not path.is_file():
-        raise Fault("BAD_EVIDENCE", f"{path}: no such file; an evidence folder needs it, see `stickslip log import`")
+    check_file(path, "BAD_EVIDENCE", "an evidence folder needs it, see `stickslip log import`")
     try:
         table = read_toml(path)
         if "format" in table and table["format"] != FORMAT:

@@ -44,9 +44,13 @@ def find_sources(folders: list[Path]) -> list[Source]:
     """The evidence folders among `folders` and, where one has no manifest, right below it; each once, in order."""
     found: dict[Path, None] = {}
     for folder in folders:
-        inside = sorted(path.parent.resolve() for path in folder.glob(f"*/{MANIFEST}"))
+        try:
+            holds = (folder / MANIFEST).is_file()
+            inside = sorted(path.parent.resolve() for path in folder.glob(f"*/{MANIFEST}"))
+        except OSError:
+            holds, inside = False, list[Path]()
         # a folder without any evidence stays: reading it says what is missing
-        given = [folder.resolve()] if (folder / MANIFEST).is_file() or not inside else inside
+        given = [folder.resolve()] if holds or not inside else inside
         found.update(dict.fromkeys(given))
     names = [folder.name for folder in found]
     return [Source(folder.name if names.count(folder.name) == 1 else str(folder), folder) for folder in found]

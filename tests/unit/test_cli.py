@@ -59,6 +59,8 @@ def test_a_folder_as_the_file_to_write_is_refused_at_once(log: Path, command: st
     assert result.stderr.startswith(f"stickslip: LOG_WRITE: --out {log.parent}: is a folder; ")
     under_a_file = log / "picture"
     assert f"{under_a_file}: cannot be written" in call(command, *more, "--out", str(under_a_file)).stderr
+    long = log.parent / ("x" * 300)
+    assert f"{long}: cannot be written: File name too long" in call(command, *more, "--out", str(long)).stderr
 
 
 def test_a_rig_that_cannot_be_read_is_no_picture_that_cannot_be_written(tmp_path: Path) -> None:

@@ -99,6 +99,42 @@ def test_json_has_no_numbers_that_json_does_not_know():
     }
 
 
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("rig/" + "x" * 300, "cannot be read: File name too long; "),
+        ("in its place", "in its place/manifest.toml: is a folder, must be a file; "),
+        ("run in its place", "run-01.csv: is a folder, must be a file; "),
+        ("long run", "cannot be read: File name too long; "),
+    ],
+)
+def test_evidence_that_cannot_be_looked_at_is_bad_and_ends_no_other(name, why, tmp_path):
+    folders(tmp_path, "rig")
+    (tmp_path / "in its place" / "manifest.toml").mkdir(parents=True)
+    (tmp_path / "run in its place" / "run-01.csv").mkdir(parents=True)
+    (tmp_path / "run in its place" / "manifest.toml").write_text(made_up.MANIFEST)
+    (tmp_path / "long run").mkdir()
+    (tmp_path / "long run" / "manifest.toml").write_text(made_up.MANIFEST.replace("run-01", "x" * 300))
+    result = diagnose(tmp_path / name)
+    assert result.exit_code == 2
+    assert why in result.stderr
+    assert result.stderr.startswith("stickslip: BAD_EVIDENCE: ")
+    result = diagnose(tmp_path / name, tmp_path / "rig", "--jobs", 1)
+    assert result.exit_code == 2
+    assert "rig: effect: drive-backlash" in result.stdout
+    assert why in result.stdout
+
+
+@pytest.mark.parametrize("option", ["--json", "--report", "--apply"])
+def test_a_name_too_long_to_be_written_is_said_before_the_work(option, tmp_path, monkeypatch):
+    monkeypatch.setattr(many, "real_diagnose", made_up.endless)
+    result = diagnose(folders(tmp_path, "rig") / "rig", option, tmp_path / ("x" * 252))
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert result.stderr.startswith(
+        f"stickslip: LOG_WRITE: {tmp_path / ('x' * 252)}: cannot be written: File name too long"
+    )
+
+
 @pytest.mark.parametrize("where", ["absent", "refused"])
 def test_bad_evidence_writes_nothing(where, tmp_path):
     folders(tmp_path, "refused")

@@ -150,8 +150,9 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
         "foreign": "must be 'stickslip schema 1'",
         "version": "written by 'stickslip schema 2'",
         "text": "no MCAP file",
-        "folder": "no such file",
-        "absent": "no such file",
+        "folder": "is a folder, must be a file; ",
+        "absent": "no such file; ",
+        "long" * 70: "cannot be read: File name too long; ",
     }
     for name, line in expected.items():
         path = tmp_path / f"{name}.mcap"
@@ -162,6 +163,8 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
             assert line in caught.value.line
         for command in ("check", "info", "recover"):
             assert CliRunner().invoke(log_app, [command, str(path)]).exit_code == 7
+        export = ["export", str(path), "--to", str(tmp_path / "out.csv")]
+        assert CliRunner().invoke(log_app, export).exit_code == 7
 
 
 def test_the_verdict_on_a_cut_log_says_what_was_lost(tmp_path: Path) -> None:
