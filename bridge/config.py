@@ -25,13 +25,14 @@ T = TypeVar("T", bound=Strict)
 def read_toml(path: Path) -> dict[str, Any]:
     """Read one TOML file. Raises Fault CONFIG when it cannot be read or is not TOML."""
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))  # Notepad marks what it saves as UTF-8
     except FileNotFoundError:
         raise Fault("CONFIG", f"{path}: no such file; give the path of a TOML file") from None
     except OSError as error:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}") from None
 
 
@@ -84,6 +85,8 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
         return f"{source}: {key} = {problem['input']!r}: must be a number; write it without quotes"
     if kind in {"model_type", "dict_type"}:
         return f"{source}: {key} = {problem['input']!r}: must be a table; write {path[-1] if path else 'it'} = {{ KEY = VALUE }}"
+    if kind == "list_type" and isinstance(problem["input"], dict):
+        return f"{source}: {key}: is one table: must be a list of them; write [[{key}]] above each"
     rule = message[:1].lower() + message[1:]
     rule = rule.replace("input should be", "must be")
     return f"{source}: {key} = {problem['input']!r}: {rule}; change the value"

@@ -88,6 +88,7 @@ def test_a_good_folder(tmp_path: Path) -> None:
         ("run-01.parquet", "run-07.parquet", "run-07.parquet: no such file"),
         ("drive_velocity_mps = 0.0005", "holdout = true", "run.holdout = true for every run"),
         ("[[run]]", "[[run", "manifest.toml: not valid TOML"),
+        ("[[run]]", "[run]", "manifest.toml: run: is one table: must be a list of them; write [[run]] above each"),
     ],
 )
 def test_a_bad_manifest_names_the_key(tmp_path: Path, old: str, new: str, expected: str) -> None:
@@ -273,6 +274,15 @@ def test_a_file_that_is_not_what_its_name_says(tmp_path: Path, name: str) -> Non
         load_evidence(tmp_path)
     assert caught.value.kind.code == "BAD_EVIDENCE"
     assert name in caught.value.line
+
+
+def test_a_manifest_of_notepad_is_read_and_one_of_another_encoding_told(tmp_path: Path) -> None:
+    folder(tmp_path, columns())
+    (tmp_path / "manifest.toml").write_text(MANIFEST, encoding="utf-8-sig")
+    assert load_evidence(tmp_path).rig.mass_kg == 1.5
+    (tmp_path / "manifest.toml").write_text(MANIFEST, encoding="utf-16")
+    with pytest.raises(Fault, match=r"manifest.toml: is not UTF-8 from byte 1 on; save it as UTF-8"):
+        load_evidence(tmp_path)
 
 
 def test_no_folder_and_no_manifest(tmp_path: Path) -> None:
