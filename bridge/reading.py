@@ -1,5 +1,6 @@
 """Files that are read: one that is not there, or that cannot be looked at, is one clear line that says why."""
 
+import os
 import stat
 from pathlib import Path
 
@@ -19,3 +20,8 @@ def check_file(path: Path, code: str, remedy: str) -> None:
             return
         why = "is a folder, must be a file" if stat.S_ISDIR(mode) else "must be a file on a disk"
     raise Fault(code, f"{path}: {why}; {remedy}")
+
+
+def shown(path: Path) -> str:
+    """The path as a text that can be printed: bytes of a name that are not UTF-8 are spelt out."""
+    return os.fsencode(path).decode(errors="backslashreplace")

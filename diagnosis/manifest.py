@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
-from bridge.reading import check_file
+from bridge.reading import check_file, shown
 
 FORMAT = "evidence/1"
 MANIFEST = "manifest.toml"
@@ -155,6 +155,8 @@ def check_channel_names(channels: dict[str, Any]) -> None:
 
 def read_manifest(folder: Path) -> Manifest:
     """Read and check `manifest.toml`. Raises Fault BAD_EVIDENCE, one line a problem."""
+    if shown(folder) != str(folder):
+        raise Fault("BAD_EVIDENCE", f"{shown(folder)}: its name is not UTF-8; rename it")
     try:
         what = "" if folder.is_dir() else "no folder" if folder.exists() else "no such folder"
     except OSError as error:

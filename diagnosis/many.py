@@ -16,6 +16,7 @@ from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky import BrokenProcessPool
 
 from bridge.faults import Fault
+from bridge.reading import shown
 from diagnosis.evidence import Evidence, load_evidence
 from diagnosis.manifest import MANIFEST
 from diagnosis.result import Diagnosis
@@ -53,7 +54,8 @@ def find_sources(folders: list[Path]) -> list[Source]:
         given = [folder.resolve()] if holds or not inside else inside
         found.update(dict.fromkeys(given))
     names = [folder.name for folder in found]
-    return [Source(folder.name if names.count(folder.name) == 1 else str(folder), folder) for folder in found]
+    unique = [folder if names.count(folder.name) > 1 else Path(folder.name) for folder in found]
+    return [Source(shown(name), folder) for name, folder in zip(unique, found, strict=True)]
 
 
 def real_diagnose(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:

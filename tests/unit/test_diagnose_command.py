@@ -261,6 +261,20 @@ def test_a_link_stays_one_and_a_device_is_written_into(tmp_path):
     assert (tmp_path / "pipe").is_fifo()
 
 
+def test_a_folder_whose_name_is_not_utf_8_is_told_and_ends_no_other(tmp_path):
+    """As an old archive of Windows leaves them: neither the reader of CSV nor a report takes such a name."""
+    odd = tmp_path / os.fsdecode(b"m\xe4rz")
+    made_up.evidence_folder(odd)
+    folders(tmp_path, "rig")
+    result = diagnose(odd)
+    assert result.exit_code == 2
+    assert "m\\xe4rz: its name is not UTF-8; rename it" in result.stderr
+    result = diagnose(odd, tmp_path / "rig", "--report", tmp_path / "out", "--jobs", 1)
+    assert result.exit_code == 2
+    assert "rig: effect: drive-backlash" in result.stdout
+    assert "m\\xe4rz: BAD_EVIDENCE: " in result.stdout
+
+
 def test_one_folder_given_twice_is_one(tmp_path):
     rig = folders(tmp_path, "rig") / "rig"
     assert diagnose(rig, rig, "--apply", tmp_path / "found.toml").exit_code == 0
