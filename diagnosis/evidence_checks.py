@@ -27,6 +27,7 @@ _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
 _VELOCITY_TOLERANCE = 0.1  # of the stated drive velocity against the drive position's slope
 _ANOTHER = 3.0  # times as fast, or as slow, or the other way: another drive than the one stated
 _FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
+_LEAST_TRAVEL = 0.002  # of the way to the first slip; the noise of a drive at rest is less
 _FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
 _FEWEST_IN_A_SLIP = 3.0  # samples
 _SHORTEST_S = 1.0  # of a run
@@ -103,6 +104,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
                 seen.highest if seen.clipped_high else math.inf,
             )
     _compare_velocity(usable, rig, table, note)
+    _check_moves(usable, rig, table, note)
     if (
         rig.drive_stiffness_N_per_m
         and "drive_force_N" in usable
@@ -198,10 +200,13 @@ def _good_rows(
             if rows - lost < _FEWEST_ROWS
             else f"must be below {100 * _LARGEST_BAD_SHARE:g} %"
         )
-        line = (
-            f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: {few}; repair the file, or cut it where "
-            "the trouble begins"
-        )
+        remedy = "repair the file, or cut it where the trouble begins"
+        if len(back) and worst.kind == "time" and (np.diff(t_s[np.isfinite(t_s)]) >= 0.0).all():
+            remedy = (
+                "it stands but never goes back: write it with more digits, or give `stickslip log import` the "
+                "source.sample_rate_Hz in place of channels.t_s"
+            )
+        line = f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: {few}; {remedy}"
         raise Fault("BAD_EVIDENCE", line)
     findings += found
     return ({name: values[good] for name, values in columns.items()} if lost else columns), np.flatnonzero(good)
@@ -261,6 +266,23 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
     if fastest_mps > _FASTEST * rig.stribeck_velocity_mps:
         times = fastest_mps / rig.stribeck_velocity_mps
         note("units", where, f"{fastest_mps:.3g} m/s, {times:.3g} times rig.stribeck_velocity_mps: is it in mm?")
+
+
+def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
+    """Note a drive that stands still, whose run fits nearly every rig."""
+    if rig.drive_stiffness_N_per_m is None:
+        return
+    if "drive_position_m" in columns:
+        where, travel_m = "drive_position_m", float(np.ptp(columns["drive_position_m"]))
+    elif table.drive_velocity_mps is not None:
+        t_s = columns["t_s"]
+        where, travel_m = "drive_velocity_mps", abs(table.drive_velocity_mps) * float(t_s[-1] - t_s[0])
+    else:
+        return
+    share = travel_m * rig.drive_stiffness_N_per_m / rig.static_force_N
+    if share < _LEAST_TRAVEL:
+        text = f"{travel_m:.2g} m in all, {share:.2g} of what breaks the mass away: it stands still in the whole run"
+        note("still", where, f"{text}: friction and drive are not tested")
 
 
 def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> bool:

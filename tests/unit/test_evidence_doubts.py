@@ -152,6 +152,27 @@ def test_a_speed_without_a_drive_position_may_be_in_mm(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_drive_that_stands_still_is_told(tmp_path: Path, stated: bool) -> None:
+    """Such a run says `no-gap` of nearly every rig."""
+    data = columns()
+    data["drive_position_m"][:] = 0.01 + np.random.default_rng(2).normal(0, 1e-7, 4000)
+    if stated:
+        del data["drive_position_m"]
+    speed = "drive_velocity_mps = 0.0" if stated else ""
+    found = kinds(load_evidence(folder(tmp_path, data, MANIFEST.replace("drive_velocity_mps = 0.0005", speed))))
+    assert "stands still in the whole run: friction and drive are not tested" in found["still"]
+
+
+def test_a_clock_with_too_few_digits_is_told_as_one(tmp_path: Path) -> None:
+    data = columns()
+    data["t_s"] = np.round(data["t_s"], 3)
+    with pytest.raises(
+        Fault, match=r"1999 of 4000 rows.* more digits.* source.sample_rate_Hz in place of channels.t_s"
+    ):
+        load_evidence(folder(tmp_path, data))
+
+
 def test_time_in_ms_is_refused(tmp_path: Path) -> None:
     """51.2 kHz in ms is a sample every 20 ms, and a slip of this rig lasts 36."""
     data = columns()
