@@ -26,6 +26,7 @@ Fit
     waves, axis_waves           periods at which a wave may be looked for
     ringing                     frequencies at which a structure that rings may be looked for
     phases, phases_by_run       a wave over time that begins in another phase in every run; where its refit starts
+    late_friction               where the refit of friction starts that lags by much
     retuning                    the rig without effects, refitted: what all evidence is measured against
     refit                       Gauss-Newton over nuisances and the parameters of an effect
     together                    many fits at once, whose predictions go side by side
