@@ -1,13 +1,16 @@
 """A run of several processes: starts plant, controller and recorder, watches them, ends them, leaves nobody behind."""
 
+import contextlib
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
+from typing import Any
 
 from bridge.faults import FAULTS, Fault
 
@@ -37,7 +40,8 @@ class Child:
 
     def _read(self) -> None:
         if self.process.stderr is not None:
-            self._lines.extend(line.rstrip() for line in self.process.stderr)
+            with self.process.stderr as lines:
+                self._lines.extend(line.rstrip() for line in lines)
 
     def last_words(self) -> str:
         """What it said last on stderr."""
@@ -84,10 +88,11 @@ def run_processes(
     over = threading.Event()
     watcher = threading.Thread(target=watch, args=(over,), daemon=True)
     try:
-        for role in _ROLES:
-            extra = ["--log", str(log)] if role == "recorder" else []
-            wait_for = ["--wait-for", "controller,recorder"] if role == "plant" else []
-            children.append(Child(role, [*arguments, *more, *extra, *wait_for]))
+        with _ctrl_c_afterwards():
+            for role in _ROLES:
+                extra = ["--log", str(log)] if role == "recorder" else []
+                wait_for = ["--wait-for", "controller,recorder"] if role == "plant" else []
+                children.append(Child(role, [*arguments, *more, *extra, *wait_for]))
         watcher.start()
         _until_the_end(children)
     except KeyboardInterrupt:
@@ -98,6 +103,23 @@ def run_processes(
         _stop(children)
         if watcher.is_alive():
             watcher.join(2.0)
+
+
+@contextlib.contextmanager
+def _ctrl_c_afterwards() -> Generator[None]:
+    """Ctrl-C waits for the end of the block: a child that was just started and is not noted yet would be left behind."""
+    came = threading.Event()
+
+    def note(_number: int, _frame: Any) -> None:
+        came.set()
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if came.is_set():
+        raise KeyboardInterrupt
 
 
 def _until_the_end(children: list[Child]) -> None:

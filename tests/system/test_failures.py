@@ -6,6 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +17,7 @@ from mcap.reader import make_reader
 
 from bridge.faults import FAULTS
 from bridge.logfile import RunData, read_run, recover
+from cockpit import orchestra
 from tests.logs import short_log
 from tests.system.ports import free_endpoint
 
@@ -180,6 +182,29 @@ def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list
     assert err.strip() == "stickslip: INTERRUPTED: stopped by Ctrl-C before anything was recorded"
     if older is not None:
         assert log.read_bytes() == older
+
+
+def test_ctrl_c_while_a_child_starts_leaves_nobody_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[subprocess.Popen[str]] = []
+
+    class Interrupted(orchestra.Child):
+        def __init__(self, role: str, arguments: list[str]) -> None:
+            super().__init__(role, arguments)
+            started.append(self.process)
+            if role == "recorder":
+                os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(orchestra, "Child", Interrupted)
+    endpoint = free_endpoint()
+    arguments = ["--scenario", "paper-c45-c45", "--set", f'bus.endpoint="{endpoint}"']
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            orchestra.run_processes(arguments, endpoint, tmp_path / "run.mcap", False, threading.Event.wait)
+        assert len(started) == 3
+        assert all(process.poll() is not None for process in started)
+    finally:
+        for process in started:
+            process.kill()
 
 
 def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped(tmp_path: Path) -> None:
