@@ -1,6 +1,6 @@
 """What a person touches: the `stickslip` command. The only package that knows both the controller and the plant.
 
-cli, log_commands                the commands
+cli, log_commands, ..._command   the commands; options: what several of them have
 scenario, running, verdict       what a run is made of, one run, what came of it
 orchestra, processes, live       a run of several processes, how each behaves, its progress line
 operator_word                    a person's stop or reset on its way

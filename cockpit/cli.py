@@ -13,7 +13,21 @@ from bridge.faults import FAULTS, Fault
 from cockpit.blind_command import blind_app
 from cockpit.diagnose_command import diagnose
 from cockpit.log_commands import log_app
+from cockpit.options import (
+    DEFAULT_SCENARIO,
+    ChildOf,
+    Endpoint,
+    Json,
+    Lockstep,
+    LogFile,
+    Prefix,
+    ScenarioName,
+    Seed,
+    Settings,
+    as_settings,
+)
 from cockpit.processes import guarded, stop_event
+from cockpit.replay_command import replay_command
 from cockpit.writing import check_writable, writing
 
 app = typer.Typer(
@@ -22,36 +36,6 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-
-ScenarioName = Annotated[
-    str, typer.Option("--scenario", help="Name of a scenario in deploy/scenarios, or a .toml file.")
-]
-Settings = Annotated[
-    list[str],
-    typer.Option("--set", help="Change one value: key=value, e.g. controller.limits.v_ratio=1.3. Repeatable."),
-]
-Seed = Annotated[int | None, typer.Option(help="Seed of the sensor noise; the same seed gives the same run.")]
-Endpoint = Annotated[str | None, typer.Option(help="Where the processes meet, e.g. tcp/127.0.0.1:7447.")]
-Prefix = Annotated[str | None, typer.Option(help="First part of every key on the bus.")]
-Lockstep = Annotated[
-    bool,
-    typer.Option("--lockstep", help="Not paced: each block waits for its command. Repeatable to the bit."),
-]
-ChildOf = Annotated[int, typer.Option("--child", hidden=True)]  # the process that started this one, 0: a person
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
-LogFile = Annotated[Path | None, typer.Option("--log", help="Where the log goes; runs/NAME.mcap if not given.")]
-DEFAULT_SCENARIO = "paper-c45-c45"
-
-
-def _settings(settings: list[str], seed: int | None, endpoint: str | None, prefix: str | None) -> list[str]:
-    result = list(settings)
-    if seed is not None:
-        result.append(f"seed={seed}")
-    if endpoint is not None:
-        result.append(f'bus.endpoint="{endpoint}"')
-    if prefix is not None:
-        result.append(f'bus.prefix="{prefix}"')
-    return result
 
 
 @app.command()
@@ -79,7 +63,7 @@ def run(
         from cockpit.scenario import rig_setting
 
         other = [rig_setting(rig)] if rig is not None else []
-        changed = [*other, *_settings(settings, seed, endpoint, prefix)]
+        changed = [*other, *as_settings(settings, seed, endpoint, prefix)]
         return run_scenario(scenario, changed, lockstep, in_process, log, as_json)
 
     sys.exit(guarded(work, as_json))
@@ -102,7 +86,7 @@ def plant(
         from cockpit.scenario import header, load_scenario
         from plant.app import run as serve
 
-        made = load_scenario(scenario, _settings(settings, seed, endpoint, prefix))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         roles = [role for role in wait_for.split(",") if role]
         described = header(made, "plant", lockstep)
         serve(made.rig, made.seed, made.duration_s, made.bus, described, roles, lockstep, stop_event(child))
@@ -126,7 +110,7 @@ def controller(
         from cockpit.scenario import header, load_scenario
         from controller.app import run as control
 
-        made = load_scenario(scenario, _settings(settings, seed, endpoint, prefix))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         control(made.controller, made.bus, header(made, "controller", lockstep), lockstep, stop_event(child))
 
     sys.exit(guarded(work))
@@ -150,7 +134,7 @@ def recorder(
         from cockpit.running import about_run, log_path
         from cockpit.scenario import load_scenario
 
-        made = load_scenario(scenario, _settings(settings, seed, endpoint, prefix))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         path = log_path(log, made.name)
         record(path, made.bus, ["plant", "controller"], about_run(made, lockstep), lockstep, stop_event(child))
 
@@ -174,7 +158,7 @@ def operator_stop(
         from cockpit.operator_word import tell
         from cockpit.scenario import load_scenario
 
-        made = load_scenario(scenario, _settings([], None, endpoint, prefix))
+        made = load_scenario(scenario, as_settings([], None, endpoint, prefix))
         tell(made.bus, wire.Operator.RESET if reset else wire.Operator.STOP)
 
     sys.exit(guarded(work))
@@ -252,85 +236,6 @@ def plot(
     sys.exit(guarded(work))
 
 
-def _only_with(mode: str, given: dict[str, bool]) -> None:
-    """Refuse options that only another kind of replay follows. Raises Fault CONFIG."""
-    for option, is_given in given.items():
-        if is_given:
-            raise Fault("CONFIG", f"{option}: only with {mode}; add that, or leave it out")
-
-
-@app.command("replay")
-def replay_command(
-    logs: Annotated[list[Path], typer.Argument(help="Run logs, .mcap.")],
-    settings: Annotated[
-        list[str], typer.Option("--set", help="What if: key=value, or key=value@20s from a time on. Repeatable.")
-    ] = [],  # noqa: B006
-    start: Annotated[
-        str, typer.Option("--from", help="Start here, e.g. 12.5s, at the nearest snapshot before.")
-    ] = "0s",
-    closed_loop: Annotated[
-        bool, typer.Option("--closed-loop", help="Simulate the run again from the log's own plant and seed.")
-    ] = False,
-    to_bus: Annotated[bool, typer.Option("--to-bus", help="Publish the log on the bus again, paced.")] = False,
-    speed: Annotated[
-        float | None, typer.Option(min=0.01, max=1000.0, help="With --to-bus: times real time; 1 if not given.")
-    ] = None,
-    everything: Annotated[
-        bool, typer.Option("--all", help="With --to-bus: the controller's topics too, for viewers.")
-    ] = False,
-    wait: Annotated[
-        bool, typer.Option("--wait", help="With --to-bus: begin when a controller and a recorder are on the bus.")
-    ] = False,
-    log: Annotated[
-        Path | None, typer.Option("--log", help="With --closed-loop: the new log; runs/closed-loop.mcap if not given.")
-    ] = None,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    as_json: Json = False,
-) -> None:
-    """Feed a log to today's controller: the same bits (exit 0), or the first difference (exit 1)."""
-
-    def work() -> int:
-        from cockpit import replaying
-
-        from_s = replaying.time_s(f"--from {start}", start, "12.5s")
-        if not to_bus:
-            paced = {"--speed": speed is not None, "--all": everything, "--wait": wait}
-            meeting = {"--endpoint": endpoint is not None, "--prefix": prefix is not None}
-            _only_with("--to-bus, which plays the log on the bus", paced | meeting)
-        if not closed_loop:
-            _only_with("--closed-loop, whose new run goes there", {"--log": log is not None})
-        if to_bus:
-            for option, given in (("--closed-loop", closed_loop), ("--json", as_json), ("--set", bool(settings))):
-                if given:
-                    line = f"{option}: not with --to-bus, which plays the log as it is; leave one of them out"
-                    raise Fault("CONFIG", line)
-            from cockpit.scenario import load_scenario
-            from cockpit.to_bus import publish_log
-
-            bus = load_scenario(DEFAULT_SCENARIO, _settings([], None, endpoint, prefix)).bus
-            roles = ["controller", "recorder"] if wait else []
-            stop = stop_event()
-            for path in logs:
-                if not stop.is_set():
-                    publish_log(path, bus, speed or 1.0, from_s, everything, roles, stop)
-            return 0
-        if closed_loop:
-            out = log or Path("runs/closed-loop.mcap")
-            if len(logs) != 1:
-                raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")
-            if from_s > 0.0:
-                line = f"--from {start}: not with --closed-loop, which simulates the run from its start; leave it out"
-                raise Fault("CONFIG", line)
-            if out.resolve() == logs[0].resolve():
-                line = f"--log {out}: is the recorded run, which the new one would replace; choose another file"
-                raise Fault("CONFIG", line)
-            return replaying.closed_loop(logs[0], settings, out, as_json)
-        return replaying.replay_logs(logs, from_s, settings, as_json)
-
-    sys.exit(guarded(work, as_json))
-
-
 _NO_FAULTS = {
     "0": "all is well; a diagnosis that was made is, whatever it says",
     "1": "the command did its work, and the run, the log or the comparison is not as it should be; or, with a traceback, "
@@ -391,6 +296,7 @@ def scenarios(as_json: Json = False) -> None:
     sys.exit(guarded(work, as_json))
 
 
+app.command("replay")(replay_command)
 app.command()(diagnose)
 app.add_typer(log_app, name="log")
 app.add_typer(blind_app, name="blind")

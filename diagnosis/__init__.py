@@ -28,6 +28,7 @@ Fit
     phases, phases_by_run       a wave over time that begins in another phase in every run; where its refit starts
     late_friction               where the refit of friction starts that lags by much
     retuning                    the rig without effects, refitted: what all evidence is measured against
+    form                        effects in given formulas, and their free parameters as coordinates
     refit                       Gauss-Newton over nuisances and the parameters of an effect
     together                    many fits at once, whose predictions go side by side
     random_friction             friction without a path that could be followed: judged by what it scatters

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from diagnosis.advice import UNCOUPLE
 from diagnosis.evidence import Evidence
 from diagnosis.flexible import flexible_differences
+from diagnosis.form import NOTHING, Axis, Form
 from diagnosis.gap import (
     DEFINITION,
     KNEE,
@@ -30,7 +31,7 @@ from diagnosis.phases_by_run import starts_by_run
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem, prepare
 from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction, is_random
-from diagnosis.refit import FAR_KNEE, NOTHING, Axis, Fit, Fitter, Form
+from diagnosis.refit import FAR_KNEE, Fit, Fitter
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.retuning import retuned_rig
 from diagnosis.search import (
@@ -230,8 +231,7 @@ def _starts_of_contenders(retuned: Fit, contenders: list[Fit]) -> list[Start]:
 
 def _close(retuned: Fit, fits: list[Fit]) -> list[Fit]:
     """The fits, best first, that close much of what the best one closes."""
-    least = _CONTENDS * max((retuned.chi2 - fit.chi2 for fit in fits[:1]), default=0.0)
-    return [fit for fit in fits if retuned.chi2 - fit.chi2 > least]
+    return [fit for fit in fits if retuned.chi2 - fit.chi2 > _CONTENDS * (retuned.chi2 - fits[0].chi2)]
 
 
 def _again(fitter: Fitter, singles: list[Fit], starts: list[Start], jobs: int) -> list[Fit]:

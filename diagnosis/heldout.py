@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.by_run import Table
+from diagnosis.form import NOTHING, Form
 from diagnosis.gap import Floor, cell_squares, differences, floor_of, replicates, whitened
 from diagnosis.nuisance import Nuisances
 from diagnosis.phases import PHASE, has_own_phases
 from diagnosis.problem import Problem
 from diagnosis.random_friction import RANDOM, is_random
-from diagnosis.refit import NOTHING, Fit, Form
+from diagnosis.refit import Fit
 from diagnosis.twin import Effects, Roughness
 
 Floats = npt.NDArray[np.floating[Any]]

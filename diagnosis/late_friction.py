@@ -2,7 +2,7 @@
 
 Under vibration the friction takes the speed that the base had a dead time ago. chi2 over the dead time is a comb then, with a
 tooth every half period, and a refit stays where it began. Runs without vibration have no comb: friction late by 5.53 ms came to
-chi2 958 from all runs at once, to 5.38 ms from the runs without, and to 160 from the best tooth beside that.
+chi2 958 from all runs at once, to 5.38 ms from the runs without, and to 181 from the best tooth beside that.
 """
 
 import math

@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from diagnosis.axis_waves import axis_waves
 from diagnosis.by_run import of_run
+from diagnosis.form import Axis, Form
 from diagnosis.manifest import RigTable
 from diagnosis.phases import OTHER_PHASE, PHASE
 from diagnosis.problem import AGE_BEFORE, AGEING, Prepared, Problem
 from diagnosis.reduced import BLOCK_S
-from diagnosis.refit import Axis, Form
 from diagnosis.ringing import ringing_Hz
 from diagnosis.twin import AGE_BEFORE_S, AGE_SPREAD
 from diagnosis.waves import (

@@ -16,10 +16,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from diagnosis.axis_features import friction_share
 from diagnosis.commands import Commands
+from diagnosis.form import Axis, Form
 from diagnosis.gap import whitened
 from diagnosis.problem import Problem
 from diagnosis.reduced import BLOCK_S
-from diagnosis.refit import Axis, Fit, Fitter, Form
+from diagnosis.refit import Fit, Fitter
 from diagnosis.waves import friction_series
 
 Floats = npt.NDArray[np.floating[Any]]

@@ -4,20 +4,18 @@ Gauss-Newton in whitened, compressed differences. The nuisances' columns are com
 own columns at every step, since effects are as nonlinear as a gap that opens or a wave that passes.
 """
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.form import LEVELS, NOTHING, Form
 from diagnosis.gap import KNEE, Floor, differences, whitened
 from diagnosis.nuisance import Nuisances
-from diagnosis.phases import is_phase
 from diagnosis.problem import Problem
 from diagnosis.together import At, Question, Work, together
 from diagnosis.twin import Effects
-from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 _NARROW = 0.1  # prior of a coordinate that is known so well that a common step would leave its line
@@ -27,59 +25,7 @@ _MOST_TOLERANCES = 3.3
 _MOST_OF_CHAIN = 5.0
 _WORTH_A_STEP = 0.5  # of chi2
 _SHARES = (1.0, 0.3, 0.1)  # of a step; a static friction stayed at chi2 235 without the last, and went to 158 with it
-# Effects that change a number of the rig table alone: it and the effect are one direction. With a derivative of its own for each,
-# the number stayed at its bound and the effect at 3 of 10 %: chi2 196, where 133 was to be had, and another effect was named.
-LEVELS = {
-    "coulomb-level": "coulomb_force_N",
-    "static-level": "static_force_N",
-    "stribeck-velocity": "stribeck_velocity_mps",
-    "drive-stiffness": "drive_stiffness_N_per_m",
-}
 _MORE_REFITS, _GAINED = 5, 0.97  # refits of a fit, while each leaves this share of chi2 or less
-
-
-class Axis(NamedTuple):
-    """One parameter of an effect as a coordinate: value = scale * w, or scale * exp(w) where it must stay positive."""
-
-    effect: str
-    name: str
-    scale: float
-    logarithmic: bool
-    prior: float  # standard deviation of w
-    low: float
-    high: float
-
-    def value(self, w: float) -> float:
-        """The parameter's value, within its bounds."""
-        raw = self.scale * math.exp(min(max(w, -30.0), 30.0)) if self.logarithmic else self.scale * w
-        if is_phase(self.name):
-            return math.remainder(raw, 2.0 * math.pi)
-        return min(max(raw, self.low), self.high)
-
-
-class Form(NamedTuple):
-    """Effects in given formulas with their free parameters; the others are held."""
-
-    forms: dict[str, str]  # effect -> form
-    axes: tuple[Axis, ...]
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names."""
-        return tuple(self.forms)
-
-    def tables(self, w: Floats) -> Effects:
-        """As a rig file would have them."""
-        tables: Effects = {name: {"form": form} for name, form in self.forms.items()}
-        for axis, coordinate in zip(self.axes, w.tolist(), strict=True):
-            tables[axis.effect][axis.name] = axis.value(coordinate)
-        for name, form in self.forms.items():
-            for parameter in EFFECTS[name].forms[form].parameters:
-                tables[name].setdefault(parameter.name, parameter.default)
-        return tables
-
-
-NOTHING = Form({}, ())
 
 
 class Stage(NamedTuple):

@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from bridge.faults import Fault
 from diagnosis.evidence import Evidence
+from diagnosis.form import NOTHING
 from diagnosis.gap import between, compress, differences, floor_of, gap, replicates
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
-from diagnosis.refit import NOTHING, Fit, Fitter
+from diagnosis.refit import Fit, Fitter
 from diagnosis.search import Directions
 from diagnosis.together import together
 from diagnosis.twin import Roughness

@@ -14,9 +14,10 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.form import LEVELS, NOTHING, Form
 from diagnosis.gap import KNEE
 from diagnosis.library import Trial
-from diagnosis.refit import LEVELS, NOTHING, Fit, Fitter, Form, step_within
+from diagnosis.refit import Fit, Fitter, step_within
 from diagnosis.together import Work, together
 from diagnosis.verdict import much_left
 from diagnosis.workers import each

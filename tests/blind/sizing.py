@@ -18,10 +18,11 @@ import numpy.typing as npt
 
 from diagnosis.evidence import load_evidence
 from diagnosis.features import POWERS
+from diagnosis.form import NOTHING
 from diagnosis.gap import Floor, cell_names, cell_squares, floor_of, replicates
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Point, Prepared, Problem, prepare
-from diagnosis.refit import NOTHING, Fit, Fitter
+from diagnosis.refit import Fit, Fitter
 from diagnosis.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
 from diagnosis.verdict import JITTER
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.form import Axis, Form
 from diagnosis.gap import Floor
 from diagnosis.heldout import HeldOut, foretells
-from diagnosis.refit import Axis, Form
 
 
 def form(name: str, form: str, *parameters: str) -> Form:

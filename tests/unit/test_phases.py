@@ -7,12 +7,13 @@ import pytest
 
 from diagnosis.by_run import as_in_rig_file
 from diagnosis.diagnose import estimate_of
+from diagnosis.form import Axis
 from diagnosis.gap import floor_of, replicates
 from diagnosis.library import trials, wave_trial
 from diagnosis.nuisance import Nuisances
 from diagnosis.phases import has_own_phases, in_run, is_phase, phase_of
 from diagnosis.problem import Problem
-from diagnosis.refit import Axis, Fitter
+from diagnosis.refit import Fitter
 from diagnosis.result import Estimate
 from diagnosis.twin import Roughness
 from diagnosis.waves import Wave

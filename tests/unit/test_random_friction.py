@@ -5,11 +5,11 @@ import copy
 import numpy as np
 import pytest
 
+from diagnosis.form import NOTHING
 from diagnosis.gap import replicates
 from diagnosis.heldout import HeldOut
 from diagnosis.problem import Problem
 from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction
-from diagnosis.refit import NOTHING
 from diagnosis.retuning import retuned_rig
 from diagnosis.verdict import JITTER
 from tests.prepared import prepared

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from diagnosis.form import NOTHING
 from diagnosis.gap import floor_of, replicates
 from diagnosis.library import trials
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
-from diagnosis.refit import NOTHING, Fitter, step_within
+from diagnosis.refit import Fitter, step_within
 from diagnosis.together import together
 from diagnosis.twin import Roughness
 from tests.prepared import fitter_of, prepared

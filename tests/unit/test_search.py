@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from diagnosis.form import NOTHING
 from diagnosis.gap import KNEE
 from diagnosis.library import trials
-from diagnosis.refit import FAR_KNEE, NOTHING, Fit
+from diagnosis.refit import FAR_KNEE, Fit
 from diagnosis.search import Directions, Origin, pairs_with, refitted, screened
 from tests.prepared import fitter_of, prepared
 

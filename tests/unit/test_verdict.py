@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnose import compared_fits
+from diagnosis.form import NOTHING, Axis, Form
 from diagnosis.random_friction import Scattered
-from diagnosis.refit import NOTHING, Axis, Fit, Form
+from diagnosis.refit import Fit
 from diagnosis.verdict import JITTER, although_outside, judge
 
 FEATURES = 100

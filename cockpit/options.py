@@ -1,0 +1,37 @@
+"""Options that several commands have, as typer wants them."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ScenarioName = Annotated[
+    str, typer.Option("--scenario", help="Name of a scenario in deploy/scenarios, or a .toml file.")
+]
+Settings = Annotated[
+    list[str],
+    typer.Option("--set", help="Change one value: key=value, e.g. controller.limits.v_ratio=1.3. Repeatable."),
+]
+Seed = Annotated[int | None, typer.Option(help="Seed of the sensor noise; the same seed gives the same run.")]
+Endpoint = Annotated[str | None, typer.Option(help="Where the processes meet, e.g. tcp/127.0.0.1:7447.")]
+Prefix = Annotated[str | None, typer.Option(help="First part of every key on the bus.")]
+Lockstep = Annotated[
+    bool,
+    typer.Option("--lockstep", help="Not paced: each block waits for its command. Repeatable to the bit."),
+]
+ChildOf = Annotated[int, typer.Option("--child", hidden=True)]  # the process that started this one, 0: a person
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+LogFile = Annotated[Path | None, typer.Option("--log", help="Where the log goes; runs/NAME.mcap if not given.")]
+DEFAULT_SCENARIO = "paper-c45-c45"
+
+
+def as_settings(settings: list[str], seed: int | None, endpoint: str | None, prefix: str | None) -> list[str]:
+    """What the options say, as settings of a scenario."""
+    result = list(settings)
+    if seed is not None:
+        result.append(f"seed={seed}")
+    if endpoint is not None:
+        result.append(f'bus.endpoint="{endpoint}"')
+    if prefix is not None:
+        result.append(f'bus.prefix="{prefix}"')
+    return result
