@@ -16,6 +16,18 @@ class Row(NamedTuple):
     bar: str
     scores: tuple[Score | None, ...]
 
+    @property
+    def missed(self) -> bool:
+        """Whether the first method does not reach the bar, not even if only rounding would."""
+        first = self.scores[0]
+        if not self.bar or first is None:
+            return False
+        sign, _, bound = self.bar.rpartition(" ")
+        if sign:
+            return first.value < float(bound) if sign == ">=" else first.value > float(bound)
+        low, high = map(float, bound.split("-"))
+        return not low <= first.value <= high
+
 
 def headline(scores: Scores, sealed: bool) -> str:
     """The answer in one sentence."""
@@ -76,11 +88,12 @@ def table(methods: dict[str, Scores], sealed: bool) -> str:
     if tool.faults:
         lines.append(f"{tool.faults} cases ended in a fault and count as wrong")
     others = list(methods)[1:]
-    lines += ["", f"{'':32} {'bar':>9}  {TOOL:26}" + "".join(f" {name:>12}" for name in others)]
+    lines += ["", f"{'':32} {'bar':>9}  {TOOL:33}" + "".join(f" {name:>12}" for name in others)]
     for row in rows(methods):
         if any(one is not None for one in row.scores):
             cells = "".join(f" {_value(one):>12}" for one in row.scores[1:])
-            lines.append(f"{row.name:32} {row.bar:>9}  {with_interval(row.scores[0]):26}{cells}".rstrip())
+            said = with_interval(row.scores[0]) + (" missed" if row.missed else "")
+            lines.append(f"{row.name:32} {row.bar:>9}  {said:33}{cells}".rstrip())
     for title, part in (
         ("by detectability, in limits", tool.by_detectability),
         ("by friction law, 2 limits or more", tool.by_backbone),

@@ -8,11 +8,11 @@ import pytest
 from bridge.config import validate
 from diagnosis.blind import baselines
 from diagnosis.blind.calibration import calibration_error, error_of_perfect, log_score, reliability
-from diagnosis.blind.intervals import bootstrapped, mean, rate, ratio
+from diagnosis.blind.intervals import Score, bootstrapped, mean, rate, ratio
 from diagnosis.blind.locating import f1
 from diagnosis.blind.outcomes import Opened, opened
 from diagnosis.blind.scoring import as_json, score
-from diagnosis.blind.table import table
+from diagnosis.blind.table import Row, table
 from diagnosis.making import paper_rig
 from plant.config import RigConfig
 from plant.effects import EFFECTS
@@ -103,7 +103,22 @@ def test_scores_by_hand():
     text = table({"diagnosis": scores, "BIC": score([baselines.lowest_bic(one) for one in cases], {})}, sealed=True)
     assert text.startswith("11 cases (sealed set, opened once): right effect first in 25 %")
     assert "coulomb-level -> drive-backlash" in text
+    marked = [line.split("  ")[0] for line in text.splitlines() if "missed" in line]
+    assert "top-1, 2 limits or more" in marked
+    assert "mean group size, same" not in marked
     assert as_json({"diagnosis": scores})["diagnosis"]["visible"]["top_1"]["n"] == 4
+
+
+@pytest.mark.parametrize(
+    ("bar", "reached", "missed"),
+    [(">= 0.85", 0.85, 0.8499), ("<= 0.05", 0.05, 0.0501), ("0.85-0.95", 0.9, 0.951), ("0.85-0.95", 0.85, 0.84)],
+)
+def test_a_bar_is_not_reached_by_rounding(bar: str, reached: float, missed: float):
+    def row(value: float) -> Row:
+        return Row("of anything", bar, (Score(value, value, value, 20), None))
+
+    assert not row(reached).missed
+    assert row(missed).missed
 
 
 def test_probabilities_are_judged():
