@@ -42,6 +42,9 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 f"It scatters as {nearest.effect} at random would (probability {percent(nearest.probability)}), and as bursts "
                 "of debris or a tilted track would: no path can be told from these runs."
             )
+    still = [finding.where.partition(":")[0] for finding in diagnosis.findings if finding.kind == "still"]
+    if still:
+        sentences.append(f"In {', '.join(still)} the drive stands still: friction and drive are not tested there.")
     vibrating = [finding for finding in diagnosis.findings if finding.kind == PICK_UP]
     if vibrating:
         others = ", ".join(finding.where.partition(":")[0] for finding in vibrating[1:])

@@ -195,6 +195,12 @@ def test_runs_of_two_folders_keep_their_names_apart():
     assert [cell["run"] for cell in to_json(made._replace(where=tuple(cells)))["where"]] == ["a/1", "b/1"]
 
 
+def test_runs_in_which_nothing_moves_are_in_the_summary():
+    findings = tuple(Finding("still", f"run-0{i}.csv: drive_position_m", "0 m in all") for i in (1, 3))
+    told = " ".join(summary(made_up.diagnosis()._replace(verdict="no-gap", effects=(), findings=findings)))
+    assert "In run-01.csv, run-03.csv the drive stands still: friction and drive are not tested there." in told
+
+
 def test_a_force_that_vibrates_is_in_the_summary_with_its_runs():
     findings = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
     told = " ".join(summary(made_up.diagnosis()._replace(findings=findings)))
