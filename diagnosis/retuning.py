@@ -68,7 +68,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     starts = [fit.deviations, 0.5 * fit.deviations]
     shares = each(jobs, _retuned, Fitter(problem, floor, nuisances), [starts[i::jobs] for i in range(jobs)])
     fitter, fit = min(chain.from_iterable(shares), key=lambda one: one[1].chi2)
-    expected = _expected_chi2(fitter, fit, roughness, jobs)
+    expected = expected_chi2(fitter, fit, roughness, jobs)
     left = differences(floor, problem, fitter.predicted(fit.deviations, {}))
     progress(f"refitted inside its tolerances, {gap(floor, left):.1f} noise floors are left", 0.25)
     return Retuned(fitter, fit, roughness, expected)
@@ -81,15 +81,15 @@ def _retuned(fitter: Fitter, starts: list[Floats]) -> list[tuple[Fitter, Fit]]:
     return list(zip(fitters, together(fitter.predicted_many, works), strict=True))
 
 
-def _expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness, jobs: int) -> float:
-    """chi2 of a perfect model: of new replicates of the refitted one, each refitted along the nuisances' derivatives.
+def expected_chi2(fitter: Fitter, fit: Fit, roughness: Roughness, jobs: int) -> float:
+    """chi2 of a perfect model: of new replicates of the fitted one, each refitted along its derivatives.
 
     Evidence without a gap has 0.6 to 1.7 times that. What it is depends on the evidence: 102 to 185 of 600 features.
     """
-    point = fitter.nuisances.point(fit.deviations, {})
+    point = fitter.nuisances.point(fit.deviations, fit.effects)
     surface = roughness._replace(ratio=roughness.ratio / _MARGIN)
     drawn = replicates(fitter.problem, point, surface, _NEW_REPLICATES, 3, jobs)
-    z = between(fitter.floor, fitter.predicted(fit.deviations, {}), drawn)
+    z = between(fitter.floor, fitter.predicted(fit.deviations, fit.effects), drawn)
     z = np.where(np.isfinite(z), z, 0.0)  # what a rig does not show is not compared
     directions = Directions(fit, fitter.most)
     left = [directions.freed(fitter.floor.whitening @ compress(row)) for row in z]

@@ -226,6 +226,12 @@ def judge(
     return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
 
 
+def refittable(verdict: Verdict) -> bool:
+    """Whether a single effect was named that a prediction can follow."""
+    named = verdict.named
+    return named is not None and len(named.form.effects) == 1 and not is_random(named.form)
+
+
 def although_outside(verdict: Verdict) -> Verdict:
     """The verdict where something shows that no fit looks at, and that no effect of the library makes: never "no gap"."""
     if verdict.kind != "no-gap":

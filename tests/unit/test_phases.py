@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from diagnosis.assembling import estimate_of
 from diagnosis.by_run import as_in_rig_file
-from diagnosis.diagnose import estimate_of
 from diagnosis.form import Axis
 from diagnosis.gap import floor_of, replicates
 from diagnosis.library import trials, wave_trial

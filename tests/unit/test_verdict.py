@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import compared_fits
+from diagnosis.assembling import compared_fits
 from diagnosis.form import NOTHING, Axis, Form
 from diagnosis.random_friction import Scattered
 from diagnosis.refit import Fit
