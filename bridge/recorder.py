@@ -38,7 +38,7 @@ def run(
         the closed log, with its counts. Raises Fault NO_PEER, PEER_DIED, LOG_WRITE.
 
     """
-    with Bus(bus_config, "recorder", lockstep) as bus:
+    with Bus(bus_config, "recorder", lockstep, stop) as bus:
         inbox = Inbox(_INBOX_LIMIT, patient=lockstep)
         for topic in TOPICS:
             if topic.logged and topic.sender != "recorder":

@@ -23,6 +23,7 @@ from bridge.messages import parsed
 from bridge.topics import Topic
 
 _CONNECT_S = 30.0  # a first start of the plant compiles before it listens: longer than 10 s on a busy machine
+_DIAL_S = 2.0  # of it at once: Zenoh hears no stop while it dials
 
 
 class BusConfig(Strict):
@@ -93,7 +94,7 @@ def session_config(config: BusConfig, hub: bool) -> zenoh.Config:
         "mode": "peer" if hub else "client",
         "listen/endpoints": [config.endpoint] if hub else [],
         "connect/endpoints": [] if hub else [config.endpoint],
-        "connect/timeout_ms": 0 if hub else round(_CONNECT_S * 1e3),
+        "connect/timeout_ms": 0 if hub else round(_DIAL_S * 1e3),
         "connect/exit_on_failure": not hub,
         "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
         "scouting/multicast/enabled": False,
@@ -112,26 +113,39 @@ def session_config(config: BusConfig, hub: bool) -> zenoh.Config:
     return result
 
 
+def _listening(config: BusConfig) -> zenoh.Session:
+    try:
+        return zenoh.open(session_config(config, hub=True))
+    except zenoh.ZError as error:
+        line = f"{config.endpoint}: cannot listen there, another process holds it ({_brief(error)})"
+        raise Fault("ENDPOINT_BUSY", f"{line}; end it or choose another --endpoint") from None
+
+
+def _dialled(config: BusConfig, stop: threading.Event) -> zenoh.Session:
+    until_s = time.monotonic() + _CONNECT_S
+    while not stop.is_set():
+        try:
+            return zenoh.open(session_config(config, hub=False))
+        except zenoh.ZError:
+            if time.monotonic() > until_s:
+                line = f"{config.endpoint}: no plant answers there after {_CONNECT_S:g} s"
+                raise Fault("NO_PEER", f"{line}; start `stickslip plant` with this --endpoint") from None
+    raise Fault("NO_PEER", f"{config.endpoint}: no plant answered there before the stop")
+
+
 class Bus:
     """The session of one role. Use as a context manager: an unclosed session hangs the process at its end."""
 
-    def __init__(self, config: BusConfig, role: str, lockstep: bool) -> None:
+    def __init__(self, config: BusConfig, role: str, lockstep: bool, stop: threading.Event | None = None) -> None:
+        """Listen as the plant, or dial it until `stop` is set. Raises Fault ENDPOINT_BUSY, NO_PEER."""
         self._config = config
         self._role = role
         self._lockstep = lockstep
         self._keep: list[Any] = []
         self._alive: set[str] = set()
         self._alive_changed = threading.Condition()
-        hub = role == "plant"
         zenoh.init_log_from_env_or("off")
-        try:
-            self._session = zenoh.open(session_config(config, hub))
-        except zenoh.ZError as error:
-            if hub:
-                line = f"{config.endpoint}: cannot listen there, another process holds it ({_brief(error)})"
-                raise Fault("ENDPOINT_BUSY", f"{line}; end it or choose another --endpoint") from None
-            line = f"{config.endpoint}: no plant answers there after {_CONNECT_S:g} s"
-            raise Fault("NO_PEER", f"{line}; start `stickslip plant` with this --endpoint") from None
+        self._session = _listening(config) if role == "plant" else _dialled(config, stop or threading.Event())
         self._keep.append(
             self._session.liveliness().declare_subscriber(
                 self._key("alive/*"), zenoh.handlers.Callback(self._on_alive, indirect=False), history=True

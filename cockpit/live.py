@@ -37,7 +37,7 @@ def follower(config: BusConfig, duration_s: float) -> Callable[[threading.Event]
             return
         while not over.is_set():
             try:
-                with Bus(config, "cockpit", lockstep=False) as bus:
+                with Bus(config, "cockpit", lockstep=False, stop=over) as bus:
                     _show(bus, duration_s, over)
             except Fault:
                 time.sleep(_LOOK_S)

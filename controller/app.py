@@ -32,7 +32,7 @@ def run(
     """
     node = ControllerNode(config)
     node.warm_up()
-    with Bus(bus_config, "controller", lockstep) as bus:
+    with Bus(bus_config, "controller", lockstep, stop) as bus:
         bus.serve_header(header)
         process = _Process(config, node, bus, lockstep)
         process.prepare()

@@ -2,8 +2,13 @@
 
 import subprocess
 import sys
+import threading
+import time
 
-from bridge.faults import FAULTS
+import pytest
+
+from bridge.faults import FAULTS, Fault
+from bridge.zenoh_link import Bus, BusConfig
 from tests.system.ports import free_endpoint
 
 
@@ -13,3 +18,12 @@ def test_missing_plant() -> None:
     assert result.returncode == FAULTS["NO_PEER"].exit_status
     assert "no plant answers" in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_a_stop_is_heard_while_nobody_answers() -> None:
+    stop = threading.Event()
+    threading.Timer(0.5, stop.set).start()
+    began_s = time.monotonic()
+    with pytest.raises(Fault, match="no plant answered there before the stop"):
+        Bus(BusConfig(endpoint=free_endpoint()), "controller", lockstep=True, stop=stop)
+    assert time.monotonic() - began_s < 15.0  # half of what it waits for a plant
