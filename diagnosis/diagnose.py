@@ -62,10 +62,10 @@ _STRONGEST_WAVE = 0.05
 # Times the expected chi2: right effects whose formula is another leave up to 2.5 (but one, seen by the force alone, 28), a gain
 # of the force sensor that stood for a Coulomb friction never tried left 5.5. What is searched then takes as long as all before.
 _DOUBTFUL = 3.0
-# Times the first number of an effect that leaves much. Where slips come and go chi2 is rough: a force late by 1.75 ms came to 204
-# to 369 from 14 starts between 1.6 and 2.1 ms, and the lag that stood for it to 227.
+# Times the first number of an effect that comes near and leaves much. Where slips come and go chi2 is rough: a force late by
+# 1.75 ms came to 204 to 369 from 14 starts between 1.6 and 2.1 ms, and the lag that stood for it to 227.
 _SIZES_BESIDE = (0.85, 1.15)
-_LIKE_IT = 0.6  # of the gap: of 11 effects outside the library the best single one closed 0.08 to 0.42
+_NEAR = 0.6  # of the gap: of 11 effects outside the library the best single one closed 0.08 to 0.42
 _WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
 
 
@@ -103,7 +103,8 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         retuned = min(retuned, again, key=lambda fit: fit.chi2)
     if singles and retuned.chi2 - singles[0].chi2 > _WORTH_MORE:
         contenders = _contenders(retuned, singles, pairs, expected_chi2)
-        sizes = _SIZES_BESIDE if much_left(singles[0], expected_chi2) else ()
+        near = _is_near(singles[0], retuned, expected_chi2) and much_left(singles[0], expected_chi2)
+        sizes = _SIZES_BESIDE if near else ()
         singles = _again(fitter, singles, _starts_of_contenders(retuned, contenders, sizes), jobs)
         singles = _finished(fitter, singles, expected_chi2, jobs)
     verdict = judge(retuned, singles, pairs, expected_chi2)
@@ -186,11 +187,14 @@ def _varies(retuned: Fit, singles: list[Fit], expected_chi2: float) -> bool:
 
 
 def _nearest(retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> Fit | None:
-    """The model that leaves least, if it closes so much that the rig is like it."""
+    """The model that leaves least, if it comes near."""
     found = min((*singles[:1], *pairs[:1]), key=lambda fit: fit.chi2, default=retuned)
-    if retuned.chi2 - found.chi2 > _LIKE_IT * (retuned.chi2 - expected_chi2) > 0.0:
-        return found
-    return None
+    return found if _is_near(found, retuned, expected_chi2) else None
+
+
+def _is_near(fit: Fit, retuned: Fit, expected_chi2: float) -> bool:
+    """Whether a model closes so much that the measured rig is like it."""
+    return retuned.chi2 - fit.chi2 > _NEAR * (retuned.chi2 - expected_chi2) > 0.0
 
 
 def _random(effect: str, fitter: Fitter, retuned: Fit, singles: list[Fit]) -> RandomFriction:
