@@ -63,7 +63,7 @@ _STRONGEST_WAVE = 0.05
 # of the force sensor that stood for a Coulomb friction never tried left 5.5. What is searched then takes as long as all before.
 _DOUBTFUL = 3.0
 # Times the first number of an effect that comes near and leaves much. Where slips come and go chi2 is rough: a force late by
-# 1.75 ms came to 204 to 369 from 14 starts between 1.6 and 2.1 ms, and the lag that stood for it to 227.
+# 1.75 ms had ended at 368, beside a slow sensor at 237; from these sizes it came to 205 (`stickslip diagnose --json`).
 _SIZES_BESIDE = (0.85, 1.15)
 _NEAR = 0.6  # of the gap: of 11 effects outside the library the best single one closed 0.08 to 0.42
 _WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
