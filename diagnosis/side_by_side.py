@@ -1,4 +1,4 @@
-"""Four rigs through one run in the time of two or three (`make bench`): a refit asks for one run of many slightly different rigs.
+"""Four rigs through one run in the time of two (`make bench`): a refit asks for one run of many slightly different rigs.
 
 They get the same commands in the same steps, so that `lanes` does each step for all of them at once. What its loops cannot
 hold, a sine of the place or a power of an age, has loops of its own here, which run only where a rig has such an effect.
@@ -46,7 +46,7 @@ def advance_lanes(
 
     """
     w = np.zeros(at.ROWS * LANES)
-    ripples = settles = tails = lags = ages = varies = False
+    ripples = sags = settles = lags = ages = varies = False
     for i in range(LANES):
         p: Record = params[i]
         s: Record = state[i]
@@ -62,6 +62,7 @@ def advance_lanes(
         w[at.RELAXING + i], w[at.QUADRATIC + i] = p.relaxing_Ns_per_m, p.quadratic_Ns2_per_m2
         w[at.FORWARD + i], w[at.BACKWARD + i] = p.forward_ratio, p.backward_ratio
         w[at.KINETIC_BACKWARD + i], w[at.LATE_SHARE + i] = p.kinetic_backward_ratio, p.late_share
+        w[at.FALLING + i] = (1.0 - p.stribeck_tail) * (1.0 - p.late_share)
         w[at.DRIFT + i] = p.drift_per_s
         if p.drift_settling_s > 0.0:
             w[at.SETTLING + i], w[at.PER_SETTLING_S + i], w[at.BEFORE_S + i] = (
@@ -89,8 +90,8 @@ def advance_lanes(
         w[at.BASE + i], w[at.BASE_V + i], w[at.ARM + i] = s.base_m, s.base_mps, s.arm_N
         w[at.AGE + i], w[at.V_LAG + i] = s.age_s, s.v_lag
         ripples = ripples or p.ripple_ratio != 0.0
+        sags = sags or w[at.SAG_PER_N + i] != 0.0
         settles = settles or p.drift_settling_s > 0.0
-        tails = tails or p.stribeck_tail != 0.0
         lags = lags or p.lag_s > 0.0 or p.lag_dead_s > 0.0 or p.lag_distance_m > 0.0
         ages = ages or p.age_growth_N != 0.0
         varies = varies or _varies(p)
@@ -126,7 +127,7 @@ def advance_lanes(
             share = delivered_share(p, frequency_Hz[block]) if vibrating else 1.0
             if p.sag_settling_s > 0.0:
                 share *= 1.0 - p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * BLOCK_S) / p.sag_settling_s))
-            w[at.SHARE + i] = share
+            w[at.SHARE + i] = w[at.DELIVERED + i] = share
             w[at.DRIVE + i] = drive[block]
             if dt != dt_before:
                 at.set_steps(w, p, i, dt)
@@ -158,6 +159,10 @@ def advance_lanes(
                     w[at.SETTLED + i] = -w[at.SETTLING + i] * at.gone(
                         (w[at.BEFORE_S + i] + t_s) * w[at.PER_SETTLING_S + i]
                     )
+            if sags:
+                for i in range(LANES):
+                    sag = max(1.0 - w[at.SAG_PER_N + i] * math.fabs(w[at.FORCE + i]), 0.0)
+                    w[at.DELIVERED + i] = w[at.SHARE + i] * sag
             at.approach(w, dt, t_s, base_mps)
             if varies:
                 for i in range(LANES):
@@ -167,10 +172,6 @@ def advance_lanes(
                         w[at.LEVEL + i] = level(params[i], t_s, at_m, w[at.V_R_NOW + i], *load)
             if lags:
                 at.lag(w, params, state, dt, t_s)
-            if tails:
-                for i in range(LANES):
-                    q = w[at.V_G + i] * w[at.PER_V_S + i]
-                    w[at.TAILED + i] = w[at.TAIL + i] / (1.0 + q * q)
             if ages:
                 for i in range(LANES):
                     p = params[i]
