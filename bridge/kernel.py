@@ -1,7 +1,11 @@
 """How hot code is compiled: numba, cached on disk, without the flags that change bits."""
 
+import atexit
 import hashlib
 import os
+import shutil
+import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -30,12 +34,33 @@ def _cache_folder() -> Path:
     for package in ("bridge", "controller", "plant", "diagnosis"):
         for path in sorted((root / package).glob("*.py")):
             digest.update(path.read_bytes())
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return home / "stickslip" / digest.hexdigest()[:16]
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser(
+        "~/.cache"
+    )  # `Path.home` fails for a user without one
+    return Path(home) / "stickslip" / digest.hexdigest()[:16]
 
 
+def _usable(folder: Path) -> Path:
+    """The folder, or where nothing can be written there one for this process and those that it starts, gone at its end."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        own = tempfile.mkdtemp(prefix="stickslip-kernels-")
+        atexit.register(shutil.rmtree, own, ignore_errors=True)
+        os.environ[_CACHE] = own
+        line = (
+            f"stickslip: {folder}: {error.strerror}: compiled kernels cannot be kept, so every command compiles them anew, "
+            f"which takes up to a minute; set {_CACHE} to a folder that can be written to"
+        )
+        print(line, file=sys.stderr)
+        return Path(own)
+    return folder
+
+
+_CACHE = "NUMBA_CACHE_DIR"
 _settings: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
-_settings.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR") or str(_cache_folder())
+_settings.CACHE_DIR = str(_usable(Path(os.environ.get(_CACHE) or _cache_folder())))
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
