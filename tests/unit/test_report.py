@@ -141,6 +141,16 @@ def test_numbers_that_are_none(tmp_path):
     assert "width: nan" not in page
 
 
+def test_without_a_run_kept_aside_there_is_no_chart_but_what_to_do(tmp_path):
+    made = made_up.diagnosis()
+    alone = made.gap._replace(runs=(), nominal=NAN, retuned=NAN, with_effect=NAN, floor=NAN, compared=())
+    page = page_of(made._replace(gap=alone), tmp_path)
+    assert "Add a second run" in page
+    assert "how much of that drive-backlash closes" in page
+    assert "with the best explanation" not in page
+    assert "unknown" not in page.split("<h2>How far")[1].split("<h2>")[0]
+
+
 def test_the_map_keeps_the_order_of_a_cycle_and_counts_what_it_leaves_out():
     cells = tuple(
         Cell("drive_force_N", regime, (0.0, 20.0), run, share)
