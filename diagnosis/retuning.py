@@ -57,7 +57,7 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
         raise Fault(
             "BAD_EVIDENCE",
             f"{evidence.folder}: the rig as described shows nothing of what was measured: check the friction and the stiffness "
-            "of [rig] against the runs",
+            "of [rig] against the runs, and that the drive moves in them",
         )
     apart = gap(floor, differences(floor, problem, problem.predicted(point)))
     progress(f"as described, the rig and the model are {apart:.1f} noise floors apart", 0.1)
