@@ -155,6 +155,20 @@ def _turns(force_N: Floats, drop_N: float, at: Indices) -> int:
     return turns
 
 
+@kernel
+def half_fallen(falling: Floats, tops: Indices, bottoms: Indices) -> Floats:
+    """Where half of each fall is done, between two samples [falls]."""
+    found = np.empty(len(tops))
+    for fall in range(len(tops)):
+        half = 0.5 * (falling[tops[fall]] + falling[bottoms[fall]])
+        under = tops[fall]
+        while falling[under] > half:
+            under += 1
+        step = falling[under - 1] - falling[under]
+        found[fall] = under - (half - falling[under]) / step if step > 0.0 else under
+    return found
+
+
 def _fall_s(t_s: Floats, force_N: Floats) -> float:
     """Time from the last sample above 90 % of a fall to the first below 10 % of it."""
     top_N, drop_N = float(force_N[0]), float(force_N[0] - force_N.min())

@@ -7,6 +7,7 @@ have is NaN.
 """
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
 from diagnosis.commands import Commands, Segment
-from diagnosis.cycles import turning_points
+from diagnosis.cycles import half_fallen, turning_points
 from diagnosis.reduced import BLOCK_S
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -173,12 +174,7 @@ def find_slips(cut: Signals, scales: Scales) -> Slips:
     # what takes ten times as long as a slip is a change of level
     quick = (bottoms - tops) * BLOCK_S < 10.0 * scales.slip_s
     tops, bottoms = tops[quick], bottoms[quick]
-    middles = np.empty(len(tops))
-    for i, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
-        half = 0.5 * (falling[top] + falling[bottom])
-        under = top + int(np.argmax(falling[top : bottom + 1] <= half))
-        step = falling[under - 1] - falling[under]
-        middles[i] = under - (half - falling[under]) / step if step > 0.0 else under
+    middles = half_fallen(falling, tops, bottoms)
     width = scales.slip_s / BLOCK_S
     margin = np.minimum(middles + SHAPE_AT[0] * width, len(falling) - 1 - middles - SHAPE_AT[-1] * width)
     return Slips(tops, bottoms, middles, np.clip(margin / (_TAPER * len(falling)), 0.0, 1.0))
@@ -270,20 +266,22 @@ def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Sc
     names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]
     if not names:
         return
-    blocks = len(cut[names[0]])
-    inside = slips.weights > 0.0
-    at = slips.middles[inside, None] + SHAPE_AT * width
-    weights = slips.weights[inside] / max(float(slips.weights.sum()), 1e-9)
-    for name in names:
-        signal = cut[name]
-        shape = np.full(len(SHAPE_AT), np.nan)
-        ring = math.nan
-        if slips.some:
-            shape = weights @ np.interp(at.ravel(), np.arange(blocks), signal).reshape(at.shape)
-            fast = signal - uniform_filter1d(signal, 5)
-            near = (slips.middles[inside, None] + np.arange(int(3.0 * width))).astype(np.int64)
-            power = float(weights @ np.mean(fast[np.minimum(near, blocks - 1)] ** 2, axis=1))
-            ring = math.nan if shaken and name.endswith("accel_mps2") else power
+    shapes, powers = np.full((len(names), len(SHAPE_AT)), np.nan), np.full(len(names), np.nan)
+    if slips.some:
+        signals = np.array([cut[name] for name in names])
+        last = signals.shape[1] - 1
+        inside = slips.weights > 0.0
+        middles = slips.middles[inside, None]
+        weights = slips.weights[inside] / max(float(slips.weights.sum()), 1e-9)
+        at = np.clip(middles + SHAPE_AT * width, 0.0, last)
+        before = np.minimum(at.astype(np.int64), last - 1)
+        low = signals[:, before]
+        shapes = weights @ (low + (at - before) * (signals[:, before + 1] - low))
+        fast = signals - uniform_filter1d(signals, 5)
+        rings = fast[:, np.minimum((middles + np.arange(int(3.0 * width))).astype(np.int64), last)]
+        powers = np.einsum("nij,nij,i->n", rings, rings, weights) / rings.shape[2]
+    for i, name in enumerate(names):
+        shape, ring = shapes[i], math.nan if shaken and name.endswith("accel_mps2") else float(powers[i])
         if name == "drive_force_N":
             shape = shape - shape.mean()
         if name == "mass_position_m":
@@ -335,20 +333,16 @@ def _parity(found: Features, signals: Signals, commands: Commands, scales: Scale
     if both:
         columns["direction"] = np.sign(force_N)
     # one after the other, each freed of those before it: together they would pass noise on to each other
-    basis = [np.full(len(force_N), len(force_N) ** -0.5)]
-    left = force_N - force_N.mean()
-    for name, column in columns.items():
-        free = column.copy()
-        for before in basis:
-            free -= before * float(before @ free)
-        power = float(free @ free) + 1e-30
-        weight = float(free @ left) / power
-        left = left - weight * free
-        basis.append(free / power**0.5)
-        found.add(f"spring {name}", "drive_force_N", "stick", LOW, -1, weight)
+    both_ways = np.array([*columns.values(), force_N])
+    both_ways -= both_ways.mean(axis=1, keepdims=True)
+    products = both_ways @ both_ways.T
+    for i, name in enumerate(columns):
+        freed = products[i] / (products[i, i] + 1e-30)
+        found.add(f"spring {name}", "drive_force_N", "stick", LOW, -1, float(freed[-1]))
+        products -= np.outer(products[i], freed)
     if not both:
         found.add("spring direction", "drive_force_N", "stick", LOW, -1, math.nan)
-    found.add("spring rest", "drive_force_N", "stick", MIDDLE, -1, float(left.var()))
+    found.add("spring rest", "drive_force_N", "stick", MIDDLE, -1, max(float(products[-1, -1]), 0.0) / len(force_N))
 
 
 def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
@@ -365,10 +359,15 @@ def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
 
 
 def _without_line(position_m: Floats, segment: Segment) -> Floats:
-    at = np.linspace(-1.0, 1.0, segment.last - segment.first)
-    # a bow is the displacement sensor's linearity; the line its zero and the speed
-    bow = at * at - 1.0 / 3.0
     rest = position_m - position_m.mean()
-    for column in (at, bow):
-        rest = rest - column * (float(rest @ column) / float(column @ column))
+    for column, power in _line_and_bow(segment.last - segment.first):
+        rest -= column * (float(rest @ column) / power)
     return rest
+
+
+@lru_cache(maxsize=64)
+def _line_and_bow(blocks: int) -> tuple[tuple[Floats, float], ...]:
+    """A line, a sensor's zero and the speed, and a bow, its linearity: [blocks], and the square of each."""
+    line = np.linspace(-1.0, 1.0, blocks)
+    bow = line * line - 1.0 / 3.0
+    return (line, float(line @ line)), (bow, float(bow @ bow))

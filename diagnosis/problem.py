@@ -21,7 +21,7 @@ from diagnosis.lanes import LANES
 from diagnosis.manifest import RigTable
 from diagnosis.noise import Noise, noise_of
 from diagnosis.phases import in_run
-from diagnosis.reduced import BLOCK_S, SHAKEN, reduce_run, without_vibration
+from diagnosis.reduced import BLOCK_S, SHAKEN, averaged, reduce_run, without_vibration
 from diagnosis.sensing import SENSOR_EFFECTS, Chain, sensed, true_force_N
 from diagnosis.twin import AGE_BEFORE_S, AGE_SPREAD, Effects, Entry, Roughness, Start, predict, predict_many, rig_config
 from plant.config import RigConfig
@@ -87,6 +87,7 @@ class Problem:
         self.scales = scales_of(rig)
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
+        self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}
         self._measured = [self._features(run, run.signals) for run in runs]
         self.measured = np.concatenate([np.array(found.values) for found in self._measured])
 
@@ -218,7 +219,7 @@ class Problem:
     def _features(self, run: Prepared, signals: Signals) -> Features:
         if self.rig.drive == "force":
             return axis_features(signals, run.commands, self.rig)
-        return spring_features(without_vibration(signals, run.commands.frequency_Hz), run.commands, self.scales)
+        return spring_features(without_vibration(signals, self._averaged[run.file]), run.commands, self.scales)
 
 
 def _truly(reading_N: float, effects: Effects, t_s: float) -> float:
@@ -331,7 +332,7 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
         )
         raise Fault("BAD_EVIDENCE", line)
     start = _start(rig, signals, commands)
-    noisy = without_vibration(signals, commands.frequency_Hz)
+    noisy = without_vibration(signals, averaged(commands.frequency_Hz))
     if commands.motion is not None and "mass_position_m" in signals:
         led = predict(rig_config(rig, {}, {}, None), True, commands, start)
         noisy = signals | {"mass_position_m": signals["mass_position_m"] - led["mass_position_m"]}

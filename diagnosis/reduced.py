@@ -4,7 +4,7 @@ Measured and predicted runs are reduced alike, so what the reduction loses it lo
 on the paper's spring) and averages 20 samples of noise; vibration is too fast for it and is kept as an rms.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -49,17 +49,21 @@ def reduce_run(run: Run) -> dict[str, Floats]:
     return reduced
 
 
-def without_vibration(signals: dict[str, Floats], frequency_Hz: Floats) -> dict[str, Floats]:
-    """The signals with accelerations whose means keep nothing of a vibration; what they lose belongs to the shake.
+class Averaged(NamedTuple):
+    """With which others a block is averaged, so that nothing of the vibration is left: all [averaged]."""
+
+    own: npt.NDArray[np.int64]
+    before: npt.NDArray[np.int64]
+    after: npt.NDArray[np.int64]
+    cosine: Floats  # of the angle that the vibration turns by in between
+
+
+def averaged(frequency_Hz: Floats) -> Averaged:
+    """The blocks under a vibration of this frequency [blocks], 0 where there is none.
 
     A block holds 4.5 periods of 4.5 kHz: its mean keeps up to 7 % of the amplitude, of either sign, by the phase of the exciter,
     which no log tells. Every block is averaged with those so many blocks off that the vibration is turned by most of half a
     turn, with the weights that leave nothing at its frequency and a constant as it is.
-
-    Args:
-        signals: [blocks] each, measured or predicted.
-        frequency_Hz: of the vibration, [blocks]; 0 where there is none, and there nothing changes.
-
     """
     shaken = np.flatnonzero(frequency_Hz)
     values_Hz, which = np.unique(frequency_Hz[shaken], return_inverse=True)
@@ -67,7 +71,18 @@ def without_vibration(signals: dict[str, Floats], frequency_Hz: Floats) -> dict[
     cosine = turned.min(axis=1, initial=1.0)[which]
     apart = (turned.argmin(axis=1) + 1)[which]
     own, cosine, apart = (values[cosine < _LEAST_APART] for values in (shaken, cosine, apart))
-    before, after = np.maximum(own - apart, 0), np.minimum(own + apart, len(frequency_Hz) - 1)
+    return Averaged(own, np.maximum(own - apart, 0), np.minimum(own + apart, len(frequency_Hz) - 1), cosine)
+
+
+def without_vibration(signals: dict[str, Floats], blocks: Averaged) -> dict[str, Floats]:
+    """The signals with accelerations whose means keep nothing of a vibration; what they lose belongs to the shake.
+
+    Args:
+        signals: [blocks] each, measured or predicted.
+        blocks: of the vibration in their run.
+
+    """
+    own, before, after, cosine = blocks
     result = dict(signals)
     for shake, source in SHAKEN.items():
         if source in signals:

@@ -4,6 +4,7 @@ The plant's kernel has the same effects, sample by sample; here they act on the 
 sensor costs no simulation. A slip lasts tens of blocks, so the grid resolves a lag far below 1 ms.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,8 +93,17 @@ def delayed(values: Floats, delay_s: float) -> Floats:
     """Shifted by a time of any sign, linear between blocks."""
     if delay_s == 0.0:
         return values
-    at = np.arange(len(values), dtype=np.float64)
-    return np.interp(at - delay_s / BLOCK_S, at, values)
+    whole = math.floor(delay_s / BLOCK_S)
+    later, earlier = _shifted(values, whole), _shifted(values, whole + 1)
+    return later + (delay_s / BLOCK_S - whole) * (earlier - later)
+
+
+def _shifted(values: Floats, blocks: int) -> Floats:
+    """By so many blocks, either way; what comes in is like the end."""
+    inside = min(abs(blocks), len(values))
+    if blocks >= 0:
+        return np.concatenate([np.full(inside, values[0]), values[: len(values) - inside]])
+    return np.concatenate([values[inside:], np.full(inside, values[-1])])
 
 
 def low_pass(values: Floats, lag_s: float) -> Floats:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.reduced import without_vibration
+from diagnosis.reduced import averaged, without_vibration
 
 SAMPLES = 20  # a block
 BLOCKS = 400
@@ -23,7 +23,7 @@ def reduced(frequency_Hz: float, phase_rad: float) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("phase_rad", [0.0, 0.7, 1.5])
 def test_the_means_keep_nothing_of_it(frequency_Hz: float, phase_rad: float) -> None:
     blocks = reduced(frequency_Hz, phase_rad)
-    found = without_vibration(blocks, np.full(BLOCKS, frequency_Hz))
+    found = without_vibration(blocks, averaged(np.full(BLOCKS, frequency_Hz)))
     middle = slice(5, -5)  # at the ends a neighbour is missing
     slow = SLOW_mps2 * (np.arange(BLOCKS) + 0.5) * 1e-3
     assert found["base_accel_mps2"][middle] == pytest.approx(slow[middle], abs=1e-9)
@@ -40,7 +40,7 @@ def test_before_a_mean_tells_the_phase() -> None:
 def test_only_where_it_shakes() -> None:
     blocks = reduced(4500.0, 0.7)
     frequency_Hz = np.where(np.arange(BLOCKS) < 200, 0.0, 4500.0)
-    found = without_vibration(blocks, frequency_Hz)
+    found = without_vibration(blocks, averaged(frequency_Hz))
     for name, values in blocks.items():
         assert np.array_equal(found[name][:200], values[:200])
     assert np.abs(found["base_accel_mps2"][205:-5]).max() < 0.2 < np.abs(blocks["base_accel_mps2"][205:]).min()
@@ -48,5 +48,5 @@ def test_only_where_it_shakes() -> None:
 
 def test_a_whole_number_of_periods_changes_nothing() -> None:
     blocks = reduced(3000.0, 0.7)
-    found = without_vibration(blocks, np.full(BLOCKS, 3000.0))
+    found = without_vibration(blocks, averaged(np.full(BLOCKS, 3000.0)))
     assert all(np.array_equal(found[name], values) for name, values in blocks.items())
