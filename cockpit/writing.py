@@ -9,7 +9,10 @@ from bridge.faults import Fault
 
 
 def check_writable(option: str, path: Path) -> None:
-    """Raise Fault LOG_WRITE where a file, or the nearest folder above it, does not allow it."""
+    """Raise Fault LOG_WRITE where a file, or the nearest folder above it, does not allow it, CONFIG for a mistyped option."""
+    if str(path).startswith("--"):
+        line = f"{option} {path}: takes a file, and {path} is an option; give a file, or the whole path of one of that name"
+        raise Fault("CONFIG", line)
     with writing(path):
         Path(f"{path}.part").exists()  # it is written beside itself first: a name may be too long for that
         needed = [path] if path.exists() else []

@@ -125,6 +125,15 @@ def test_evidence_that_cannot_be_looked_at_is_bad_and_ends_no_other(name, why, t
     assert why in result.stdout
 
 
+def test_an_option_that_would_be_the_name_of_a_file_is_refused_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.chdir(folders(tmp_path, "rig"))
+    result = diagnose("rig", "--json", "--jobs", "1")
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert "--json --jobs: takes a file, and --jobs is an option" in result.stderr
+    assert diagnose("rig", "--json", tmp_path / "--jobs").exit_code == 0
+    assert "--jobs" in files(tmp_path)
+
+
 @pytest.mark.parametrize("option", ["--json", "--report", "--apply"])
 def test_a_name_too_long_to_be_written_is_said_before_the_work(option, tmp_path, monkeypatch):
     monkeypatch.setattr(many, "real_diagnose", made_up.endless)
