@@ -34,9 +34,8 @@ def _cache_folder() -> Path:
     for package in ("bridge", "controller", "plant", "diagnosis"):
         for path in sorted((root / package).glob("*.py")):
             digest.update(path.read_bytes())
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser(
-        "~/.cache"
-    )  # `Path.home` fails for a user without one
+    # `Path.home` fails for a user without one
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     return Path(home) / "stickslip" / digest.hexdigest()[:16]
 
 

@@ -333,9 +333,9 @@ def _parity(found: Features, signals: Signals, commands: Commands, scales: Scale
     if both:
         columns["direction"] = np.sign(force_N)
     # one after the other, each freed of those before it: together they would pass noise on to each other
-    both_ways = np.array([*columns.values(), force_N])
-    both_ways -= both_ways.mean(axis=1, keepdims=True)
-    products = both_ways @ both_ways.T
+    centred = np.array([*columns.values(), force_N])
+    centred -= centred.mean(axis=1, keepdims=True)
+    products = centred @ centred.T
     for i, name in enumerate(columns):
         freed = products[i] / (products[i, i] + 1e-30)
         found.add(f"spring {name}", "drive_force_N", "stick", LOW, -1, float(freed[-1]))

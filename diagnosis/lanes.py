@@ -106,6 +106,7 @@ def slide(w: Floats, dt: float, z_dt: float, base_mid_mps: float, base_mps2: flo
         static_N = (w[F_S + i] + w[AGED + i]) * w[LEVEL + i]
         excess_N = static_N - coulomb_N
         q = w[V_G + i] * w[PER_V_S + i]
+        # of the excess over Coulomb's: what falls with the velocity of now, and what stands by its tail and by the late one
         late, falling = w[LATE_SHARE + i], w[FALLING + i]
         standing = falling + (1.0 - late) * (w[TAIL + i] / (1.0 + q * q)) + late * w[LATE_FALL + i]
         g = (coulomb_N + excess_N * standing) + (excess_N * falling) * gone(q * q)

@@ -90,7 +90,7 @@ def _force_offset_N(effects: Effects, t_s: Floats) -> Floats:
 
 
 def delayed(values: Floats, delay_s: float) -> Floats:
-    """Shifted by a time of any sign, linear between blocks."""
+    """Shifted by a time of any sign, linear between blocks: as `np.interp`, which searches for every block."""
     if delay_s == 0.0:
         return values
     whole = math.floor(delay_s / BLOCK_S)
