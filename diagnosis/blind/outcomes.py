@@ -94,6 +94,7 @@ class Opened(NamedTuple):
             "group": sorted(self.group),
             "first": [{"effect": name, "probability": probability} for name, probability in self.ranked[:3]],
             "shrinkage": self.said["gap"].get("shrinkage"),
+            "gap_left": self.said["gap"].get("with_effect"),
         }
 
 

@@ -199,6 +199,18 @@ def test_words_fit_what_the_runs_kept_aside_say():
     assert wording.percent(-0.003) == "0 %"
 
 
+@pytest.mark.parametrize(
+    ("left", "effects", "said"),
+    [(2.2, ("drive-backlash",), False), (5.54, ("drive-backlash",), True), (5.54, (), False)],
+)
+def test_a_name_that_leaves_more_than_a_right_one_says_so(left, effects, said):
+    made = made_up.diagnosis()
+    verdict = "effect" if effects else "unexplained"
+    gap = made.gap._replace(retuned=6.51, with_effect=left)
+    told = " ".join(summary(made._replace(verdict=verdict, effects=effects, gap=gap)))
+    assert ("leaves about 1 there, not 5.5" in told) is said
+
+
 def test_runs_of_two_folders_keep_their_names_apart():
     made = made_up.diagnosis()
     cells = [cell._replace(run=run) for cell, run in zip(made.where, ("a/1.csv", "b/1.csv"), strict=False)]
