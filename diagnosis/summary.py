@@ -8,7 +8,7 @@ from diagnosis.result import Diagnosis
 from diagnosis.wording import EFFECT_WORDS, cannot_tell, estimate_in_words, percent, signal_name, times
 
 _SMALL_SHARE = 0.05
-# Noise floors on the runs kept aside: 111 right names on a sealed set left 2.2 at most, of 19 wrong ones five 2.3 to 4.8
+# Noise floors on the runs kept aside: 111 right names on a sealed set left 2.2 at most, of 19 wrong ones four 2.4 to 4.8
 _MORE_THAN_RIGHT = 2.3
 
 
