@@ -94,7 +94,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             )
         if diagnosis.effects and gap.with_effect > _MORE_THAN_RIGHT:
             sentences.append(
-                f"A right explanation leaves about 1 there, not {times(gap.with_effect)}: something else acts as well, and be it "
+                f"A right explanation leaves about 1 there, not {times(gap.with_effect)}: something else acts as well, if only "
                 "a surface rougher than ground steel, or the cause is another one."
             )
     else:
