@@ -104,7 +104,7 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         if form == "time":
             waves += waves_apart(drive_series(runs, over) or friction_series(runs, problem.scales, over), runs, _WAVES)
     if PHASE in scale:
-        return [wave_trial(name, form, wave) for wave in waves]
+        return [wave_trial(name, form, wave, 1.0 / _longest_s(runs)) for wave in waves]
     starts: list[dict[str, float]] = [{}]
     if name == "frame-compliance":
         starts = [{"frequency_Hz": f} for f in (40.0, 90.0, 200.0)]
@@ -131,6 +131,10 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
     return [_trial(name, form, scale, start, of_runs) for start in starts]
 
 
+def _longest_s(runs: list[Prepared]) -> float:
+    return max(len(run.commands.drive) for run in runs) * BLOCK_S
+
+
 def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, float], of_runs: list[Axis]) -> Trial:
     axes: list[Axis] = []
     for row in EFFECTS[name].forms[form].parameters:
@@ -144,8 +148,8 @@ def _trial(name: str, form: str, scale: dict[str, _Scale], start: dict[str, floa
     return Trial(Form({name: form}, tuple(axes)), w)
 
 
-def wave_trial(name: str, form: str, wave: Wave) -> Trial:
-    """A form of one wave, from where the wave is."""
+def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
+    """A form of one wave, from where the wave is. What turns slower than `slowest_Hz` is no wave over time."""
     axes: list[Axis] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name == PHASE:
@@ -154,9 +158,11 @@ def wave_trial(name: str, form: str, wave: Wave) -> Trial:
             axes.append(Axis(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
         elif row.name in {"second_sin", "second_cos"}:
             axes.append(Axis(name, row.name, 0.4, False, 1.0, row.low, row.high))
+        elif row.name == "frequency_Hz":
+            # in a phase of its own in every run it would be any trend: a tilted track was named a load of 0.06 Hz in runs of 10 s
+            axes.append(Axis(name, row.name, 1.0 / wave.period, True, wave.spread, max(row.low, slowest_Hz), row.high))
         else:
-            size = wave.period if row.name == "wavelength_m" else 1.0 / wave.period
-            axes.append(Axis(name, row.name, size, True, wave.spread, row.low, row.high))
+            axes.append(Axis(name, row.name, wave.period, True, wave.spread, row.low, row.high))
     start = {PHASE: wave.phase_rad, "second_sin": wave.second_sin, "second_cos": wave.second_cos} | dict(wave.phases_of)
     w = np.array([start.get(axis.name, 0.0) / axis.scale for axis in axes])
     return Trial(Form({name: form}, tuple(axes)), w)
@@ -208,7 +214,7 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
         slip_mps = max(20.0 * rig.stribeck_velocity_mps, 0.05)
         critical = static_N / slip_mps
         slip_s = 0.05
-    length_s = max(len(run.commands.drive) for run in runs) * BLOCK_S
+    length_s = _longest_s(runs)
     # wide, so that the rig's number of the same name, which holds a part of it, goes back to where it was
     level = {"ratio": _Scale(0.1, False, 3.0)}
     rested = {"rested_s": _Scale(0.3, True, 1.5)}

@@ -36,14 +36,16 @@ class _Tried(NamedTuple):
 def starts_by_run(fitter: Fitter, origin: Fit, trials: list[Trial], jobs: int = 1) -> list[Start]:
     """Starts of a load wave on the rig of `origin`, at those frequencies of the trials that promise most."""
     waves: dict[float, Wave] = {}
+    slowest_Hz = 0.0
     for trial in trials:
         if trial.form.forms == {EFFECT: FORM}:
             axes = {axis.name: axis for axis in trial.form.axes}
             frequency = axes["frequency_Hz"]
+            slowest_Hz = frequency.low
             waves[frequency.scale] = Wave(1.0 / frequency.scale, 0.0, 0.0, spread=frequency.prior)
     shares = each(jobs, _in_best_phases, fitter, [(origin, list(waves.values())[i::jobs]) for i in range(jobs)])
     best = sorted(chain.from_iterable(shares), key=lambda one: one.chi2)[:_MOST]
-    found = [wave_trial(EFFECT, FORM, one.wave) for one in best]
+    found = [wave_trial(EFFECT, FORM, one.wave, slowest_Hz) for one in best]
     return [(trial.form, origin.deviations, trial.w) for trial in found]
 
 

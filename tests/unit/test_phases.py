@@ -60,7 +60,7 @@ def test_a_refit_finds_both_phases(problem):
         problem, floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 16, 1)), nuisances
     )
     near = Wave(1.0 / 0.91, 0.05, 0.6, spread=0.06, phases_of={phase_of(problem.runs[1].file): 2.5})
-    trial = wave_trial("normal-load-fluctuation", "sine", near)
+    trial = wave_trial("normal-load-fluctuation", "sine", near, 0.1)
     fit = fitter.further(fitter.refit(trial.form, described, trial.w))
     table = fit.effects["normal-load-fluctuation"]
     assert table["ratio"] == pytest.approx(0.06, rel=0.1)

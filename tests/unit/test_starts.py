@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from diagnosis.library import wave_trial
 from diagnosis.problem import Problem
 from diagnosis.ringing import ringing_Hz
 from diagnosis.twin import predict, rig_config
@@ -76,6 +77,14 @@ def test_waves_beside_a_wave_have_their_own_phase(tmp_path):
     turns = [at_m / one.period + one.phase_rad / (2.0 * math.pi) for one in (shorter, same, longer)]
     for beside in (turns[0], turns[2]):
         assert math.remainder(beside - turns[1], 1.0) == pytest.approx(0.0, abs=0.15)
+
+
+def test_a_wave_over_time_turns_once_in_a_run():
+    """Slower, in a phase of its own in every run, it would be any trend."""
+    trial = wave_trial("normal-load-fluctuation", "sine", Wave(5.0, 0.02, 0.0), slowest_Hz=0.1)
+    (frequency,) = [axis for axis in trial.form.axes if axis.name == "frequency_Hz"]
+    assert frequency.value(0.0) == pytest.approx(0.2)
+    assert frequency.value(-2.0) == pytest.approx(0.1)
 
 
 def test_a_base_that_rings_shows_its_frequency(tmp_path):
