@@ -105,6 +105,16 @@ def test_a_second_effect_must_pay(base, single, double, named):
     assert len(verdict.named.form.effects) == named
 
 
+def test_beside_an_effect_that_has_no_other_formula_a_small_second_one_is_no_mismatch():
+    pair = [fit(80.0, "force-sensor-gain", "drive-hardening")]
+    verdict = judge(fit(7200.0), [fit(200.0, "force-sensor-gain")], pair, EXPECTED)
+    assert verdict.named is pair[0]
+    elsewhere = [fit(80.0, "coulomb-level", "drive-hardening")]
+    named = judge(fit(7200.0), [fit(200.0, "coulomb-level")], elsewhere, EXPECTED).named
+    assert named is not None
+    assert named.form.effects == ("coulomb-level",)
+
+
 def test_no_gap_leaves_room_for_what_is_too_small_to_see():
     probabilities = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED).probabilities
     assert sum(probabilities.values()) == pytest.approx(1.0)
