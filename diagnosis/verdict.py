@@ -43,7 +43,7 @@ _REFUTED = 12.0  # log evidence by which `unexplained` is ahead of what the runs
 # one was one; bursts of debris and a tilted track, of 4 to 10 detection limits, scatter alike.
 _LOAD, _RANDOM_LOAD = "normal-load-fluctuation", 2.5
 # log evidence below which a gap is no alarm: one effect of 26 in several forms always fits some noise. Of 30 evidences without a
-# gap the most was 7.5 under an older floor, of 30 under this one 0.4; with an effect of 0.9 detection limits a wrong one had 3.
+# gap the most was 7.5 under an older floor, of 60 under this one 0.8; with an effect of 0.9 detection limits a wrong one had 3.
 # Waves and bumps of the track of 2.3 and 3.7 limits have 11, and of 3.8 a load that varies narrow-band 4.
 COST_OF_EFFECT = 8.0
 # Refits end in valleys that differ by this much of chi2: slips come and go as parameters move. Priors do not.
