@@ -12,7 +12,7 @@ from diagnosis.assembling import assembled
 from diagnosis.evidence import Evidence
 from diagnosis.form import NOTHING, Form
 from diagnosis.gap import KNEE
-from diagnosis.heldout import HeldOut
+from diagnosis.heldout import MORE_THAN_RIGHT, HeldOut
 from diagnosis.late_friction import EFFECT as LAG
 from diagnosis.late_friction import late_fits
 from diagnosis.library import trials
@@ -41,6 +41,7 @@ from diagnosis.verdict import (
     NEVER_WITHOUT_GAP,
     Verdict,
     although_outside,
+    doubted,
     hidden_by_noise,
     judge,
     much_left,
@@ -167,6 +168,8 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         if verdict.named is not None and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
             gone, best = best, retuned
             verdict = judge(retuned, singles, pairs, expected_chi2, random, refuted=True)
+        elif verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
+            verdict = doubted(verdict)
     if any(run.pick_up for run in evidence.runs):
         verdict = although_outside(verdict)
     progress(f"verdict: {verdict.kind}", 0.8)

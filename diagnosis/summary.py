@@ -2,14 +2,13 @@
 
 import math
 
+from diagnosis.heldout import MORE_THAN_RIGHT
 from diagnosis.phases import has_own_phases
 from diagnosis.pick_up import PICK_UP
 from diagnosis.result import Diagnosis
 from diagnosis.wording import EFFECT_WORDS, cannot_tell, estimate_in_words, percent, signal_name, times
 
 _SMALL_SHARE = 0.05
-# Noise floors on the runs kept aside: 111 right names on a sealed set left 2.2 at most, of 19 wrong ones four 2.4 to 4.8
-_MORE_THAN_RIGHT = 2.3
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -92,7 +91,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 f"On {kept}, kept aside, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
                 f"{percent(gap.shrinkage)} of what could be closed{between}."
             )
-        if diagnosis.effects and gap.with_effect > _MORE_THAN_RIGHT:
+        if diagnosis.effects and gap.with_effect > MORE_THAN_RIGHT:
             sentences.append(
                 f"A right explanation leaves about 1 there, not {times(gap.with_effect)}: something else acts as well, if only "
                 "a surface rougher than ground steel, or the cause is another one."

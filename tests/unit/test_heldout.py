@@ -35,8 +35,7 @@ def stand_in(retuned: float, left: float, gap: float = 1.0, scattered: float = 1
         _chi2=lambda _fit: left,
         floor=SimpleNamespace(whitening=range(100)),
         retuned=gap,
-        _squares=lambda _form, _at: [np.array([scattered**2])],
-        _gap=HeldOut._gap,
+        left_by=lambda _fit: scattered,
     )
 
 

@@ -7,7 +7,7 @@ from diagnosis.assembling import compared_fits
 from diagnosis.form import NOTHING, Axis, Form
 from diagnosis.random_friction import Scattered
 from diagnosis.refit import Fit
-from diagnosis.verdict import JITTER, although_outside, judge
+from diagnosis.verdict import JITTER, although_outside, doubted, judge
 
 FEATURES = 100
 NUISANCES = 2
@@ -136,6 +136,22 @@ def test_no_verdict_is_surer_than_such_verdicts_were():
     assert left["unexplained"] == pytest.approx(0.80, abs=0.01)
     for probabilities in (named, pair.probabilities, left):
         assert sum(probabilities.values()) == pytest.approx(1.0)
+
+
+def test_a_name_that_leaves_much_of_the_runs_kept_aside_is_less_sure():
+    pairs = [fit(50.0, "coulomb-level", "drive-backlash")]
+    for verdict in (
+        judge(fit(4000.0), [fit(50.0, "coulomb-level")], [], EXPECTED),
+        judge(fit(4000.0), [fit(900.0, "coulomb-level")], pairs, EXPECTED),
+    ):
+        assert verdict.named is not None
+        names, less_sure = verdict.named.form.effects, doubted(verdict)
+        assert less_sure.named is verdict.named
+        assert tuple(sorted(list(less_sure.probabilities)[: len(names)])) == tuple(sorted(names))
+        sure, less = (sum(one.probabilities[name] for name in names) for one in (verdict, less_sure))
+        assert 0.55 * sure < less < 0.7 * sure
+        assert 0.2 < less_sure.probabilities["unexplained"] < 0.3
+        assert sum(less_sure.probabilities.values()) == pytest.approx(1.0)
 
 
 def test_no_gap_stays_the_likeliest_where_it_is_the_verdict():
