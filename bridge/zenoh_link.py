@@ -88,7 +88,7 @@ class Inbox:
             return None
 
 
-def session_config(config: BusConfig, hub: bool) -> zenoh.Config:
+def session_config(config: BusConfig, hub: bool, lockstep: bool) -> zenoh.Config:
     """The settings of every session of the project; `hub` is the one that listens."""
     settings: dict[str, Any] = {
         "mode": "peer" if hub else "client",
@@ -99,8 +99,9 @@ def session_config(config: BusConfig, hub: bool) -> zenoh.Config:
         "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
-        # a frozen process is noticed after 100 ms instead of 10 s; with four busy cores no false alarm was seen
-        "transport/link/tx/lease": 100,
+        # A frozen process is noticed after 100 ms instead of 10 s, as puts to it wait. On a machine that pauses for as long the
+        # link is closed and made anew, which loses messages: in lockstep, where nothing is late, one run in eight stalled on it.
+        "transport/link/tx/lease": 10_000 if lockstep else 100,
         "transport/link/tx/keep_alive": 4,
         # deeper than the default 2: answers later than 1 ms fell from 24 and 51 to 1 and 2 of 10000
         "transport/link/tx/queue/size/real_time": 16,
@@ -113,19 +114,19 @@ def session_config(config: BusConfig, hub: bool) -> zenoh.Config:
     return result
 
 
-def _listening(config: BusConfig) -> zenoh.Session:
+def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
     try:
-        return zenoh.open(session_config(config, hub=True))
+        return zenoh.open(session_config(config, hub=True, lockstep=lockstep))
     except zenoh.ZError as error:
         line = f"{config.endpoint}: cannot listen there, another process holds it ({_brief(error)})"
         raise Fault("ENDPOINT_BUSY", f"{line}; end it or choose another --endpoint") from None
 
 
-def _dialled(config: BusConfig, stop: threading.Event) -> zenoh.Session:
+def _dialled(config: BusConfig, lockstep: bool, stop: threading.Event) -> zenoh.Session:
     until_s = time.monotonic() + _CONNECT_S
     while not stop.is_set():
         try:
-            return zenoh.open(session_config(config, hub=False))
+            return zenoh.open(session_config(config, hub=False, lockstep=lockstep))
         except zenoh.ZError:
             if time.monotonic() > until_s:
                 line = f"{config.endpoint}: no plant answers there after {_CONNECT_S:g} s"
@@ -145,7 +146,9 @@ class Bus:
         self._alive: set[str] = set()
         self._alive_changed = threading.Condition()
         zenoh.init_log_from_env_or("off")
-        self._session = _listening(config) if role == "plant" else _dialled(config, stop or threading.Event())
+        self._session = (
+            _listening(config, lockstep) if role == "plant" else _dialled(config, lockstep, stop or threading.Event())
+        )
         self._keep.append(
             self._session.liveliness().declare_subscriber(
                 self._key("alive/*"), zenoh.handlers.Callback(self._on_alive, indirect=False), history=True

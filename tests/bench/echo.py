@@ -13,7 +13,7 @@ ANSWER = bytes(60)  # a Command
 
 def over_zenoh(endpoint: str) -> None:
     """Answer on a bare Zenoh session until the other side leaves."""
-    with zenoh.open(session_config(BusConfig(endpoint=endpoint), hub=False)) as session:
+    with zenoh.open(session_config(BusConfig(endpoint=endpoint), hub=False, lockstep=False)) as session:
         answers = session.declare_publisher("bench/pong", priority=zenoh.Priority.REAL_TIME, express=True)
         pings = session.declare_subscriber("bench/ping")
         realtime.claim(1)

@@ -29,7 +29,7 @@ def _echo(kind: str, address: str) -> "subprocess.Popen[bytes]":
 
 def _ping_zenoh(endpoint: str, result: Any) -> None:
     round_trips_ns = np.empty(PINGS)
-    with zenoh.open(session_config(BusConfig(endpoint=endpoint), hub=True)) as session:
+    with zenoh.open(session_config(BusConfig(endpoint=endpoint), hub=True, lockstep=False)) as session:
         pongs = session.declare_subscriber("bench/pong")
         ready = session.declare_subscriber("bench/ready")
         pings = session.declare_publisher("bench/ping", priority=zenoh.Priority.REAL_TIME, express=True)

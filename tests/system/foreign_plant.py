@@ -106,7 +106,7 @@ class Rig:
             ("listen/endpoints", [endpoint]),
             ("scouting/multicast/enabled", False),
             ("scouting/gossip/enabled", False),
-            ("transport/link/tx/lease", 100),
+            ("transport/link/tx/lease", 10_000),
             ("transport/link/tx/keep_alive", 4),
         ):
             config.insert_json5(key, json.dumps(value))

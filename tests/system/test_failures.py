@@ -152,6 +152,22 @@ def told_lost(data: RunData, topic: str) -> int:
     return sum(int(text.split()[1]) for text in texts if text.startswith(f"/{topic}: "))
 
 
+@pytest.mark.parametrize("victim", ["plant", "controller", "recorder"])
+def test_in_lockstep_a_pause_costs_nothing(tmp_path: Path, runs: list[Run], victim: str) -> None:
+    """A busy machine pauses processes for longer than the lease of real time, which would break the link and lose messages."""
+    run = Run(tmp_path / "run.mcap", "--lockstep", seconds=10.0)
+    runs.append(run)
+    run.wait_until_recording()
+    os.kill(run.children[victim], signal.SIGSTOP)
+    time.sleep(0.5)
+    os.kill(run.children[victim], signal.SIGCONT)
+    status, _, err = run.end()
+    assert (status, err) == (0, "")
+    data = read_run(run.log)
+    assert len(data.sensors) == len(data.command) == 10_000
+    assert told_lost(data, "sensors") == 0
+
+
 def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap", "--set", "controller.policy.enabled_from_s=0.0")
     runs.append(run)
