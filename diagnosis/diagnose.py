@@ -56,7 +56,7 @@ _SURE = COST_OF_EFFECT + 14.0
 _LEADING = 2  # fits that are refitted further: one that was not had a second effect named for what it left
 _CONTENDERS, _CONTENDS = 3, 0.3  # single effects, if they close this share of what the best one closes,
 _RIVALS = 0.9  # this one where two effects explain what none does alone
-_PAIR, _RIVAL_PAIRS = 2, 0.7  # effects; of what the best pair takes beyond the best single effect
+_RIVAL_PAIRS = 0.7  # of what the best pair takes beyond the best single effect
 # Of what is above the expected: a path that varies at random has a strongest wave. Two that were drawn had one of 38 and 64 %, a
 # load whose wave began anew in every run one of 7.7 %; a clock that ran fast, a coupling that slipped and a loose plug, which a
 # path that free would take for scatter, 1 to 3 %.
@@ -110,7 +110,7 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         singles = _again(fitter, singles, _starts_of_contenders(retuned, contenders, sizes), jobs)
         singles = _finished(fitter, singles, expected_chi2, jobs)
     verdict = judge(retuned, singles, pairs, expected_chi2)
-    if verdict.named is not None and len(verdict.named.form.effects) == _PAIR:
+    if verdict.named is not None and len(verdict.named.form.effects) > 1:
         starts = _starts_of_contenders(retuned, _rival_pairs(singles, pairs), ())
         pairs = _finished(fitter, _again(fitter, pairs, starts, jobs), expected_chi2, jobs)
         verdict = judge(retuned, singles, pairs, expected_chi2)

@@ -6,7 +6,7 @@ from diagnosis.refit import Fit, Fitter
 from diagnosis.verdict import JITTER, Model
 
 # Log evidence: what explains the runs, or imitates the named effect, to within this could as well have been named. A delay of the
-# force of 9 limits was 1.4 behind a slow sensor that it was 10 from imitating: neither formula was the rig's.
+# force of 9 limits was 1.4 behind a slow sensor that it could not have imitated: neither formula was quite the rig's.
 _SAME = 6.0
 _TRIED = 4  # candidates behind the named one
 

@@ -167,7 +167,7 @@ def refitted_rest(
     What a trial promises is linear: friction 0.4 ms behind the velocity was the 63rd of 86, and took chi2 from 640 to 426.
     Screening sent a roll-off of 9 kHz to 23, from where it came to 310; from 4 kHz, where it was to be tried, to 77. A wave
     begins where the data have it, or nowhere. Resonances have a valley between any two frequencies that were commanded: one of
-    3.4 kHz beside a Stribeck velocity came to 231 from 3.4 kHz, from no other start below 440.
+    3.4 kHz beside a Stribeck velocity came to 231 from there, and was not among the best five from the first start alone.
     """
     seen = best_of_each(_first(found[-1]), by_form=True)
     passed_over = best_of_each(found[-1], by_form=True)[len(seen) :]
