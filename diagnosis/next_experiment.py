@@ -64,7 +64,7 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
     there = f"{best.separation:.1f} standard deviations, most in {_in_words(best.feature)}"
     if present > _DECISIVE:
         why = (
-            f"{both} differ by {present:.1f} standard deviations in the present runs, which is enough; "
+            f"{both} differ by {present:.1f} standard deviations in the present runs already; "
             f"a run like this would confirm it, with {there}."
         )
     elif present > best.separation:

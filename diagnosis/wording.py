@@ -67,7 +67,7 @@ def answer(diagnosis: Diagnosis) -> str:
     sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
     others = [one for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for one in group]
     others = [one for one in dict.fromkeys(others) if one not in diagnosis.effects]
-    alike = f"; or {', '.join(others)}, which would look the same in these runs" if others else ""
+    alike = f"; or {', '.join(others)}, which would explain these runs nearly as well" if others else ""
     return f"{names}, probability {percent(sure)}{alike}"
 
 

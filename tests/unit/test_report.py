@@ -173,7 +173,7 @@ def test_the_map_keeps_the_order_of_a_cycle_and_counts_what_it_leaves_out():
 
 def test_an_effect_that_cannot_be_told_from_another_says_so_at_once():
     made = made_up.diagnosis()._replace(not_distinguishable=(("drive-damping", "drive-backlash"),))
-    assert "or drive-damping, which would look the same" in wording.headline(made)
+    assert "or drive-damping, which would explain these runs nearly as well" in wording.headline(made)
     assert "two and three" in wording.headline(made._replace(effects=("two", "three")))
 
 
