@@ -29,8 +29,9 @@ _NO_ALARM = 1.0  # log evidence that `unexplained` stays behind `none` up to the
 _MUCH = 1.6
 # and of what chi2 was above the expected: what a right effect's formula does not fit grows with it. Of an uneven drive one of 7
 # limits left 0.10; of 12 effects outside the library the best single one left 0.35 to 0.98, but of a seal, which the runs kept
-# aside tell. Two effects are freer.
-_MISMATCH_OF_ONE, _MISMATCH = 0.12, 0.035
+# aside tell. Two effects are freer: refitted from many starts, of 17 right pairs 14 left no more than 1.6 times the expected and
+# the others up to 0.017 beyond; an amplifier that gives less above a knee, taken for gain and hardening, 0.026.
+_MISMATCH_OF_ONE, _MISMATCH = 0.12, 0.012
 # Proportions and a constant have no other formula: two right gains of 6 and 13 limits and a stiffness of 10 left 0.01 at most, an
 # amplifier that gives less above a knee, taken for a gain, 0.09.
 _EXACT = frozenset({"force-sensor-gain", "force-sensor-bias", "drive-stiffness"})
