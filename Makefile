@@ -3,7 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-BLIND := $(or $(OUT),runs/blind)
+CASES ?= 200
+SEED ?= 1
+GENERATOR ?= independent
+BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
 .PHONY: demo test check bench blind real bless lock proto clean
 
@@ -24,8 +27,8 @@ bench: $(VENV)/.ready-bench
 	@$(BIN)/python -m tests.bench
 
 blind: $(READY) ## hours; what has a result is not done again: make blind CASES=20 SEED=1 OUT=runs/blind GENERATOR=plant
-	@test -e $(BLIND) || $(BIN)/stickslip blind make --cases $(or $(CASES),200) --seed $(or $(SEED),1) --out $(BLIND) \
-		--key $(BLIND).key.json --generator $(or $(GENERATOR),independent)
+	@test -e $(BLIND) || $(BIN)/stickslip blind make --cases $(CASES) --seed $(SEED) --out $(BLIND) \
+		--key $(BLIND).key.json --generator $(GENERATOR)
 	@$(BIN)/stickslip blind run $(BLIND)
 	@$(BIN)/stickslip blind score $(BLIND) --key $(BLIND).key.json --baselines --json $(BLIND).json --report $(BLIND).html
 

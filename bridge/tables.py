@@ -18,6 +18,9 @@ from scipy.io.matlab import MatReadError
 from bridge.faults import Fault
 from bridge.reading import check_file
 
+# Arrow takes Ctrl-C and SIGTERM for itself while it reads a CSV file, and loses what comes when it is nearly done.
+pa.enable_signal_handlers(False)
+
 Floats = npt.NDArray[np.float64]
 SUFFIXES = (".csv", ".parquet", ".mat", ".tdms")
 

@@ -12,16 +12,12 @@ PARAMETERS, FLEXIBLE = "parameters alone", "flexible residual"
 
 def parameters_only(case: Opened) -> Opened:
     """Tuning, as most do it: what is left of the gap is there, and nobody says what it is."""
-    retuned = case.said["gap"].get("retuned")
-    gap = retuned is not None and retuned > _NO_GAP
-    return _saying(case, {"unexplained" if gap else "none": 1.0}, _closed(case, PARAMETERS))
+    return _gap_or_none(case, PARAMETERS)
 
 
 def flexible_residual(case: Opened) -> Opened:
     """A blend of everything, which closes what it can and names nothing."""
-    retuned = case.said["gap"].get("retuned")
-    gap = retuned is not None and retuned > _NO_GAP
-    return _saying(case, {"unexplained" if gap else "none": 1.0}, _closed(case, FLEXIBLE))
+    return _gap_or_none(case, FLEXIBLE)
 
 
 def lowest_bic(case: Opened) -> Opened:
@@ -63,6 +59,12 @@ def told(case: Opened, shrinkage: float | None) -> Opened:
 def from_probabilities(case: Opened, probabilities: dict[str, float]) -> Opened:
     """Any classifier: the most probable is what it says."""
     return _saying(case, probabilities, None)
+
+
+def _gap_or_none(case: Opened, closes: str) -> Opened:
+    retuned = case.said["gap"].get("retuned")
+    gap = retuned is not None and retuned > _NO_GAP
+    return _saying(case, {"unexplained" if gap else "none": 1.0}, _closed(case, closes))
 
 
 def _closed(case: Opened, who: str) -> Said | None:

@@ -44,7 +44,11 @@ def reliability(pairs: Sequence[tuple[float, bool]]) -> list[Bin]:
 
 def calibration_error(pairs: Sequence[tuple[float, bool]]) -> Score | None:
     """Mean over the cases of how far the rate of right ones in their bin is from the mean probability in it."""
-    return bootstrapped(pairs, _error)
+    found = bootstrapped(pairs, _error)
+    if found is None:
+        return None
+    # drawn anew the same cases are off by chance once more, so the bootstrap's quantiles are mirrored at the value
+    return found._replace(low=max(2.0 * found.value - found.high, 0.0), high=2.0 * found.value - found.low)
 
 
 def error_of_perfect(pairs: Sequence[tuple[float, bool]]) -> Score | None:

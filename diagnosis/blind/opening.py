@@ -9,7 +9,7 @@ from diagnosis.blind.oracle import oracle
 from diagnosis.blind.outcomes import Opened, opened
 from diagnosis.blind.running import missing, results
 from diagnosis.blind.scoring import Oracle, Scores, score
-from diagnosis.blind.sealing import mark_opened, opened_answers
+from diagnosis.blind.sealing import mark_opened, opened_answers, was_published
 from diagnosis.blind.table import TOOL
 from diagnosis.blind.trees import tree_probabilities
 
@@ -17,7 +17,7 @@ Progress = Callable[[str, float], None]
 
 
 def open_set(folder: Path, key: Path, partial: bool) -> tuple[list[Opened], bool]:
-    """Check every hash, open the answers and mark the set; the cases, and whether they were sealed until now.
+    """Check every hash, open the answers and mark the set; the cases, and whether nobody could know an answer until now.
 
     Raises Fault SEAL_BROKEN, and BAD_SET for missing results unless `partial`; then nothing was opened.
     """
@@ -29,7 +29,7 @@ def open_set(folder: Path, key: Path, partial: bool) -> tuple[list[Opened], bool
         raise Fault("BAD_SET", line + " makes them" + ("" if partial else ", --partial scores without them"))
     said = results(folder, list(answers))
     cases = [opened(name, answers[name], result) for name, result in said.items()]
-    return cases, mark_opened(folder)
+    return cases, mark_opened(folder) and not was_published(key)
 
 
 def scored(folder: Path, cases: list[Opened], with_baselines: bool, jobs: int, progress: Progress) -> dict[str, Scores]:
@@ -42,7 +42,8 @@ def scored(folder: Path, cases: list[Opened], with_baselines: bool, jobs: int, p
         "flexible": score([baselines.flexible_residual(case) for case in cases], best),
     }
     if with_baselines:
-        guessed = tree_probabilities(folder, [case.name for case in cases], jobs, progress)
-        found["trees"] = score([baselines.from_probabilities(case, guessed[case.name]) for case in cases], best)
+        readable = [case.name for case in cases if case.verdict != "fault"]
+        guessed = tree_probabilities(folder, readable, jobs, progress)
+        found["trees"] = score([baselines.from_probabilities(case, guessed.get(case.name, {})) for case in cases], best)
         found["oracle"] = score([baselines.told(case, best.get(case.name)) for case in cases], best)
     return found

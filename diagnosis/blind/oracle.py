@@ -1,7 +1,7 @@
 """The oracle: told which effects are there, how much of the held-out gap does the library close with them?
 
 Its formulas are the library's, not those of the case, so it closes less than everything. What was computed is kept beside the
-set, since it takes half a minute a case.
+set, since it takes half a minute a case, and computed anew by another version.
 """
 
 import json
@@ -15,6 +15,7 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import Oracle
+from diagnosis.blind.sealing import tool_version
 from diagnosis.evidence import load_evidence
 from diagnosis.gap import KNEE
 from diagnosis.heldout import HeldOut
@@ -27,26 +28,29 @@ from diagnosis.strict_json import write_json
 
 Progress = Callable[[str, float], None]
 KEPT = "oracle"
+_SCORED = ("one-effect", "two-effects")
 
 
 def oracle(folder: Path, cases: list[Opened], jobs: int, progress: Progress) -> Oracle:
-    """Shrinkage of the true effects of every case with effects of the library, by case. Raises OSError."""
+    """Shrinkage of the true effects of every case that is scored by it, by case. Raises OSError."""
     found: Oracle = {}
+    tool = tool_version()
     todo: list[Opened] = []
     for case in cases:
         # what ended in a fault would end in it here too
-        if case.answer["verdict"] != "effect" or case.verdict == "fault":
+        if case.stratum not in _SCORED or case.verdict == "fault":
             continue
         path = folder / KEPT / f"{case.name}.json"
-        if path.is_file():
-            found[case.name] = json.loads(path.read_text(encoding="utf-8"))["shrinkage"]
+        kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        if kept.get("tool") == tool:
+            found[case.name] = kept["shrinkage"]
         else:
             todo.append(case)
     tasks = (delayed(_one)(folder / case.name, case.name, sorted(case.truth)) for case in todo)
     done: Any = Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
     for number, (name, shrinkage) in enumerate(done, 1):
         found[name] = shrinkage
-        write_json(folder / KEPT / f"{name}.json", {"shrinkage": shrinkage})
+        write_json(folder / KEPT / f"{name}.json", {"shrinkage": shrinkage, "tool": tool})
         progress(f"oracle: {number} of {len(todo)}", number / len(todo))
     return found
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from bridge.faults import Fault
 from diagnosis import many
-from diagnosis.blind.sealing import RESULTS, read_set
+from diagnosis.blind.sealing import RESULTS, read_set, tool_version
 from diagnosis.many import Outcome, Source
 from diagnosis.result import to_json
 from diagnosis.strict_json import write_json
@@ -30,12 +30,19 @@ def run(folder: Path, jobs: int) -> Generator[Outcome]:
     """Diagnose what has no result yet, one core a case and `jobs` at a time; yield each when its result is written.
 
     A case that ends in a fault has that as its result. Closing the generator ends the workers; what is written stays.
-    Raises Fault BAD_SET, and OSError where a result cannot be written.
+    Raises Fault BAD_SET, also where another version made the results that are there, and OSError where one cannot be written.
     """
+    tool = tool_version()
+    for name, result in results(folder, list(read_set(folder))).items():
+        if (before := result.get("tool")) != tool:
+            line = (
+                f"{result_file(folder, name)}: was made by version {before}, this is {tool}: a score is of one version;"
+            )
+            raise Fault("BAD_SET", f"{line} go on with that one, or delete {folder / RESULTS} and begin anew")
     sources = [Source(name, folder / name) for name in missing(folder)]
     with closing(many.diagnose_many(sources, jobs, "", many.real_diagnose)) as outcomes:
         for outcome in outcomes:
-            write_json(result_file(folder, outcome.source.name), _as_json(outcome))
+            write_json(result_file(folder, outcome.source.name), _as_json(outcome) | {"tool": tool})
             yield outcome
 
 

@@ -50,11 +50,13 @@ class Scores(NamedTuple):
     by_effect: dict[str, Singles]
     by_backbone: dict[str, Singles]
     false_alarms: Score | None
-    false_alarms_wide: Score | None  # of rigs whose numbers were drawn as far off as they may be
+    false_alarms_wide: Score | None  # of rigs whose numbers were drawn further off than usual
     outside_caught: Score | None  # unexplained
     outside_caught_visible: Score | None  # of 2 detection limits or more
     outside_named: Score | None
-    sure_of_wrong_name: Score | None  # an effect that is not there has more than 0.8
+    sure_of_wrong_name: (
+        Score | None
+    )  # an effect that is not there has more than 0.8; not of real logs, which have more in them
     sure_of_wrong_answer: Score | None  # anything but the right candidate has, none and unexplained included
     named_wrong: Score | None
     pair_f1: Score | None
@@ -68,7 +70,7 @@ class Scores(NamedTuple):
     reliability: tuple[Bin, ...]
     sensor_or_physics: Score | None
     locating_f1: Score | None
-    shrinkage: Score | None
+    shrinkage: Score | None  # where something is named
     shrinkage_of_oracle: Score | None
     interval_coverage: Score | None
     seconds: Score | None
@@ -82,7 +84,8 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
     outside = [case for case in cases if case.stratum == "outside"]
     pair = [case for case in cases if case.stratum == "two-effects"]
     unclear = [case for case in cases if case.stratum == "indistinguishable"]
-    one_right = [case for case in cases if case.right_candidate is not None]
+    made = [case for case in cases if case.stratum != "real-log"]
+    one_right = [case for case in made if case.right_candidate is not None]
     visible = [case for case in single if case.detectability >= _VISIBLE]
     pairs = judged(cases)
     named_one = [case for case in single if case.named]
@@ -110,7 +113,7 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
             [case.verdict == "unexplained" for case in outside if case.detectability >= _VISIBLE]
         ),
         outside_named=rate([bool(case.named) for case in outside]),
-        sure_of_wrong_name=rate([_sure_of(case, effects_only=True) for case in one_right]),
+        sure_of_wrong_name=rate([_sure_of(case, effects_only=True) for case in made]),
         sure_of_wrong_answer=rate([_sure_of(case, effects_only=False) for case in one_right]),
         named_wrong=rate([bool(case.group) and not (case.truth & case.group) for case in one_right]),
         pair_f1=mean([case.set_f1 for case in pair]),

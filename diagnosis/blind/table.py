@@ -31,7 +31,11 @@ class Row(NamedTuple):
 
 def headline(scores: Scores, sealed: bool) -> str:
     """The answer in one sentence."""
-    kind = "sealed set, opened once" if sealed else "DEVELOPMENT DATA: results were made after the answers were opened"
+    kind = (
+        "sealed set, opened once"
+        if sealed
+        else "DEVELOPMENT DATA: the answers could be known before these results were made"
+    )
     return (
         f"{scores.cases} cases ({kind}): right effect first in {_percent(scores.visible.top_1)} of the visible single "
         f"effects, false alarms {_percent(scores.false_alarms)}, sure of a wrong name {_percent(scores.sure_of_wrong_name)}"
@@ -54,7 +58,7 @@ def rows(methods: dict[str, Scores]) -> list[Row]:
         row("top-3, any size", "", [one.singles.top_3 for one in every]),
         row("truth in the named group, same", "", [one.singles.in_group for one in every]),
         row("false alarms", "<= 0.05", [one.false_alarms for one in every]),
-        row("  numbers as far off as may be", "", [one.false_alarms_wide for one in every]),
+        row("  numbers further off than usual", "", [one.false_alarms_wide for one in every]),
         row("outside caught", ">= 0.80", [one.outside_caught for one in every]),
         row("  of 2 limits or more", "", [one.outside_caught_visible for one in every]),
         row("  outside, but an effect named", "", [one.outside_named for one in every]),
@@ -74,7 +78,7 @@ def rows(methods: dict[str, Scores]) -> list[Row]:
         row("  if every probability were true", "", [one.calibration_error_of_perfect for one in every]),
         row("sensor or physics", "", [one.sensor_or_physics for one in every]),
         row("localisation F1", "", [one.locating_f1 for one in every]),
-        row("held-out shrinkage", "", [one.shrinkage for one in every]),
+        row("held-out shrinkage, where named", "", [one.shrinkage for one in every]),
         row("  of the oracle's", ">= 0.95", [one.shrinkage_of_oracle for one in every]),
         row("  90 % intervals holding it", "0.85-0.95", [one.interval_coverage for one in every]),
         row("seconds a case", "", [one.seconds for one in every]),

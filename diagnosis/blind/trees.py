@@ -48,7 +48,7 @@ class _Bench(NamedTuple):
 
 
 def tree_probabilities(folder: Path, cases: list[str], jobs: int, progress: Progress) -> dict[str, dict[str, float]]:
-    """Probabilities of every case's candidates. Raises Fault CONFIG without scikit-learn."""
+    """Probabilities of the candidates of every case, all of which can be read. Raises Fault CONFIG without scikit-learn."""
     try:
         from sklearn.ensemble import ExtraTreesClassifier  # noqa: PLC0415  # pyright: ignore[reportMissingImports]
     except ImportError:

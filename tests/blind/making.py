@@ -23,7 +23,7 @@ from tests.blind.sizing import Bench
 from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
 
 Progress = Callable[[str, float], None]
-_ANSWERS, _ASKED = "answers", "asked.txt"  # of a set in the making
+_ASKED, _ANSWERS, _SET = "asked.txt", "answers", "set"  # of a set in the making
 _TRIES = 3  # strengths that are looked at
 _NEAR_ENOUGH = 1.4  # times the target, or its inverse
 _WEAKEST = 0.01
@@ -40,7 +40,7 @@ class Sized(NamedTuple):
 
 
 def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, progress: Progress) -> None:
-    """Make a set and its key, both or neither; what was made before an interruption is not made again.
+    """Make a set and its key, both or neither; what was made before an interruption is not made again, nor named anew.
 
     Beside the key the sizes are left, for `tests/blind/sizes`. Raises Fault CONFIG and OSError.
     """
@@ -52,65 +52,73 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
             raise Fault("CONFIG", f"{option} {path}: is there already and is never overwritten; choose another")
     source = generator(name)
     part = out.parent / f".{out.name}-in-the-making"
-    answers = _taken_up(part, f"--generator {name} --cases {cases} --seed {seed} with version {tool_version()}")
+    known = known_sizes(name, seed)
+    sealed = _taken_up(
+        part, f"--generator {name} --cases {cases} --seed {seed} with version {tool_version('tests/blind')}"
+    )
+    drawn = draw(source, cases, seed)
+    todo = [
+        case for case in drawn if case.seed not in {secret.answer["counterfactual_seed"] for secret in sealed.values()}
+    ]
+    secrets.SystemRandom().shuffle(
+        todo
+    )  # drawn they lie by kind, and which was made first can be seen in some file systems
     try:
-        todo = {number: case for number, case in enumerate(draw(source, cases, seed)) if number not in answers}
-        for number, answer in made(source, todo, part, jobs, known_sizes(name, seed)):
-            write_json(part / _ANSWERS / f"{number}.json", answer)
-            answers[number] = answer
-            progress(f"{len(answers)} of {cases} cases made", len(answers) / cases)
+        for case, answer in made(source, {secrets.token_hex(6): case for case in todo}, part / _SET, jobs, known):
+            sealed[case] = Secret(secrets.token_hex(16), answer)
+            write_json(part / _ANSWERS / f"{case}.json", sealed[case]._asdict())
+            progress(f"{len(sealed)} of {cases} cases made", len(sealed) / cases)
     except BaseException:
-        if not answers:
+        if not sealed:
             shutil.rmtree(part)
         raise
-    sealed = {secrets.token_hex(6): Secret(secrets.token_hex(16), answer) for answer in answers.values()}
-    for number, case in zip(answers, sealed, strict=True):
-        (part / str(number)).rename(part / case)
-    shutil.rmtree(part / _ANSWERS)
-    write_set(part, sealed)
-    write_key(key, sealed)
-    _make_alike(part)
+    write_set(part / _SET, sealed)
+    _make_alike(part / _SET)
+    write_sizes(key.with_suffix(".sizes.toml"), [secret.answer for secret in sealed.values()])
+    write_key(key, sealed, published=bool(known))
     try:
-        part.rename(out)
-    except OSError:
+        (part / _SET).rename(out)
+    except BaseException:
         key.unlink(missing_ok=True)
         raise
-    write_sizes(key.with_suffix(".sizes.toml"), answers.values())
+    shutil.rmtree(part)
 
 
-def _taken_up(part: Path, asked: str) -> dict[int, Answer]:
-    """The answers of the cases that are there already, by number. Raises Fault CONFIG where they are of another set."""
-    note = part / _ANSWERS / _ASKED
+def _taken_up(part: Path, asked: str) -> dict[str, Secret]:
+    """The cases that are there already, by name. Raises Fault CONFIG where they are of another set."""
+    note = part / _ASKED
     if not part.exists():
-        note.parent.mkdir(parents=True)
+        (part / _ANSWERS).mkdir(parents=True)
+        (part / _SET).mkdir()
         note.write_text(asked, encoding="utf-8")
         return {}
     before = note.read_text(encoding="utf-8") if note.is_file() else "something else"
     if before != asked:
         line = f"{part}: holds the beginnings of {before}, not of {asked}; finish that, or delete the folder"
         raise Fault("CONFIG", line)
-    answers = {int(path.stem): json.loads(path.read_text(encoding="utf-8")) for path in note.parent.glob("*.json")}
-    for path in part.iterdir():
-        if path.name not in {_ANSWERS, *map(str, answers)}:  # ended half-way
+    kept = {
+        path.stem: Secret(**json.loads(path.read_text(encoding="utf-8"))) for path in (part / _ANSWERS).glob("*.json")
+    }
+    for path in (part / _SET).iterdir():
+        if path.is_dir() and path.name not in kept:  # ended half-way
             shutil.rmtree(path)
-    return answers
+    return kept
 
 
 def made(
-    source: Generator, drawn: dict[int, Drawn], folder: Path, jobs: int, known: Mapping[int, Sizes]
-) -> Iterator[tuple[int, Answer]]:
-    """Make every case in a folder named by its number; number and answer of each as they come."""
+    source: Generator, drawn: Mapping[str, Drawn], folder: Path, jobs: int, known: Mapping[int, Sizes]
+) -> Iterator[tuple[str, Answer]]:
+    """Make every case in a folder of its name; name and answer of each as they come."""
     tasks = (
-        joblib.delayed(_one)(source, case, folder / str(number), known.get(case.seed, {}))
-        for number, case in drawn.items()
+        joblib.delayed(_one)(source, case, folder / name, known.get(case.seed, {})) for name, case in drawn.items()
     )
     found: Any = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
     yield from found
 
 
-def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[int, Answer]:
+def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[str, Answer]:
     if case.stratum == REAL:
-        return int(folder.name), _real(case, folder)
+        return folder.name, _real(case, folder)
     plan = Plan((), case.tolerances, case.leave_out, backbone=case.backbone)
     sizes: list[Sized] = []
     cells: list[list[Any]] = []
@@ -129,7 +137,7 @@ def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[in
         }
         for one, target in zip(sizes, case.targets, strict=True)
     ]
-    return int(folder.name), _answer(case, effects, cells)
+    return folder.name, _answer(case, effects, cells)
 
 
 def sized(

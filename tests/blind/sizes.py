@@ -1,7 +1,7 @@
 """Sizes that were found before. With them a set is made again without sizing, and the same one by every version of the ruler.
 
 `sizes/<generator>-<seed>.toml`: a table for the seed of a case, and of each of its effects the strength and the detection limits
-that it was worth.
+that it was worth. Who has them has the answers but for their names, so a set made with them is development data.
 """
 
 import tomllib

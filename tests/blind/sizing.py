@@ -28,7 +28,7 @@ from diagnosis.verdict import JITTER
 
 Floats = npt.NDArray[np.floating[Any]]
 # The ruler stays where the diagnosis' own threshold moves, or scores of two versions could not be compared.
-_ALARM = 8.0  # log evidence; the diagnosis asks for 12
+_ALARM = 8.0  # log evidence
 _OCCAM = 5.0  # of one parameter, as it comes out of most refits
 LIMIT = math.sqrt(2.0 * JITTER * (_ALARM + _OCCAM))
 _MUCH = 0.6  # of chi2 a compared feature: less need not be refitted again

@@ -39,7 +39,7 @@ def known(
 
 def _write_sizes() -> None:
     with patch.object(strata, "_real_faults", lambda: 0):
-        cases = {number: case for number, case in enumerate(draw(Independent(RUNS), CASES, SEED)) if case.effects}
+        cases = {str(number): case for number, case in enumerate(draw(Independent(RUNS), CASES, SEED)) if case.effects}
     answers: list[Answer] = []
     with tempfile.TemporaryDirectory() as folder:
         for _, answer in made(Independent(RUNS), cases, Path(folder), joblib.cpu_count(), {}):

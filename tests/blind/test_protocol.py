@@ -143,23 +143,36 @@ def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
     whole = making._one
 
     def made_three(source, case, folder, known):
-        if folder.name == "3":
+        if len(list(folder.parent.iterdir())) == 3:
             (folder / "half").mkdir(parents=True)
             raise KeyboardInterrupt
         return whole(source, case, folder, known)
 
     monkeypatch.setattr(making, "_one", made_three)
     assert make(tmp_path, **options).exit_code == FAULTS["INTERRUPTED"].exit_status
-    assert {path.name for path in part.iterdir()} == {"0", "1", "2", "3", "answers"}
+    kept = {path.stem for path in (part / "answers").iterdir()}
+    assert len(kept) == 3
+    assert len({path.name for path in (part / "set").iterdir()} - kept) == 1
     result = make(tmp_path, **options, cases=CASES + 1)
     assert result.exit_code == 2
     assert f"{part}: holds the beginnings of" in result.stderr
     again = []
     monkeypatch.setattr(making, "_one", lambda *case: again.append(case[2].name) or whole(*case))
+
+    def no_space(*_arguments, **_options):
+        raise OSError(28, "No space left on device")
+
+    # the last step fails: nothing that was made is lost, and there is no key without a set
+    for step in ("write_set", "write_key", "write_sizes"):
+        with monkeypatch.context() as broken:
+            broken.setattr(making, step, no_space)
+            assert make(tmp_path, **options).exit_code == FAULTS["LOG_WRITE"].exit_status
+        assert not (tmp_path / "again.json").exists()
     assert make(tmp_path, **options).exit_code == 0
-    assert again == ["3", "4", "5", "6", "7"]
+    assert len(again) == CASES - 3
     assert not part.exists()
     first, second = (sealing.read_set(tmp_path / name) for name in ("set", "again"))
+    assert second.keys() == kept | set(again)
     assert sorted(one.evidence_sha256 for one in first.values()) == sorted(
         one.evidence_sha256 for one in second.values()
     )
@@ -179,6 +192,9 @@ def test_known_sizes_make_the_same_set_without_sizing(made, tmp_path, monkeypatc
         one.evidence_sha256 for one in second.values()
     )
     assert (tmp_path / "same.sizes.toml").read_bytes() == (made / "key.sizes.toml").read_bytes()
+    # who has the sizes has the answers but for their names
+    assert blind("run", tmp_path / "same", "--jobs", 1).exit_code == 0
+    assert "DEVELOPMENT DATA" in blind("score", tmp_path / "same", "--key", tmp_path / "same.json").stdout
 
 
 def test_without_the_source_tree_one_line_says_so(tmp_path, monkeypatch):
@@ -192,11 +208,19 @@ def test_a_run_is_taken_up_again(made):
     names = sorted(answers(made))
     results = made / "set" / "results"
     results.mkdir()
-    (results / f"{names[0]}.json").write_text('{"mine": true}')
+    mine = {"format": "mine", "tool": sealing.tool_version()}
+    (results / f"{names[0]}.json").write_text(json.dumps(mine))
     assert blind("run", made / "set", "--jobs", 1).exit_code == 0
     assert sorted(path.stem for path in results.iterdir()) == names
-    assert json.loads((results / f"{names[0]}.json").read_text()) == {"mine": True}
-    assert json.loads((results / f"{names[1]}.json").read_text())["format"] == "diagnosis/1"
+    assert json.loads((results / f"{names[0]}.json").read_text()) == mine
+    result = json.loads((results / f"{names[1]}.json").read_text())
+    assert (result["format"], result["tool"]) == ("diagnosis/1", mine["tool"])
+    (results / f"{names[0]}.json").write_text(json.dumps(mine | {"tool": "0.9+of-yesterday"}))
+    (results / f"{names[1]}.json").unlink()
+    refused = blind("run", made / "set", "--jobs", 1)
+    assert refused.exit_code == FAULTS["BAD_SET"].exit_status
+    assert f"{names[0]}.json: was made by version 0.9+of-yesterday" in refused.stderr
+    assert not (results / f"{names[1]}.json").exists()
 
 
 def test_a_killed_run_keeps_what_is_done(made):

@@ -17,7 +17,7 @@ from tests.real.table import lines
 parser = argparse.ArgumentParser(prog="python -m tests.real", description=__doc__)
 parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(EVIDENCES)}; all if left out")
 parser.add_argument("--json", type=Path, metavar="FILE", help="write all results there")
-parser.add_argument("--out", type=Path, default=Path("runs/real"), metavar="DIR", help="reports and evidence folders")
+parser.add_argument("--out", type=Path, default=Path("runs/real"), metavar="DIR", help="reports")
 parser.add_argument("--known", action="store_true", help="only what plain rulers say, beforehand")
 parser.add_argument("--jobs", type=int, default=1)
 

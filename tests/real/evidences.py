@@ -154,6 +154,8 @@ def axis(folder: Path, sensor: Sensor = faithful) -> None:
         t_s, signal_V = log["t"].ravel(), log["vir"].ravel()
         shown_V = sensor(t_s, _N_PER_V * signal_V) / _N_PER_V
         scipy.io.savemat(folder / name, {"t": t_s, "vir": shown_V, "qm": log["qm"].ravel()})
+        with (folder / name).open("r+b") as file:
+            file.write(b"MATLAB 5.0 MAT-file".ljust(116))  # in place of the time of writing: the same is the same again
     (folder / "manifest.toml").write_text(AXIS_MANIFEST, encoding="utf-8")
 
 

@@ -1,6 +1,9 @@
 """Import: every format gives the same evidence, and bad input leaves nothing behind."""
 
 import json
+import os
+import signal
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -321,3 +324,21 @@ def test_a_csv_file_in_a_wide_encoding_that_does_not_say_so(tmp_path: Path) -> N
     with pytest.raises(Fault, match=r'a.csv: line 1: has zero bytes.* encoding = "utf-16-le"'):
         read_table(tmp_path / "a.csv", Dialect(";", ","))
     assert len(read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-16-le")).column("F")) == 4000
+
+
+def test_no_signal_is_lost_while_a_csv_file_is_read(tmp_path):
+    write_raw(tmp_path / "run.csv", raw())
+    got, sent = threading.Event(), 0
+    before = signal.signal(signal.SIGTERM, lambda *_: got.set())
+    try:
+        for _ in range(100):
+            got.clear()
+            sender = threading.Timer(0.001, os.kill, (os.getpid(), signal.SIGTERM))
+            sender.start()
+            while sender.is_alive():
+                read_table(tmp_path / "run.csv")
+            sender.join()
+            assert got.wait(5.0), f"signal {sent} was lost"
+            sent += 1
+    finally:
+        signal.signal(signal.SIGTERM, before)
