@@ -96,7 +96,7 @@ def _stream(
     rows = dict.fromkeys(writers, 0)
     period_ns = 0.0
     for piece in iter_pieces(reader):
-        if piece.topic not in writers:
+        if piece.topic not in writers or not len(piece.records):  # of a chunk nothing may be readable
             continue
         if piece.topic == "sensors":
             period_ns = period_ns or block_period_ns(piece.records)

@@ -24,8 +24,9 @@ FAULTS = {
         FaultKind(
             "ENDPOINT_BUSY",
             3,
-            "The plant could not listen on the bus endpoint: another process (often an earlier run) holds the port. End "
-            "that process, or choose another port with --endpoint tcp/127.0.0.1:PORT.",
+            "The plant could not listen on the bus endpoint: another process (often an earlier run) holds the port, or the "
+            "address is not one of this machine. Or a second controller came to a rig that has one. End that process, or "
+            "choose another port with --endpoint tcp/127.0.0.1:PORT.",
         ),
         FaultKind(
             "NO_PEER",
@@ -102,7 +103,8 @@ FAULTS = {
         FaultKind(
             "INTERRUPTED",
             130,
-            "Somebody pressed Ctrl-C. The vibration was ramped down, the log was closed and every process has ended.",
+            "Somebody pressed Ctrl-C. In real time the vibration was ramped down first. A log that was being written is closed, "
+            "what is done stays, and every process has ended.",
         ),
     )
 }

@@ -1,6 +1,7 @@
 """A run log, whole or cut: its topics as arrays, at once or chunk by chunk; and recovery of what a kill left."""
 
 import contextlib
+import fcntl
 import json
 from collections import Counter
 from collections.abc import Iterator
@@ -29,7 +30,7 @@ from bridge.reading import check_file
 from bridge.runlog import LIBRARY
 from bridge.topics import BY_NAME
 
-__all__ = ["Damage", "LogReader", "Piece", "RunData", "iter_pieces", "iter_tables", "read_run", "recover"]
+__all__ = ["Damage", "LogReader", "Piece", "RunData", "iter_pieces", "read_run", "recover"]
 
 STREAMING = ("sensors", "applied", "command", "trace", "state")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE}
@@ -69,13 +70,6 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
                 kept = _readable(topic, payloads)
                 reader.count_bad_messages(len(mine) - len(kept))
                 yield Piece(topic, log_time_ns[kept], np.empty(0), [payloads[index] for index in kept])
-
-
-def iter_tables(path: Path) -> Iterator[tuple[str, Records]]:
-    """The streaming topics of a log, chunk by chunk: topic name and records. Raises as `iter_pieces`."""
-    for piece in iter_pieces(LogReader(path)):
-        if piece.topic in STREAMING:
-            yield piece.topic, piece.records
 
 
 def _samples(data: Bytes, rows: MessageRows) -> int:
@@ -259,9 +253,26 @@ class _Copy:
             )
 
 
+def _refuse_a_live_log(path: Path) -> None:
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            line = f"{path}: is being recorded: must be closed before it is replaced, or what follows is lost"
+            raise Fault("LOG_WRITE", f"{line}; wait for the end of the run, or give another --out") from None
+        except OSError:  # a file system without locks
+            return
+
+
 def recover(path: Path, out: Path) -> Recovered:
-    """Write every message of a cut or damaged log that can be read to `out`, with an index; `out` may be `path`."""
+    """Write every message of a cut or damaged log that can be read to `out`, with an index; `out` may be `path`.
+
+    Raises Fault BAD_LOG, and LOG_WRITE, also where `out` is being recorded.
+    """
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    _refuse_a_live_log(out)
     reader = LogReader(path)
     beside = out.with_name(out.name + ".part")
     messages = 0

@@ -107,7 +107,7 @@ class Layout:
             if field.is_repeated and len(value) != self.samples:
                 line = (
                     f"{topic}: {field.name} has {len(value)} samples: must have {self.samples}; "
-                    "set solver.samples_per_block of both sides to the same number"
+                    "set rig.solver.samples_per_block and controller.samples_per_block to the same number"
                 )
                 raise Fault("BAD_MESSAGE", line)
             record[field.name] = value

@@ -24,7 +24,7 @@ def claim(core: int | None, priority: int = LOOP_PRIORITY) -> str:
     threads = (
         [int(entry.name) for entry in Path("/proc/self/task").iterdir()] if Path("/proc/self/task").exists() else []
     )
-    pinned = core is not None and core in os.sched_getaffinity(0)
+    pinned = bool(threads) and core is not None and core in os.sched_getaffinity(0)
     fifo = bool(threads)
     for thread in threads:
         if pinned and core is not None:

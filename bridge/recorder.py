@@ -27,15 +27,14 @@ def run(
     about: dict[str, object],
     lockstep: bool,
     stop: threading.Event,
-) -> RunLog:
+) -> None:
     """Record until the plant and the controller have ended, or `stop` is set.
 
     Args:
         roles: whose configurations are waited for and kept.
         about: what else the log should say of its run.
 
-    Returns:
-        the closed log, with its counts. Raises Fault NO_PEER, PEER_DIED, LOG_WRITE.
+    Raises Fault NO_PEER, PEER_DIED, LOG_WRITE.
 
     """
     with Bus(bus_config, "recorder", lockstep, stop) as bus:
@@ -56,14 +55,13 @@ def run(
         log.close()
     if lost_plant:
         raise Fault("PEER_DIED", f"the plant left the bus before its end; {path} was closed with all that came")
-    return log
 
 
 def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
     """Write until everybody has ended. Returns whether the plant vanished instead."""
     ended: set[str] = set()
     heard_s = time.monotonic()
-    started = False
+    seen = False
     until_s = math.inf
     while True:
         if stop.is_set():
@@ -73,7 +71,6 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
         received = inbox.get(0.05)
         if received is not None:
             heard_s = time.monotonic()
-            started = True
             try:
                 log.write(received.topic, received.payload)
                 if received.topic.name.startswith("event/"):
@@ -91,6 +88,7 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
             return False
         if "plant" in ended and ("controller" in ended or quiet_s > _QUIET_S):
             return False
-        if started and quiet_s > _PLANT_LOST_S and not bus.alive("plant"):
+        seen = seen or bus.alive("plant")
+        if seen and quiet_s > _PLANT_LOST_S and not bus.alive("plant"):
             log.add_event("PLANT_LOST", "the plant left the bus before its end")
             return True

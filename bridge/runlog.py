@@ -1,6 +1,7 @@
 """Writing a run: MCAP with real schemas, cut into chunks by time so that a kill loses little."""
 
 import contextlib
+import fcntl
 import json
 import time
 from collections.abc import Callable
@@ -30,8 +31,6 @@ class RunLog:
 
     def __init__(self, path: Path, lockstep: bool) -> None:
         self.path = path
-        self.lost: dict[str, int] = {topic.name: 0 for topic in TOPICS if topic.logged}
-        self.written: dict[str, int] = dict.fromkeys(self.lost, 0)
         self._lockstep = lockstep
         self._next: dict[str, int] = {}
         self._last_t_ns = 0
@@ -41,6 +40,8 @@ class RunLog:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("wb")
+            with contextlib.suppress(OSError):  # where the file system has no locks
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody may replace it meanwhile
         except OSError as error:
             raise Fault("LOG_WRITE", f"{path}: cannot be written: {error.strerror}; choose another --log") from None
         self._channels: dict[str, int] = {}
@@ -82,7 +83,6 @@ class RunLog:
             raise Fault("BAD_MESSAGE", line)
         expected = self._next.get(topic.name, sequence if topic.rate_Hz else 0)
         if sequence > expected:
-            self.lost[topic.name] += sequence - expected
             self.add_event("GAP", f"/{topic.name}: {sequence - expected} lost before {sequence}", t_ns)
         if sequence + _LATEST_MESSAGES < expected:
             self.add_event("RESTART", f"/{topic.name}: {sequence} after {expected - 1}: its sender began anew", t_ns)
@@ -106,7 +106,6 @@ class RunLog:
         self._events += 1
 
     def _add(self, topic: Topic, payload: bytes, sequence: int, t_ns: int) -> None:
-        self.written[topic.name] += 1
         log_time_ns = t_ns if self._lockstep else time.time_ns()
         self._writer.add_message(self._channels[topic.name], log_time_ns, payload, t_ns, sequence & 0xFFFFFFFF)
 
@@ -133,6 +132,7 @@ class RunLog:
             file.write(ending_without_index())
 
     def close(self) -> None:
-        """Write the index and close. The file is whole after this. Raises Fault LOG_WRITE."""
-        self._guarded(self._writer.finish)
-        self._file.close()
+        """Write the index and close. The file is whole after this, or was closed by a fault. Raises Fault LOG_WRITE."""
+        if not self._file.closed:
+            self._guarded(self._writer.finish)
+            self._file.close()

@@ -118,18 +118,18 @@ def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
     try:
         return zenoh.open(session_config(config, hub=True, lockstep=lockstep))
     except zenoh.ZError as error:
-        line = f"{config.endpoint}: cannot listen there, another process holds it ({_brief(error)})"
-        raise Fault("ENDPOINT_BUSY", f"{line}; end it or choose another --endpoint") from None
+        line = f"{config.endpoint}: cannot listen there: must be free, and an address of this machine ({_brief(error)})"
+        raise Fault("ENDPOINT_BUSY", f"{line}; end what holds it or choose another --endpoint") from None
 
 
-def _dialled(config: BusConfig, lockstep: bool, stop: threading.Event) -> zenoh.Session:
-    until_s = time.monotonic() + _CONNECT_S
+def _dialled(config: BusConfig, lockstep: bool, stop: threading.Event, patience_s: float) -> zenoh.Session:
+    until_s = time.monotonic() + patience_s
     while not stop.is_set():
         try:
             return zenoh.open(session_config(config, hub=False, lockstep=lockstep))
         except zenoh.ZError:
             if time.monotonic() > until_s:
-                line = f"{config.endpoint}: no plant answers there after {_CONNECT_S:g} s"
+                line = f"{config.endpoint}: no plant answers there after {patience_s:g} s"
                 raise Fault("NO_PEER", f"{line}; start `stickslip plant` with this --endpoint") from None
     raise Fault("NO_PEER", f"{config.endpoint}: no plant answered there before the stop")
 
@@ -137,8 +137,15 @@ def _dialled(config: BusConfig, lockstep: bool, stop: threading.Event) -> zenoh.
 class Bus:
     """The session of one role. Use as a context manager: an unclosed session hangs the process at its end."""
 
-    def __init__(self, config: BusConfig, role: str, lockstep: bool, stop: threading.Event | None = None) -> None:
-        """Listen as the plant, or dial it until `stop` is set. Raises Fault ENDPOINT_BUSY, NO_PEER."""
+    def __init__(
+        self,
+        config: BusConfig,
+        role: str,
+        lockstep: bool,
+        stop: threading.Event | None = None,
+        patience_s: float = _CONNECT_S,
+    ) -> None:
+        """Listen as the plant, or dial it for `patience_s` or until `stop` is set. Raises Fault ENDPOINT_BUSY, NO_PEER."""
         self._config = config
         self._role = role
         self._lockstep = lockstep
@@ -147,7 +154,9 @@ class Bus:
         self._alive_changed = threading.Condition()
         zenoh.init_log_from_env_or("off")
         self._session = (
-            _listening(config, lockstep) if role == "plant" else _dialled(config, lockstep, stop or threading.Event())
+            _listening(config, lockstep)
+            if role == "plant"
+            else _dialled(config, lockstep, stop or threading.Event(), patience_s)
         )
         self._keep.append(
             self._session.liveliness().declare_subscriber(

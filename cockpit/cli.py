@@ -88,6 +88,10 @@ def plant(
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         roles = [role for role in wait_for.split(",") if role]
+        if unknown := set(roles) - {"controller", "recorder"}:
+            raise Fault(
+                "CONFIG", f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder or both, by comma"
+            )
         described = header(made, "plant", lockstep)
         serve(made.rig, made.seed, made.duration_s, made.bus, described, roles, lockstep, stop_event(child))
 
@@ -131,11 +135,15 @@ def recorder(
 
     def work() -> None:
         from bridge.recorder import run as record
-        from cockpit.running import about_run, log_path
+        from cockpit.running import about_run, keep_aside, log_path
         from cockpit.scenario import load_scenario
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         path = log_path(log, made.name)
+        if (
+            not child
+        ):  # `stickslip run` writes its log anew; started by hand after an incident, this holds what happened
+            keep_aside(path)
         record(path, made.bus, ["plant", "controller"], about_run(made, lockstep), lockstep, stop_event(child))
 
     sys.exit(guarded(work))

@@ -28,6 +28,8 @@ def stop_event(parent: int = 0) -> threading.Event:
 
     signal.signal(signal.SIGINT, on_signal)
     signal.signal(signal.SIGTERM, on_signal)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # a terminal that closes; nohup ignores it
+        signal.signal(signal.SIGHUP, on_signal)
     if parent:
 
         def watch() -> None:

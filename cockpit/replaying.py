@@ -93,7 +93,7 @@ def _lines(run: RunData, result: Replay, settings: list[str]) -> list[str]:
         else ""
     )
     if result.difference is None:
-        return [f"{run.path}: identical, {result.compared} steps, every command and trace bit for bit{skipped}"]
+        return [f"{run.path}: identical, {result.compared} steps, every command and trace in it bit for bit{skipped}"]
     d = result.difference
     lines = [
         f"{run.path}: differs from block {d.block} at {d.t_s:.3f} s on: {d.table}.{d.field} was {d.logged:.9g}, "

@@ -55,7 +55,6 @@ class Measured(NamedTuple):
     stick_s: float
     swing_N: float
     settled_force_N: float
-    settled_ripple_N: float
     late_slips: float
 
 
@@ -126,7 +125,6 @@ def measure(simulation: Simulation) -> Measured:
         late.stick_s,
         late.swing_N,
         float(settled_N.mean()),
-        float(np.ptp(settled_N)),
         cycles.between(RELEASED_S, math.inf).slips,
     )
 

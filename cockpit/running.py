@@ -3,6 +3,7 @@
 import contextlib
 import json
 import sys
+import time
 from pathlib import Path
 
 from bridge.faults import Fault
@@ -13,6 +14,21 @@ from cockpit.scenario import Scenario, load_scenario
 def log_path(given: Path | None, name: str) -> Path:
     """Where a log goes."""
     return given if given is not None else Path("runs") / f"{name}.mcap"
+
+
+def keep_aside(path: Path) -> None:
+    """Give a log that is there already a name of its own, after the time it was written at. Raises Fault LOG_WRITE."""
+    if not path.is_file() or not path.stat().st_size:
+        return
+    written = time.strftime("%Y%m%d-%H%M%S", time.localtime(path.stat().st_mtime))
+    aside, number = path.with_stem(f"{path.stem}-{written}"), 1
+    while aside.exists():
+        aside, number = path.with_stem(f"{path.stem}-{written}-{number}"), number + 1
+    try:
+        path.rename(aside)
+    except OSError as error:
+        raise Fault("LOG_WRITE", f"{path}: cannot be renamed: {error.strerror}; choose another --log") from None
+    print(f"kept     {aside}, which was {path.name} until now", file=sys.stderr)
 
 
 def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:

@@ -6,12 +6,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bridge import stickslip_pb2 as wire
+from bridge.faults import Fault
 from bridge.logfile import RunData, read_run
 from diagnosis.cycles import Cycles, find_cycles
 from diagnosis.logcheck import damage_findings
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
 _ALARM_RATIO = 1.05
+_RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
+_CONTROLLED = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m")
 _RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
 
 
@@ -72,16 +75,20 @@ def judge(path: Path) -> Verdict:
 def judge_run(run: RunData) -> Verdict:
     """Judge a run that was read."""
     controller = run.configuration("controller")
-    block_s = float(controller["block_s"])
+    try:
+        block_s, enabled_from_s = float(controller["block_s"]), float(controller["policy"]["enabled_from_s"])
+    except (KeyError, TypeError, ValueError) as error:
+        line = f"{run.path}: configuration of the controller: must hold block_s and policy.enabled_from_s as numbers"
+        raise Fault("BAD_LOG", f"{line} ({type(error).__name__}: {error}); see bridge/PROTOCOL.md, Header") from None
     blocks = len(run.sensors)
     t_s = run.sensors["t_ns"] * 1e-9
     force_N = run.sensors["drive_force_N"].astype(np.float64)
-    enabled_from_s = float(controller["policy"]["enabled_from_s"])
     seconds = float(t_s[-1]) if blocks else 0.0
     began_s = max(float(t_s.min()) - block_s, 0.0) if blocks else 0.0  # a log may begin late
     in_charge_s = enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
     samples = force_N.shape[1] if blocks else 1
     finite = np.isfinite(force_N).all(axis=1)
+    unreadable = [name for name in _CONTROLLED if not np.isfinite(run.sensors[name]).all()]
     t_s, force_N = t_s[finite], force_N[finite]
     sample_s = (t_s[:, None] + (np.arange(samples) + 1 - samples) * (block_s / samples)).ravel()
     cycles = find_cycles(sample_s, force_N.ravel()) if len(t_s) else None
@@ -92,11 +99,9 @@ def judge_run(run: RunData) -> Verdict:
     faults = [
         f"{event.code}: {event.text}" for event in run.events if event.code in {"GAP", "DROPPED", "PLANT_LOST", "STALE"}
     ]
-    if not finite.all():
-        where, first = (
-            f"/sensors drive_force_N: {np.count_nonzero(~finite)} blocks",
-            run.sensors["sequence"][~finite][0],
-        )
+    for name in unreadable:
+        bad = ~np.isfinite(run.sensors[name]).all(axis=1)
+        where, first = f"/sensors {name}: {np.count_nonzero(bad)} blocks", run.sensors["sequence"][bad][0]
         faults.append(f"NOT_FINITE: {where} hold a sample that is no number, first {first}; they were left out")
     return Verdict(
         log=str(run.path),
@@ -115,8 +120,8 @@ def judge_run(run: RunData) -> Verdict:
 
 
 def _vibrating(trace: Any, block_s: float) -> Any:
-    """Rows in EXCITE, but for the ramp at its start, when v_a is on its way up."""
-    excited = trace["mode"] == wire.EXCITE
+    """Rows in EXCITE with a measurement of their own, but for the ramp before them, when v_a is on its way up."""
+    excited = (trace["mode"] == wire.EXCITE) & ~np.isin(trace["limit"], _RAMPED_DOWN)
     starts = np.where(excited & ~np.concatenate([[False], excited[:-1]]), np.arange(len(excited)), 0)
     since = np.arange(len(excited)) - np.maximum.accumulate(starts)
     return excited & (since * block_s > _RAMP_S)

@@ -17,6 +17,9 @@ from controller.node import ControllerNode
 # within 11 ms, so none needs to be skipped.
 _INBOX_LIMIT = 256
 _PLANT_LOST_S = 1.0
+_TOLD_S = 1.0  # a rig without a token costs this
+_AT_ONCE_S = 0.05
+_OTHER_GONE_S = 0.5  # one that was killed is missed after the lease of 0.1 s
 
 
 def run(
@@ -28,7 +31,7 @@ def run(
 ) -> None:
     """Answer every block on the bus until the plant ends its run or `stop` is set.
 
-    Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG.
+    Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG, ENDPOINT_BUSY.
     """
     node = ControllerNode(config)
     node.warm_up()
@@ -36,10 +39,24 @@ def run(
         bus.serve_header(header)
         process = _Process(config, node, bus, lockstep)
         process.prepare()
+        _refuse_a_second(bus, bus_config.endpoint)
         bus.announce()
         # in lockstep plant and controller take turns: on one core the wake-up of the other costs a tenth
         granted = realtime.claim(0 if lockstep else 1)
         process.loop(stop, granted)
+
+
+def _refuse_a_second(bus: Bus, endpoint: str) -> None:
+    """Two controllers would pull one piezo to and fro, each inside its own slew limit. Raises Fault ENDPOINT_BUSY."""
+    bus.wait_for(["plant"], _TOLD_S)  # by then it is known who else is there, but for a moment
+    if bus.wait_for(["controller"], _AT_ONCE_S):
+        return
+    until_s = time.monotonic() + _OTHER_GONE_S
+    while bus.alive("controller"):
+        time.sleep(_AT_ONCE_S)
+        if time.monotonic() > until_s:
+            line = f"{endpoint}: another controller is on this bus: must be one"
+            raise Fault("ENDPOINT_BUSY", f"{line}; end that one, or choose another --endpoint or --prefix")
 
 
 class _Process:
@@ -53,6 +70,7 @@ class _Process:
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
         self._ended = False
+        self._unreadable = False
 
     def prepare(self) -> None:
         """Take one's place on the bus."""
@@ -73,33 +91,54 @@ class _Process:
 
         `granted`: the priority of this process, told when the run begins.
         """
+        try:
+            self._answer(stop, granted)
+        finally:
+            self._fade_out()
         node = self._node
+        self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
+
+    def _answer(self, stop: threading.Event, granted: str) -> None:
         heard_s = time.monotonic()
+        due_s = heard_s + self._stale_after_s  # when the command ramps down unless a new block comes
         started = False
         stale = False
         while not stop.is_set() and not self._ended:
-            # the slew limit is one a step: once stale, a step every block ramps as fast as with blocks
-            received = self._inbox.get(self._block_s if stale else self._stale_after_s)
-            if received is None:
-                self._mind_the_plant(heard_s)
-                if started and not self._lockstep:
-                    silent_blocks = 1 if stale else round(self._stale_after_s / self._block_s)
-                    if not stale:
-                        self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
-                    stale = True
-                    self._send[COMMAND.name](node.stale(silent_blocks).payload)
-                    self._send_rest(0)
+            received = self._inbox.get(max(due_s - time.monotonic(), 0.0))
+            if received is not None:
+                heard_s = time.monotonic()
+                if self._consume(received):  # nothing else is fresh: a rig that hangs may repeat its last block
+                    due_s = heard_s + self._stale_after_s
+                    if stale:
+                        self.event("FRESH", "blocks arrive again")
+                        stale = False
+                if received.topic is SENSORS and not started:
+                    started = True
+                    if (
+                        not self._lockstep
+                    ):  # not before: the plant waits with its first block until the recorder listens
+                        self.event("START", granted)
+            if time.monotonic() < due_s:
                 continue
-            heard_s = time.monotonic()
-            answered = self._consume(received)
-            if stale and answered:
-                self.event("FRESH", "blocks arrive again")
-                stale = False
-            if received.topic is SENSORS and not started:
-                started = True
-                if not self._lockstep:  # not before: the plant waits with its first block until the recorder listens
-                    self.event("START", granted)
-        self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
+            self._mind_the_plant(heard_s)
+            if started and not self._lockstep:
+                silent_blocks = 1 if stale else round(self._stale_after_s / self._block_s)
+                if not stale:
+                    self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
+                stale = True
+                self._ramp(silent_blocks)
+            # the slew limit is one a step: once stale, a step every block ramps as fast as with blocks
+            due_s = time.monotonic() + (self._block_s if stale else self._stale_after_s)
+
+    def _ramp(self, silent_blocks: int) -> None:
+        self._send[COMMAND.name](self._node.stale(silent_blocks).payload)
+        self._send_rest(0)
+
+    def _fade_out(self) -> None:
+        """Leave no vibration behind, whatever the reason to leave: not every rig lets go of its last command by itself."""
+        while self._node.amplitude_m > 0.0 and not (self._lockstep or self._ended):
+            self._ramp(1)
+            time.sleep(self._block_s)
 
     def _consume(self, received: Received) -> bool:
         """Take one message. Returns whether it was a block that got an answer."""
@@ -109,12 +148,31 @@ class _Process:
             if command is not None:
                 self._send[COMMAND.name](command.payload)
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
+                self._tell_unreadable()
             return command is not None
         if received.topic is OPERATOR:
             self._obey(received.payload)
-        elif parsed(wire.Event, received.payload, PLANT_EVENT.name).code == "END":
-            self._ended = True
+        else:
+            self._mind(parsed(wire.Event, received.payload, PLANT_EVENT.name))
         return False
+
+    def _mind(self, event: wire.Event) -> None:
+        if event.code == "END":
+            self._ended = True
+        elif event.code == "START" and self._lockstep and event.text != "lockstep":
+            line = f"{PLANT_EVENT.name}: START says {event.text!r}: must say 'lockstep' to a controller --lockstep, which waits"
+            raise Fault(
+                "CONFIG", f"{line} for ever where blocks stop coming; leave --lockstep away, or give it to the rig too"
+            )
+
+    def _tell_unreadable(self) -> None:
+        if self._node.unreadable == self._unreadable:
+            return
+        self._unreadable = self._node.unreadable
+        if self._unreadable:
+            self.event("NOT_FINITE", f"block {self._node.last_block} holds a sample that is no number: ramping to zero")
+        else:
+            self.event("FRESH", "every sample is a number again")
 
     def _obey(self, payload: bytes) -> None:
         """Take an operator's word; one that makes no sense must not stop the control."""

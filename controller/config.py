@@ -12,6 +12,7 @@ NotNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(gt=0, le=1)]
 LONGEST_WINDOW_BLOCKS = 128
 MOST_BANDS = 8
+_FEWEST_SILENT_BLOCKS = 2
 
 
 class OnsetConfig(Strict):
@@ -61,7 +62,8 @@ class LimitsConfig(Strict):
     frequency_max_Hz: Positive = 5000.0
     # the displacement transducers' carrier is 4.8 kHz: a vibration close by beats with it
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = [(4600.0, 5000.0)]
-    stale_after_s: Positive = 0.02
+    # a rig that froze must not be vibrated for longer
+    stale_after_s: Annotated[float, Field(gt=0, le=5.0)] = 0.02
 
 
 class ControllerConfig(Strict):
@@ -88,6 +90,11 @@ class ControllerConfig(Strict):
         if limits.frequency_max_Hz >= nyquist_Hz:
             raise ValueError(
                 f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be below half the sample rate, {nyquist_Hz:g} Hz"
+            )
+        if limits.stale_after_s < _FEWEST_SILENT_BLOCKS * self.block_s:
+            raise ValueError(
+                f"limits.stale_after_s = {limits.stale_after_s:g}: must hold {_FEWEST_SILENT_BLOCKS} blocks of "
+                f"{self.block_s:g} s, or every block comes too late; raise it"
             )
         for low, high in limits.forbidden_Hz:
             if high <= low:

@@ -45,6 +45,21 @@ class ControllerNode:
         self._length_checked = False
         self._operator_events = 0
 
+    @property
+    def amplitude_m(self) -> float:
+        """Of the last command."""
+        return float(self._state[0]["allowed_m"])
+
+    @property
+    def unreadable(self) -> bool:
+        """Whether the last block held a sample that is no number."""
+        return int(self._trace[0]["limit"]) == wire.NOT_FINITE
+
+    @property
+    def last_block(self) -> int:
+        """Number of the last block."""
+        return self._expected - 1
+
     def warm_up(self) -> None:
         """Compile or load the kernel on copies, so that the first answer is not late."""
         step(
@@ -134,5 +149,6 @@ class ControllerNode:
         ):
             plotted[name] = trace[name]
         moving = trace.state > wire.STANDSTILL and trace.drive_velocity_mps > 0.0
-        plotted.velocity_ratio = trace.vibration_velocity_mps / trace.drive_velocity_mps if moving else 0.0
+        measured = trace.limit not in (wire.STALE_INPUT, wire.NOT_FINITE)  # else the trace has what was measured last
+        plotted.velocity_ratio = trace.vibration_velocity_mps / trace.drive_velocity_mps if moving and measured else 0.0
         return Outgoing(STATE, self._plotted.tobytes())

@@ -20,6 +20,7 @@ from controller.codes import (
     NOTHING_TO_DO,
     PIEZO_WEAK,
     PROBE,
+    RANGE,
     STANDSTILL,
     STICK,
     STICK_SEEN,
@@ -158,5 +159,6 @@ def want(p: Record, s: Record) -> None:
         if higher_Hz > s.wanted_Hz:
             s.wanted_Hz = higher_Hz
             s.wanted_m = velocity_mps * math.exp(s.log_gain) / (TWO_PI * higher_Hz)
-    weak = s.vibration_velocity_mps < _ALARM_RATIO * s.drive_velocity_mps and s.wanted_m > p.amplitude_max_m
-    _judge_piezo(s, weak)
+    # at the limit of the last step, or as good as nothing arrives where nothing holds the command back
+    helpless = s.limit == RANGE or (settled and not trusted)
+    _judge_piezo(s, helpless and s.vibration_velocity_mps < _ALARM_RATIO * s.drive_velocity_mps)

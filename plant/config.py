@@ -85,7 +85,7 @@ class PiezoConfig(Strict):
     frequency_max_Hz: Positive = 5000.0
     # 1 um/s reaches the paper's 0.02 um in 20 ms; 0 means at once, as in the paper's own calculation
     amplitude_slew_m_per_s: NotNegative = 1e-6
-    command_timeout_s: Positive = 0.05
+    command_timeout_s: Annotated[float, Field(gt=0, le=5.0)] = 0.05
     delivered_ratio: Positive = 1.0
     mount_resonance_Hz: NotNegative = 0.0  # 0: rigid mount
     mount_damping_ratio: Positive = 0.05
@@ -159,6 +159,11 @@ class RigConfig(Strict):
             raise ValueError(
                 f"solver.block_s = {solver.block_s:g}: must hold a whole number of steps between its "
                 f"{solver.samples_per_block} samples; with step_s = {solver.step_s:g} there are {steps:g}"
+            )
+        if piezo.command_timeout_s < 2.0 * solver.block_s:
+            raise ValueError(
+                f"piezo.command_timeout_s = {piezo.command_timeout_s:g}: must hold 2 blocks of solver.block_s = "
+                f"{solver.block_s:g}, or no command is ever fresh; raise it"
             )
         # k_t dt^2 / m: 1.3 is still right, at 1.9 friction swings by itself, 6.5 shows no stick-slip
         lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2

@@ -46,7 +46,7 @@ def step(
         s.commanded_Hz = c.frequency_Hz
         s.commanded_m = c.amplitude_m
         s.command_block = c.block
-    fresh = s.command_block != NO_COMMAND and s.block - s.command_block <= p.command_timeout_blocks
+    fresh = s.command_block != NO_COMMAND and 0 <= s.block - s.command_block <= p.command_timeout_blocks
     usable = fresh and math.isfinite(s.commanded_Hz) and math.isfinite(s.commanded_m)
     frequency_Hz, amplitude_m = (s.commanded_Hz, s.commanded_m) if usable else (s.frequency_Hz, 0.0)
     if p.disturbed:

@@ -62,6 +62,27 @@ def test_a_piezo_that_is_too_weak_is_said() -> None:
     assert set(loop.trace["limit"][loop.t_s > 2.0]) == {wire.RANGE}
 
 
+def test_a_velocity_limit_that_is_too_low_is_said() -> None:
+    rig = {"drive": {"profile": [(0.0, 5e-3)]}, "piezo": {"amplitude_max_m": 1e-6}}
+    loop = close_the_loop(3.0, rig=rig, controller={"limits": {"amplitude_max_m": 1e-6}})
+    late = loop.trace[loop.t_s > 2.0]
+    assert set(late["limit"]) == {wire.RANGE}  # 6 mm/s are wanted, 5 allowed
+    assert set(late["reason"]) == {wire.PIEZO_WEAK}
+
+
+def test_an_accelerometer_that_is_unplugged_is_said() -> None:
+    def unplugged(block: int, payload: bytes) -> bytes:
+        made = sensor_block(20).read(payload, "sensors")
+        if block > 1500:
+            made["base_accel_mps2"] = 0.0
+        return made.tobytes()
+
+    loop = close_the_loop(3.0, deliver=unplugged)
+    assert wire.PIEZO_WEAK not in set(loop.trace["reason"][loop.t_s < 1.5])
+    assert set(loop.trace["reason"][loop.t_s > 2.0]) == {wire.PIEZO_WEAK}
+    assert loop.trace["limit"][-1] == wire.NO_LIMIT  # it goes on open loop, with the gain that it had learnt
+
+
 def test_a_piezo_that_suffices_again_is_weak_no_longer() -> None:
     profile = [(0.0, 1e-3), (2.0, 1e-3), (2.2, 3e-4)]
     loop = close_the_loop(5.0, rig={"drive": {"profile": profile}, "piezo": {"delivered_ratio": 0.3}})

@@ -20,6 +20,16 @@ def test_missing_plant() -> None:
     assert len(result.stderr.strip().splitlines()) == 1
 
 
+def test_a_stop_without_a_rig_says_at_once_what_to_do() -> None:
+    began_s = time.monotonic()
+    command = [sys.executable, "-m", "cockpit", "stop", "--endpoint", free_endpoint()]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == FAULTS["NO_PEER"].exit_status
+    assert "no rig answers there within 2 s" in result.stderr
+    assert "stop the exciter's amplifier by hand" in result.stderr
+    assert time.monotonic() - began_s < 25.0  # others wait half a minute for a rig
+
+
 def test_a_stop_is_heard_while_nobody_answers() -> None:
     stop = threading.Event()
     threading.Timer(0.5, stop.set).start()

@@ -11,7 +11,7 @@ import pytest
 from bridge import stickslip_pb2 as wire
 from bridge.faults import FAULTS
 from bridge.logfile import read_run
-from bridge.topics import OPERATOR, STATE
+from bridge.topics import CONTROLLER_EVENT, OPERATOR, STATE
 from bridge.zenoh_link import Bus, BusConfig, Inbox
 from controller.codes import BLOCK
 from tests.system.ports import free_endpoint
@@ -78,7 +78,10 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
     try:
         await_size(log, 400_000)
         assert subprocess.run([*COMMAND, "stop", "--endpoint", endpoint], timeout=30, check=False).returncode == 0
-        time.sleep(1.0)
+        second = [*COMMAND, "controller", "--endpoint", endpoint]
+        refused = subprocess.run(second, timeout=60, check=False, capture_output=True, text=True)
+        assert refused.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
+        assert f"{endpoint}: another controller is on this bus: must be one" in refused.stderr
         again = [*COMMAND, "stop", "--reset", "--endpoint", endpoint]
         assert subprocess.run(again, timeout=30, check=False).returncode == 0
         run.communicate(timeout=60)
@@ -105,10 +108,14 @@ def test_a_controller_that_does_not_obey_is_said(word: list[str]) -> None:
         controller.announce()
         assert not plant.wait_for({"controller"}, 10.0)
         command = [*COMMAND, "stop", *word, "--endpoint", config.endpoint]
-        result = subprocess.run(command, timeout=30, check=False, capture_output=True, text=True)
-    assert inbox.get_nowait() is not None
-    assert result.returncode == FAULTS["NO_PEER"].exit_status
-    assert f"{config.endpoint}: the controller does not answer" in result.stderr
+        told = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        tell = controller.publisher(CONTROLLER_EVENT)
+        for action in ("STOP", "RESET"):  # somebody else's words are taken meanwhile
+            assert inbox.get(30.0) is not None
+            tell(wire.Event(source="controller", code="OPERATOR", text=f"{action} by anna").SerializeToString())
+        _, said = told.communicate(timeout=30)
+    assert told.returncode == FAULTS["NO_PEER"].exit_status
+    assert f"{config.endpoint}: the controller does not answer" in said
 
 
 def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Commands that read a log or draw: what comes of logs and options that are not as usual."""
 
+import json
 import os
 import subprocess
 import sys
@@ -9,9 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from bridge import stickslip_pb2 as wire
+from bridge.faults import Fault
 from bridge.logfile import read_run
 from cockpit.cli import app
 from cockpit.replaying import outcome
+from cockpit.running import keep_aside
 from cockpit.verdict import judge_run
 from tests.logs import doctored, empty_log, short_log
 
@@ -129,6 +133,47 @@ def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value
         "NOT_FINITE: /sensors drive_force_N: 2 blocks hold a sample that is no number, first 100; they were left out"
     ]
     assert outcome(spoilt).drive_work_J == pytest.approx(outcome(sound).drive_work_J, rel=0.02)
+
+
+def test_what_was_not_measured_is_no_velocity_ratio(tmp_path: Path) -> None:
+    def spoil(tables):
+        trace = tables["trace"]
+        trace["mode"], trace["drive_velocity_mps"], trace["vibration_velocity_mps"] = wire.EXCITE, 5e-4, 6e-4
+        trace["limit"] = wire.NO_LIMIT
+        tables["sensors"]["base_accel_mps2"][250:300, 3] = np.nan
+        trace["limit"][250:300] = wire.NOT_FINITE
+        trace["vibration_velocity_mps"][300:] = 4e-4
+
+    run = read_run(doctored(tmp_path, spoil))
+    from_the_start = json.dumps({"block_s": 0.001, "policy": {"enabled_from_s": 0.0}})
+    verdict = judge_run(run._replace(headers=run.headers | {"controller": {"configuration": from_the_start}}))
+    assert verdict.faults == [
+        "NOT_FINITE: /sensors base_accel_mps2: 50 blocks hold a sample that is no number, first 250; they were left out"
+    ]
+    assert (verdict.velocity_ratio_min, verdict.velocity_ratio_max) == (pytest.approx(1.2), pytest.approx(1.2))
+
+
+def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_path: Path) -> None:
+    run = read_run(doctored(tmp_path, lambda _tables: None))
+    bare = run._replace(headers=run.headers | {"controller": {"configuration": '{"block_s": 0.001}'}})
+    with pytest.raises(
+        Fault, match=r"BAD_LOG: .*configuration of the controller: must hold block_s and policy.enabled_from_s"
+    ):
+        judge_run(bare)
+
+
+def test_a_log_that_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "run.mcap"
+    keep_aside(log)
+    for what in (b"first", b"second"):
+        log.write_bytes(what)
+        os.utime(log, (1.7e9, 1.7e9))
+        keep_aside(log)
+        assert not log.exists()
+    kept = {path.read_bytes(): str(path) for path in tmp_path.iterdir()}
+    said = capsys.readouterr().err
+    assert kept.keys() == {b"first", b"second"}
+    assert all(path in said for path in kept.values())
 
 
 @pytest.mark.parametrize("from_block", [0, 100])

@@ -42,6 +42,9 @@ from plant.config import RigConfig
         ),
         (["rig.contact.static_force_N=1.0"], ["static_force_N", "coulomb_force_N"]),
         (["controller.samples_per_block=25"], ["samples_per_block", "must equal"]),
+        (["controller.limits.stale_after_s=20"], ["controller.limits.stale_after_s", "20", "5"]),
+        (["controller.limits.stale_after_s=0.0005"], ["limits.stale_after_s = 0.0005", "2 blocks", "raise it"]),
+        (["rig.piezo.command_timeout_s=0.0005"], ["piezo.command_timeout_s = 0.0005", "2 blocks", "raise it"]),
         (
             ["rig.piezo.frequency_max_Hz=2000.0"],
             [

@@ -1,9 +1,11 @@
 """The controller's process on a bus of its own making: rigs that begin anew, silence, and words that must not be missed."""
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bridge import stickslip_pb2 as wire
@@ -131,3 +133,70 @@ def test_a_stop_is_taken_however_full_the_inbox_is() -> None:
     timer.cancel()
     assert controller._inbox.dropped == 300 - 256
     assert bus.codes() == ["START", "OPERATOR", "END"]
+
+
+def test_a_rig_that_repeats_its_last_block_is_stale() -> None:
+    controller, bus = process()
+    controller._node._state["allowed_m"] = 3e-8
+    controller._node._state["allowed_Hz"] = 2600.0
+    thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
+    bus.say(SENSORS, block(0))
+    thread.start()
+    for _ in range(2000):
+        bus.say(SENSORS, block(0))
+        if bus.sent[COMMAND.name] and commanded_m(bus)[-1] == 0.0:
+            break
+        time.sleep(0.001)
+    bus.say(PLANT_EVENT, END)
+    thread.join(5.0)
+    assert bus.codes() == ["START", "STALE", "END"]
+    assert commanded_m(bus)[-1] == 0.0
+    assert max(abs(np.diff(commanded_m(bus)))) < 1.001e-9
+
+
+def commanded_m(bus: FakeBus) -> list[float]:
+    return [float(COMMAND_LAYOUT.read(payload, "command")[0].amplitude_m) for payload in bus.sent[COMMAND.name]]
+
+
+@pytest.mark.parametrize("why", ["stop", "fault"])
+def test_who_leaves_takes_the_amplitude_down_first(why: str) -> None:
+    controller, bus = process()
+    stop = threading.Event()
+    bus.say(SENSORS, block(1000))
+    controller._node._state["allowed_m"] = 3e-8
+    controller._node._state["allowed_Hz"] = 2600.0
+    if why == "stop":
+        timer = threading.Timer(0.01, stop.set)
+        timer.start()
+        controller.loop(stop, "")
+        timer.join()
+    else:
+        bus.say(SENSORS, block(0))
+        with pytest.raises(Fault, match="BAD_MESSAGE"):
+            controller.loop(stop, "")
+    assert commanded_m(bus)[0] == pytest.approx(2.9e-8)
+    assert commanded_m(bus)[-1] == 0.0
+    assert max(abs(np.diff(commanded_m(bus)))) < 1.001e-9
+
+
+def test_samples_that_are_no_numbers_are_said_once() -> None:
+    controller, bus = process()
+    for number in range(6):
+        made = sensor_block(20).blank()
+        made["sequence"], made["t_ns"] = number, (number + 1) * 1_000_000
+        if number in {2, 3}:
+            made["base_accel_mps2"][0, 7] = np.nan
+        bus.say(SENSORS, made.tobytes())
+    bus.say(PLANT_EVENT, END)
+    controller.loop(threading.Event(), "")
+    assert bus.codes() == ["START", "NOT_FINITE", "FRESH", "END"]
+    assert "block 2 holds a sample" in wire.Event.FromString(bus.sent[CONTROLLER_EVENT.name][1]).text
+
+
+def test_a_controller_in_lockstep_refuses_a_rig_that_does_not_wait() -> None:
+    bus: Any = FakeBus()
+    controller = _Process(CONFIG, ControllerNode(CONFIG), bus, lockstep=True)
+    controller.prepare()
+    bus.say(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
+    with pytest.raises(Fault, match=r"CONFIG: event/plant: START says 'SCHED_FIFO 50': must say 'lockstep'"):
+        controller.loop(threading.Event(), "")

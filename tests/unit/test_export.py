@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from bridge.export import CHANNELS, export
 from bridge.faults import Fault
-from bridge.logfile import STREAMING, iter_tables, read_run
+from bridge.logfile import STREAMING, LogReader, iter_pieces, read_run
 from cockpit.log_commands import log_app
 from tests.logs import short_log
 
@@ -107,8 +107,9 @@ def test_a_wrong_request_is_one_clear_line(
 
 def test_tables_chunk_by_chunk_are_the_whole_run(log: Path) -> None:
     pieces: dict[str, list[bytes]] = {name: [] for name in STREAMING}
-    for topic, records in iter_tables(log):
-        pieces[topic].append(records.tobytes())
+    for piece in iter_pieces(LogReader(log)):
+        if piece.topic in STREAMING:
+            pieces[piece.topic].append(piece.records.tobytes())
     run = read_run(log)
     assert len(pieces["sensors"]) > 5
     for name in STREAMING:
