@@ -80,8 +80,10 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["Source"]) -> 
 
     seen: dict[Path, str] = {}
     for option, path in (("--json", wishes.json), ("--report", wishes.report), ("--apply", wishes.apply)):
-        if path is None or path == _STDOUT:
+        if path is None or (path == _STDOUT and option == "--json"):
             continue
+        if path == _STDOUT:
+            raise Fault("CONFIG", f"{option} -: must be a file; only --json can go to stdout")
         check_writable(option, path)
         whole = path.resolve()
         if whole in seen:

@@ -25,6 +25,7 @@ Fit
     library                     every effect in every formula, with coordinates and starts
     waves, axis_waves           periods at which a wave may be looked for
     ringing                     frequencies at which a structure that rings may be looked for
+    by_run                      parameters of an effect that differ from run to run
     phases, phases_by_run       a wave over time that begins in another phase in every run; where its refit starts
     late_friction               where the refit of friction starts that lags by much
     retuning                    the rig without effects, refitted: what all evidence is measured against
@@ -36,6 +37,8 @@ Fit
     search                      from all trials to the few that are refitted in full
 Verdict
     diagnose                    the whole way, in order
+    second_floor                once more on the floors of the nearest model, where nothing explains it
+    assembling                  what came out of it, put together
     verdict                     is there a gap, which effect closes it, how sure that is
     imitation                   which effects these runs cannot tell apart
     heldout                     how far the gap closes on runs that no fit has seen, and which names they refute

@@ -2,13 +2,16 @@
 
 import math
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from diagnosis.advice import UNCOUPLE
+from diagnosis.commands import SHORTEST_S
 from diagnosis.evidence import Evidence
+from diagnosis.findings import Finding
 from diagnosis.flexible import flexible_differences
 from diagnosis.form import Axis
 from diagnosis.gap import DEFINITION, Floor, cell_names, cell_squares, differences
@@ -20,12 +23,14 @@ from diagnosis.phases import is_phase
 from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem
 from diagnosis.random_friction import is_random
+from diagnosis.reduced import BLOCK_S
 from diagnosis.refit import Fit, Fitter
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.summary import summary
 from diagnosis.verdict import Verdict, refittable
 
 Floats = npt.NDArray[np.floating[Any]]
+_MUCH_CHANGING = 0.1  # of a run: ramps of a drive and a piezo take less
 
 
 def assembled(
@@ -98,7 +103,7 @@ def assembled(
         gap=judged,
         next_experiment=following,
         rig=nuisances.parameters(best.deviations),
-        findings=evidence.findings,
+        findings=(*evidence.findings, *_changing(runs)),
         pictures=pictures(
             Problem(evidence.rig, runs),
             nuisances.point(np.zeros(len(nuisances)), {}),
@@ -151,6 +156,15 @@ def _judged(
         compared=tuple(compared),
         refuted=verdict.refuted,
     )
+
+
+def _changing(runs: list[Prepared]) -> Iterator[Finding]:
+    """What is not compared since speed or vibration do not stay the same for long enough: nothing else would tell."""
+    for run in runs:
+        seconds, length_s = run.commands.changing_s, len(run.commands.drive) * BLOCK_S
+        if seconds > _MUCH_CHANGING * length_s:
+            text = f"in {seconds:.3g} of {length_s:.3g} s speed or vibration change within {SHORTEST_S:g} s: not compared there"
+            yield Finding("changing", f"{run.file}: commands", f"{text}; hold each one longer")
 
 
 def _shrinkage(who: str, closed: Closed) -> Shrinkage:

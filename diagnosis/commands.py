@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 100  # blocks: 0.1 s, over which a velocity is read from a position with noise
 # A change of speed is one when it is larger than this share of the faster speed; a ripple of a screw stays below.
 _SMALLEST_CHANGE = 0.35
-_SHORTEST_S = 0.3
+SHORTEST_S = 0.3
 _SHORTEST_WINDOWS = 3
 _SLOWEST = 0.01  # of the fastest speed of the run: less is a stop, whose slope is the sensor's noise
 _STILL_M = 1e-9  # and a drive that moves by less in all, or by less than its noise, stands: the rest is rounding
@@ -68,6 +68,12 @@ class Commands(NamedTuple):
     segments: tuple[Segment, ...]
     motion: Motion | None = None  # of the slide, with a force drive
 
+    @property
+    def changing_s(self) -> float:
+        """How long no command stayed the same for long enough to be compared, in all."""
+        held = sum(segment.last - segment.first + _SETTLING for segment in self.segments)
+        return 0.0 if self.motion is not None else (len(self.drive) - held) * BLOCK_S
+
 
 def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands:
     """The commands of a run, from its columns and the velocity that the manifest states."""
@@ -98,7 +104,7 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
             float(amplitude_m[first]),
         )
         for first, last in pairwise(edges)
-        if (last - first) * BLOCK_S >= _SHORTEST_S
+        if (last - first) * BLOCK_S >= SHORTEST_S
     )
     return Commands(drive, frequency_Hz, amplitude_m, segments)
 

@@ -20,6 +20,7 @@ from diagnosis.manifest import MANIFEST, STANDARD, ChannelMap, Manifest, RigTabl
 from diagnosis.pick_up import PICK_UP, PickUp, pick_up
 
 Floats = npt.NDArray[np.float64]
+_LACKING = "column"  # kind of finding: one that the channel map names is not in this file
 _ALIKE = 0.85  # of two names, by `difflib`: a letter or the case is another
 SHAKE_RATE_HZ = 8000.0  # a slower accelerometer has too few samples a millisecond to tell how strongly it vibrates
 # what each column tells that no other one does, by kind of drive
@@ -70,10 +71,12 @@ def load_evidence(folder: Path) -> Evidence:
         for name, share in manifest.rig.tolerance.items()
         if share > 0.0 and manifest.rig.values()[name] == 0.0
     ]
-    for table in manifest.run:
-        run, found = _run(folder, manifest, table)
+    read = [read_columns(folder / table.file, manifest.channels) for table in manifest.run]
+    _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
+    for table, (columns, damaged) in zip(manifest.run, read, strict=True):
+        run, found = examine(columns, manifest.rig, table)
         runs.append(run)
-        findings += found
+        findings += damaged + found
     if len(runs) > 1 and not any(run.holdout for run in runs):
         # the last one, so that adding nothing but a run never changes an earlier choice silently
         runs[-1] = runs[-1]._replace(holdout=True)
@@ -82,10 +85,14 @@ def load_evidence(folder: Path) -> Evidence:
     return Evidence(folder, manifest.rig, tuple(runs), tuple(findings))
 
 
-def _run(folder: Path, manifest: Manifest, table: RunTable) -> tuple[Run, list[Finding]]:
-    columns, damaged = read_columns(folder / table.file, manifest.channels)
-    run, findings = examine(columns, manifest.rig, table)
-    return run, damaged + findings
+def _refuse_misspelt(manifest: Manifest, findings: list[Finding]) -> None:
+    """A column that some runs lack is missing there; one that no run has is misspelt. Raises Fault BAD_EVIDENCE."""
+    tables = sum(not table.file.endswith(".mcap") for table in manifest.run)
+    for name in manifest.channels:
+        lacking = [finding for finding in findings if finding.kind == _LACKING and finding.where.endswith(f": {name}")]
+        if len(lacking) == tables > 0:
+            line = f"{lacking[0].where.partition(':')[0]}: {lacking[0].text}"
+            raise Fault("BAD_EVIDENCE", f"{line}; no run has it: correct channels.{name}.column")
 
 
 def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list[Finding]]:
@@ -147,7 +154,7 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
 
 
 def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, list[Finding]]:
-    """The standard columns of a data file, mapped and in SI units, unchecked, and what it has besides or has lost.
+    """The standard columns of a data file, mapped and in SI units, unchecked, and what it has besides, lacks or has lost.
 
     A run log has the standard columns; one of them that `channels` maps is scaled like any other. Raises Fault BAD_EVIDENCE.
     """
@@ -157,16 +164,21 @@ def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, 
             return {name: _scaled(values, channels.get(name), name) for name, values in logged.items()}, damaged
         table = read_table(path)
         found: Columns = {}
+        lacking: list[Finding] = []
         for name in STANDARD:
             if name in channels:
                 source = channels[name]
+                if source.column not in table.columns and name != "t_s":
+                    text = f"column {source.column}: not in the file; known here: {', '.join(sorted(table.columns)) or 'none'}"
+                    lacking.append(Finding(_LACKING, f"{path.name}: {name}", text))
+                    continue
                 found[name] = table.column(source.column) * source.scale + source.offset
             elif name in table.columns:
                 found[name] = table.column(name)
     except Fault as fault:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
         raise Fault("BAD_EVIDENCE", line) from None
-    return found, list(_misspelt(path.name, found, table))
+    return found, [*lacking, *_misspelt(path.name, found, table)]
 
 
 def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:

@@ -21,6 +21,7 @@ _FEWEST_ROWS = 16
 _LARGEST_BAD_SHARE = 0.1
 _LARGEST_WILD_SHARE = 1e-3  # of samples that no rig shows: a loose contact, or a value that stands for none
 _SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m")
+_COMMANDED = ("vibration_frequency_Hz", "vibration_amplitude_m")
 _GAP_STEPS = 10.0  # times the usual step
 # A pause that is longer, or gaps that take a larger share of a run, hide slips that the model would go on to make
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
@@ -29,6 +30,7 @@ _ANOTHER = 3.0  # times as fast, or as slow, or the other way: another drive tha
 _FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
 _LEAST_TRAVEL = 0.002  # of the way to the first slip; the noise of a drive at rest is less
 _FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
+_STRIDE_S = 0.1
 _FEWEST_IN_A_SLIP = 3.0  # samples
 _SHORTEST_S = 1.0  # of a run
 _QUICKEST_S = 2e-6  # between samples: 500 kHz
@@ -58,6 +60,9 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     usable = dict(columns)
     for name in list(usable):
         bad = ~np.isfinite(usable[name])
+        if name in _COMMANDED and bad.any():  # the model would run without it
+            line = f"{file}: {name}: {bad.sum()} of {len(bad)} samples are no finite number, first row {np.argmax(bad) + 1}"
+            raise Fault("BAD_EVIDENCE", f"{line}: must be one in every row; write 0 where the vibration is off")
         if name != "t_s" and bad.mean() > 0.5:
             note(
                 "not-finite", name, f"{bad.sum()} of {len(bad)} samples are no finite number; not used", int(bad.sum())
@@ -85,7 +90,9 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     for name in [name for name in usable if name != "t_s"]:
         values = usable[name]
         seen = look(values, dwells=name.endswith("_m"))
-        wrong = _wrong_unit(name, values, rig) or _too_far(name, values, t_s, rig, table)
+        wrong = _wrong_unit(name, values, rig) or _too_far(name, usable, rig, table)
+        if wrong and name in _COMMANDED:
+            raise Fault("BAD_EVIDENCE", f"{file}: {name}: {wrong}; set channels.{name}.scale")
         if wrong:
             note("units", name, f"{wrong}; not used; set channels.{name}.scale")
             del usable[name]
@@ -228,13 +235,18 @@ def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
     return ""
 
 
-def _too_far(name: str, values: Floats, t_s: Floats, rig: RigTable, table: RunTable) -> str:
-    """Why a position cannot be in metres where the drive's velocity is known; empty when it can."""
-    if rig.drive_stiffness_N_per_m is None or not table.drive_velocity_mps or not name.endswith("position_m"):
+def _too_far(name: str, columns: Columns, rig: RigTable, table: RunTable) -> str:
+    """Why a position cannot be in metres where the drive's motion is known; empty when it can."""
+    if rig.drive_stiffness_N_per_m is None or not name.endswith("position_m"):
         return ""
-    drive_m = abs(table.drive_velocity_mps) * float(t_s[-1] - t_s[0])
+    if table.drive_velocity_mps:
+        drive_m = abs(table.drive_velocity_mps) * float(columns["t_s"][-1] - columns["t_s"][0])
+    elif "drive_position_m" in columns:
+        drive_m = float(np.ptp(columns["drive_position_m"]))
+    else:
+        return ""
     furthest_m = _FURTHEST * (drive_m + rig.static_force_N / rig.drive_stiffness_N_per_m)
-    travel_m = float(np.ptp(values))
+    travel_m = float(np.ptp(columns[name]))
     if travel_m <= furthest_m:
         return ""
     return f"travels {travel_m:.3g}: the drive moves by {drive_m:.3g} m in this time, the unit cannot be right"
@@ -243,11 +255,12 @@ def _too_far(name: str, values: Floats, t_s: Floats, rig: RigTable, table: RunTa
 def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
     if rig.drive == "force":
         return
-    stated_mps, measured_mps = table.drive_velocity_mps, None
+    stated_mps, moved_mps = table.drive_velocity_mps, 0.0
     if "drive_position_m" in columns:
         t_s, position_m = columns["t_s"], columns["drive_position_m"]
         travel_m = float(position_m[-1] - position_m[0])
         measured_mps = travel_m / float(t_s[-1] - t_s[0])
+        moved_mps = _way_m(t_s, position_m) / float(t_s[-1] - t_s[0])  # to and fro
         if stated_mps is not None:
             text = (
                 f"moves at {measured_mps:.4g} m/s on average, drive_velocity_mps says {stated_mps:.4g}: check units and time; "
@@ -262,10 +275,16 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
             if abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps) > 0.0:
                 note("units", "drive_position_m", f"{text}; the stated one is used")
     where = "drive_position_m" if stated_mps is None else "drive_velocity_mps"
-    fastest_mps = abs((measured_mps if stated_mps is None else stated_mps) or 0.0)
+    fastest_mps = moved_mps if stated_mps is None else abs(stated_mps)
     if fastest_mps > _FASTEST * rig.stribeck_velocity_mps:
         times = fastest_mps / rig.stribeck_velocity_mps
         note("units", where, f"{fastest_mps:.3g} m/s, {times:.3g} times rig.stribeck_velocity_mps: is it in mm?")
+
+
+def _way_m(t_s: Floats, position_m: Floats) -> float:
+    """The way of a position there and back, from one tenth of a second to the next: noise must not add up."""
+    at = np.searchsorted(t_s, np.arange(t_s[0], t_s[-1], _STRIDE_S))
+    return float(np.abs(np.diff(position_m[[*at, -1]])).sum())
 
 
 def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:

@@ -49,7 +49,10 @@ def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Star
         for later in _LATER
     ]
     found: list[Start] = []
-    for fit in _refits(fitter.of_runs(still), starts, jobs)[:_BEST]:
+    unvibrated = fitter.of_runs(still)
+    if not unvibrated.floor.compared.any():  # a climb without a slip, whose force alone is known
+        return []
+    for fit in _refits(unvibrated, starts, jobs)[:_BEST]:
         found += _teeth(fitter, fit, jobs) if _is_late_in_time(fit) else [(fit.form, fit.deviations, fit.w)]
     return found
 

@@ -326,9 +326,10 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
         scales = scales_of(rig)
         commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
     if commands.motion is not None and (seconds := moving_s(commands.motion, rig)) < _SHORTEST_MOTION_S:
+        told = "mass_position_m" if "mass_position_m" in signals else "mass_accel_mps2"
         line = (
-            f"{run.file}: mass_position_m: moves for {seconds:.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
-            "least, or there is no friction to compare; leave the run out, or check channels.mass_position_m.scale"
+            f"{run.file}: {told}: moves for {seconds:.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
+            f"least, or there is no friction to compare; leave the run out, or check channels.{told}.scale"
         )
         raise Fault("BAD_EVIDENCE", line)
     start = _start(rig, signals, commands)

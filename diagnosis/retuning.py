@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
+from diagnosis.commands import SHORTEST_S
 from diagnosis.evidence import Evidence
 from diagnosis.form import NOTHING
 from diagnosis.gap import between, compress, differences, floor_of, gap, replicates
@@ -53,6 +54,12 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     first = replicates(problem, point, ROUGHNESS, FIRST_REPLICATES, 1)
     roughness = roughness_of(problem, first)
     floor = floor_of(problem, point, first)
+    if not any(run.commands.segments for run in problem.runs):
+        raise Fault(
+            "BAD_EVIDENCE",
+            f"{evidence.folder}: in no fitted run speed and vibration stay the same for {SHORTEST_S:g} s: must somewhere, or "
+            "nothing is compared; the vibration columns hold what was commanded, without noise; hold each command longer",
+        )
     if not floor.compared.any():
         raise Fault(
             "BAD_EVIDENCE",

@@ -8,7 +8,6 @@ away, into a valley of its own. What survives is refitted, and only the refit co
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from itertools import chain
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -304,7 +303,9 @@ def _refitted(
 def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs: int) -> list[Screened]:
     """All trials that change anything, the most promising first."""
     shares = each(jobs, _screened_share, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
-    return sorted(chain.from_iterable(shares), key=lambda one: one.chi2)
+    # in the order of the trials, or which of two as good comes first would depend on `jobs`
+    in_order = (shares[number % jobs][number // jobs] for number in range(len(trials)))
+    return sorted((one for one in in_order if one is not None), key=lambda one: one.chi2)
 
 
 def _beside(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int) -> list[Screened]:
@@ -313,13 +314,12 @@ def _beside(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int) -> list[
     return _screened(fitter, first, KNEE, others, jobs)
 
 
-def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened]:
+def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened | None]:
     base, knee, trials = work
     predicted = fitter.predicted(base.deviations, base.effects)
     origin = _Base(base, predicted, fitter.whitened(predicted, knee)[1], Directions(base, fitter.most))
     there = fitter.predicted_many([(base.deviations, base.effects | trial.form.tables(trial.w)) for trial in trials])
-    found = [_screen(fitter, origin, *one) for one in zip(trials, there, strict=True)]
-    return [one for one in found if one is not None]
+    return [_screen(fitter, origin, *one) for one in zip(trials, there, strict=True)]
 
 
 def _quick(fitter: Fitter, one: Screened) -> Work[Fit]:

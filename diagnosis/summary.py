@@ -24,8 +24,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         else:
             sentences.append("No gap beyond the stated tolerances: the rig as described explains these runs.")
         sentences.append(
-            "An effect too small to show here is not excluded, and the probabilities leave room for it: in a sealed test a third "
-            "of the rigs without a visible gap had one."
+            "An effect too small to show here is not excluded, and the probabilities leave room for it: in sealed tests more "
+            "than a quarter of the rigs without a visible gap had one."
         )
     elif diagnosis.verdict == "unexplained":
         sentences.append("There is a gap, and nothing in the library explains it.")
@@ -91,6 +91,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 f"On {kept}, kept aside, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
                 f"{percent(gap.shrinkage)} of what could be closed{between}."
             )
+        elif diagnosis.effects:
+            sentences.append(f"On {kept}, kept aside, there is no gap to close: new data have not tested the name.")
         if diagnosis.effects and gap.with_effect > MORE_THAN_RIGHT:
             sentences.append(
                 f"A right explanation leaves about 1 there, not {times(gap.with_effect)}: something else acts as well, if only "

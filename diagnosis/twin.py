@@ -209,8 +209,6 @@ def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
         s.even_m = s.s_d
         if start.drive_m is not None and p.ripple_wavelength_m > 0.0:
             p.ripple_phase_rad += 2.0 * math.pi * (even_m(p, start.drive_m) - s.s_d) / p.ripple_wavelength_m
-        s.force_lag_1 = s.force_lag_2 = held_N
-        s.delay_line[:] = held_N
 
 
 @kernel

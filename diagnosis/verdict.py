@@ -209,11 +209,11 @@ def judge(
         scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
     else:
         scores["unexplained"] = min(unknown, scores["none"] - _NO_ALARM)
-    for one in reversed(ranked):  # the better one of two forms last
-        scores[one.fit.form.effects[0]] = one.evidence
-    if double is not None:
-        for name in double.fit.form.effects:
+    alone = {one.fit.form.effects[0]: one.evidence for one in reversed(ranked)}  # the better one of two forms last
+    if double is not None:  # both as probable, so the stronger one first
+        for name in sorted(double.fit.form.effects, key=lambda name: -alone.get(name, -math.inf)):
             scores[name] = double.evidence - math.log(2.0)
+    scores |= {name: evidence for name, evidence in alone.items() if name not in scores}
     for name in EFFECTS:
         scores.setdefault(name, -30.0)
     top = max(scores, key=lambda name: scores[name])

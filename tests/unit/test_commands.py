@@ -73,3 +73,17 @@ def test_a_stop_has_no_velocity(rig, noise_m, zero_m):
         run = Run("run-01.csv", np.arange(BLOCKS) * 1e-3, {"drive_position_m": position_m}, {}, None, False)
         found = commands_of(run, rig, {"drive_position_m": position_m}).segments
         assert [one.drive_velocity_mps for one in found] == pytest.approx(segments, rel=2e-3, abs=0.0)
+
+
+def test_what_changes_too_soon_is_counted(rig):
+    assert read(rig, velocity_mps(0.0)).changing_s == pytest.approx(0.0, abs=0.2)
+    t_s = (np.arange(BLOCKS) + 0.5) * 1e-3
+    sweep = {
+        "vibration_frequency_Hz": np.where(t_s < 4.0, 1000.0 + 100.0 * t_s, 0.0),
+        "vibration_amplitude_m": np.full(BLOCKS, 1e-8),
+    }
+    position_m = 1e-3 * t_s
+    run = Run("run-01.csv", t_s, {"drive_position_m": position_m, **sweep}, {}, 1e-3, False)
+    found = commands_of(run, rig, {"drive_position_m": position_m})
+    assert found.changing_s == pytest.approx(4.0, abs=0.01)
+    assert len(found.segments) == 1

@@ -209,6 +209,8 @@ def test_folders_of_the_same_name_keep_apart(tmp_path):
         (["--json", "rig/run-01.csv"], "CONFIG"),
         (["--apply", "rig/manifest.toml"], "CONFIG"),
         (["--json", "a", "--report", "./a"], "CONFIG"),
+        (["--report", "-"], "CONFIG"),
+        (["--apply", "-"], "CONFIG"),
     ],
 )
 def test_what_cannot_be_written_is_said_before_the_work(options, code, tmp_path, monkeypatch):

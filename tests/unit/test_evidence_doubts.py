@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from bridge.faults import Fault
@@ -222,3 +224,63 @@ def test_a_drive_that_rests_before_it_starts_is_not_cut_off(tmp_path: Path) -> N
     data["drive_position_m"] = 0.01 + np.cumsum(velocity_mps) / 2000
     manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "")
     assert kinds(load_evidence(folder(tmp_path, data, manifest))) == {}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (
+            lambda values: np.where(np.arange(4000) < 2500, np.nan, values),
+            "2500 of 4000 samples are no finite number, first row 1",
+        ),
+        (
+            lambda values: np.where(np.arange(4000) == 7, np.nan, values),
+            "1 of 4000 samples are no finite number, first row 8",
+        ),
+        (lambda values: values * 1e6, "reaches 0.02: must be below 0.001, the unit cannot be right; set channels"),
+    ],
+    ids=["blank where it is off", "one", "in um"],
+)
+def test_a_vibration_that_cannot_be_read_is_not_left_out(
+    tmp_path: Path, spoil: Callable[[np.ndarray], np.ndarray], said: str
+) -> None:
+    """The model would run without it beside a run with it."""
+    data = columns()
+    slow_accelerometer(data)
+    data["vibration_amplitude_m"] = spoil(data["vibration_amplitude_m"])
+    with pytest.raises(Fault, match=f"BAD_EVIDENCE: run-01.parquet: vibration_amplitude_m: {said}"):
+        load_evidence(folder(tmp_path, data))
+
+
+def test_positions_in_mm_are_told_where_the_drive_goes_to_and_fro(tmp_path: Path) -> None:
+    """Net it goes nowhere, and no velocity is stated."""
+    data = columns()
+    to_and_fro_m = 2e-3 * (1.0 - np.abs(np.linspace(-1.0, 1.0, 4000)))
+    for scale, kind in ((1.0, None), (1000.0, "units")):
+        data["drive_position_m"] = scale * to_and_fro_m
+        manifest = MANIFEST.replace("drive_velocity_mps = 0.0005", "")
+        found = kinds(load_evidence(folder(tmp_path, data, manifest)))
+        assert list(found) == ([kind] if kind else [])
+    assert "drive_position_m: 2 m/s, 4e+03 times rig.stribeck_velocity_mps: is it in mm?" in found["units"]
+    data["drive_position_m"], data["mass_position_m"] = to_and_fro_m, 1000.0 * to_and_fro_m
+    found = kinds(load_evidence(folder(tmp_path, data, manifest)))
+    assert "mass_position_m: travels 2: the drive moves by 0.002 m" in found["units"]
+
+
+def test_a_mapped_column_that_one_run_lacks_is_told_and_one_that_all_lack_is_refused(tmp_path: Path) -> None:
+    data = columns()
+    channels = '[channels]\nmass_accel_mps2 = { column = "acc" }\n[[run]]'
+    manifest = MANIFEST.replace("[[run]]", channels) + '[[run]]\nfile = "run-02.parquet"\ndrive_velocity_mps = 0.0005\n'
+    other = {"acc": data.pop("mass_accel_mps2"), **data}
+    pq.write_table(pa.table(other), folder(tmp_path, data, manifest) / "run-02.parquet")
+    evidence = load_evidence(tmp_path)
+    assert ["mass_accel_mps2" in run.columns for run in evidence.runs] == [False, True]
+    assert (
+        "run-01.parquet: mass_accel_mps2: column acc: not in the file; known here: drive_force_N"
+        in kinds(evidence)["column"]
+    )
+    pq.write_table(pa.table(data), tmp_path / "run-02.parquet")
+    with pytest.raises(
+        Fault, match=r"column acc: not in the file; known .*; no run has it: correct channels.mass_accel_mps2"
+    ):
+        load_evidence(tmp_path)

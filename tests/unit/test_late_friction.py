@@ -42,3 +42,10 @@ def test_runs_add_up(late):
 
     parts = [late.of_runs({"run-02.parquet"}), late.of_runs({"run-01.parquet", "run-03.parquet"})]
     assert sum(left(part) for part in parts) == pytest.approx(left(late))
+
+
+def test_runs_without_vibration_of_which_nothing_is_compared_start_nothing(late, monkeypatch):
+    nothing = late.of_runs({"run-01.parquet"})
+    nothing.floor = nothing.floor._replace(compared=np.zeros_like(nothing.floor.compared))
+    monkeypatch.setattr(late, "of_runs", lambda _files: nothing)
+    assert late_starts(late, trials(late.problem)) == []

@@ -272,3 +272,14 @@ def test_a_number_known_exactly_has_not_moved():
     tail = rig_row(Parameter("stribeck_tail", 0.0, -0.12, 0.4))
     assert tail.tolerance == "± 0.4"
     assert tail.shift_sd == pytest.approx(-0.3)
+
+
+def test_a_name_that_the_runs_kept_aside_do_not_test_says_so(tmp_path):
+    made = made_up.diagnosis()
+    untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
+    assert any(
+        "kept aside, there is no gap to close: new data have not tested the name" in one for one in summary(untested)
+    )
+    page = text_of(page_of(untested, tmp_path))
+    assert "There is no gap to close on these runs: they do not test what is named." in page
+    assert "Nothing is named" not in page

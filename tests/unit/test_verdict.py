@@ -227,3 +227,10 @@ def test_what_few_waves_leave_of_a_rough_track_is_no_second_effect():
     load = judge(fit(1000.0), [waves], [], EXPECTED, scatters[:1])
     assert load.named is not None
     assert len(load.named.form.effects) == 2
+
+
+def test_of_two_named_effects_the_one_that_does_more_alone_is_first():
+    pairs = [fit(50.0, "coulomb-level", "drive-backlash")]
+    for stronger, weaker in (("coulomb-level", "drive-backlash"), ("drive-backlash", "coulomb-level")):
+        verdict = judge(fit(4000.0), [fit(900.0, stronger), fit(3000.0, weaker)], pairs, EXPECTED)
+        assert list(verdict.probabilities)[:2] == [stronger, weaker]
