@@ -131,7 +131,7 @@ def recorder(
     log: LogFile = None,
     child: ChildOf = 0,
 ) -> None:
-    """Record everything on the bus until the plant ends its run."""
+    """Record everything on the bus until the plant ends its run. A log that is there already is renamed, not overwritten."""
 
     def work() -> None:
         from bridge.recorder import run as record

@@ -53,6 +53,7 @@ Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 14.0
+_CHECKS = 3
 _LEADING = 2  # fits that are refitted further: one that was not had a second effect named for what it left
 _CONTENDERS, _CONTENDS = 3, 0.3  # single effects, if they close this share of what the best one closes,
 _RIVALS = 0.9  # this one where two effects explain what none does alone
@@ -140,24 +141,20 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         again = refitted(fitter, origins, screened(fitter, origins, own, jobs), jobs)
         singles = _finished(fitter, _with(singles, again), expected_chi2, jobs)
         verdict = judge(retuned, singles, pairs, expected_chi2, random)
-    if refittable(verdict) and verdict.ranked[0].evidence < _SURE:
-        without, again = middle_fits(fitter, retuned, singles, verdict.ranked[0].fit, jobs)
-        checked = judge(without, [again], [], expected_chi2)
-        if checked.named is None:
-            others = [fit for fit in singles if fit.form.effects != again.form.effects]
-            retuned, singles, verdict = without, [again, *others], checked
+    first = Retuned(fitter, retuned, roughness, expected_chi2)
+    singles, verdict = _checked(first, singles, random, verdict, jobs)
     nearest = _nearest(retuned, singles, pairs, expected_chi2)
     if verdict.kind == "unexplained" and nearest is not None:
         progress(
             "nothing explains it on the floors of the rig without effects: once more on those of the nearest model",
             0.77,
         )
-        first = Retuned(fitter, retuned, roughness, expected_chi2)
-        again = on_floor_of(nearest, first, singles, pairs, jobs)
-        checked = judge(again.retuned.fit, again.singles, again.pairs, again.retuned.expected_chi2)
-        if checked.named is not None:
-            (fitter, retuned, _, expected_chi2), singles, pairs = again
-            random, verdict = [], checked
+        second, alone, together = on_floor_of(nearest, first, singles, pairs, jobs)
+        again = judge(second.fit, alone, together, second.expected_chi2)
+        alone, again = _checked(second, alone, [], again, jobs)
+        if again.named is not None:
+            (fitter, retuned, _, expected_chi2), singles, pairs = second, alone, together
+            random, verdict = [], again
     best = verdict.named or retuned
     unseen = [run for run in runs if run.holdout]
     held_out: HeldOut | None = None
@@ -174,6 +171,25 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         verdict = although_outside(verdict)
     progress(f"verdict: {verdict.kind}", 0.8)
     return assembled(evidence, runs, fitter, retuned, best, gone, singles, verdict, tried, held_out, began, jobs)
+
+
+def _checked(
+    rig: Retuned, singles: list[Fit], random: list[RandomFriction], verdict: Verdict, jobs: int
+) -> tuple[list[Fit], Verdict]:
+    """Single effects and the verdict, in which a name of little evidence stands up to the middle of several refits.
+
+    One that does not is set back to its middle fit, and the next one is looked at.
+    """
+    for _ in range(_CHECKS):
+        if not refittable(verdict) or verdict.ranked[0].evidence >= _SURE:
+            break
+        without, middle = middle_fits(rig.fitter, rig.fit, singles, verdict.ranked[0].fit, jobs)
+        if judge(without, [middle], [], rig.expected_chi2).named is not None:
+            break
+        others = [fit for fit in singles if fit.form.effects != middle.form.effects]
+        singles = sorted((middle, *others), key=lambda fit: fit.chi2)
+        verdict = judge(rig.fit, singles, [], rig.expected_chi2, random)
+    return singles, verdict
 
 
 def _may_scatter(verdict: Verdict, retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> bool:

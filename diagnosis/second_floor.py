@@ -11,6 +11,7 @@ from diagnosis.gap import floor_of, replicates
 from diagnosis.refit import Fit, Fitter
 from diagnosis.retuning import REPLICATES, Retuned, expected_chi2
 from diagnosis.search import best_of_each, refits
+from diagnosis.together import together
 
 _FITS = 4  # of single effects, and of pairs, that are fitted again: the others were far behind
 
@@ -37,9 +38,11 @@ def on_floor_of(best: Fit, first: Retuned, singles: list[Fit], pairs: list[Fit],
     point = old.nuisances.point(best.deviations, best.effects)
     drawn = replicates(old.problem, point, first.roughness, REPLICATES, 2, jobs)
     fitter = Fitter(old.problem, floor_of(old.problem, point, drawn, old.floor), old.nuisances)
-    alone = [first.fit, first.fit._replace(deviations=best.deviations)]
-    starts = [(fit.form, fit.deviations, fit.w) for fit in (*alone, *singles[:_FITS], *pairs[:_FITS])]
-    found = best_of_each(sorted(refits(fitter, starts, jobs), key=lambda fit: fit.chi2))
+    # first of all: the others start with its derivatives of the nuisances
+    (retuned,) = together(fitter.predicted_many, [fitter.retuning(first.fit.deviations)])
+    beside = first.fit._replace(deviations=best.deviations)
+    starts = [(fit.form, fit.deviations, fit.w) for fit in (beside, *singles[:_FITS], *pairs[:_FITS])]
+    found = best_of_each(sorted((retuned, *refits(fitter, starts, jobs)), key=lambda fit: fit.chi2))
     without, single, double = ([fit for fit in found if len(fit.form.effects) == count] for count in range(3))
     nearest = next(fit for fit in found if fit.form.effects)
     expected = expected_chi2(fitter, nearest, first.roughness, jobs)
