@@ -20,7 +20,6 @@ from controller.codes import (
     NOTHING_TO_DO,
     PIEZO_WEAK,
     PROBE,
-    RANGE,
     STANDSTILL,
     STICK,
     STICK_SEEN,
@@ -159,6 +158,6 @@ def want(p: Record, s: Record) -> None:
         if higher_Hz > s.wanted_Hz:
             s.wanted_Hz = higher_Hz
             s.wanted_m = velocity_mps * math.exp(s.log_gain) / (TWO_PI * higher_Hz)
-    # at the limit of the last step, or as good as nothing arrives where nothing holds the command back
-    helpless = s.limit == RANGE or (settled and not trusted)
+    largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz))
+    helpless = s.wanted_m > largest_m or (settled and not trusted)  # or nothing arrives, and nothing holds it back
     _judge_piezo(s, helpless and s.vibration_velocity_mps < _ALARM_RATIO * s.drive_velocity_mps)

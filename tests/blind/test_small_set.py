@@ -51,5 +51,5 @@ def test_nothing_is_found_where_nothing_is(tool):
 
 
 def test_no_wrong_name_is_sure(tool):
-    assert tool["sure_of_wrong_name"]["n"] == 15
+    assert tool["sure_of_wrong_name"]["n"] == 18
     assert tool["sure_of_wrong_name"]["value"] == 0.0
