@@ -30,7 +30,7 @@ from diagnosis.summary import summary
 from diagnosis.verdict import Verdict, refittable
 
 Floats = npt.NDArray[np.floating[Any]]
-_MUCH_CHANGING = 0.1  # of a run: ramps of a drive and a piezo take less
+_MUCH_CHANGING = 0.2  # of a run: ramps of a drive and a piezo take less
 
 
 def assembled(

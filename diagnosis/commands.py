@@ -67,12 +67,7 @@ class Commands(NamedTuple):
     amplitude_m: Floats
     segments: tuple[Segment, ...]
     motion: Motion | None = None  # of the slide, with a force drive
-
-    @property
-    def changing_s(self) -> float:
-        """How long no command stayed the same for long enough to be compared, in all."""
-        held = sum(segment.last - segment.first + _SETTLING for segment in self.segments)
-        return 0.0 if self.motion is not None else (len(self.drive) - held) * BLOCK_S
+    changing_s: float = 0.0  # in which nothing stays the same for long enough to be a segment, in all
 
 
 def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands:
@@ -106,7 +101,8 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
         for first, last in pairwise(edges)
         if (last - first) * BLOCK_S >= SHORTEST_S
     )
-    return Commands(drive, frequency_Hz, amplitude_m, segments)
+    changing = sum(last - first for first, last in pairwise(edges) if (last - first) * BLOCK_S < SHORTEST_S)
+    return Commands(drive, frequency_Hz, amplitude_m, segments, changing_s=changing * BLOCK_S)
 
 
 def _stated(velocity_mps: float, blocks: int, position_m: Floats | None) -> Floats:

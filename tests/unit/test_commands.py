@@ -1,8 +1,12 @@
 """The drive as it is read from a measured position: even between changes of speed, as measured where it takes its time."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from diagnosis import assembling
 from diagnosis.commands import commands_of
 from diagnosis.evidence import Run
 from tests.prepared import prepared
@@ -59,6 +63,9 @@ def test_a_ripple_is_no_command(rig):
     for frequency_Hz in (0.5, 3.0):
         found = read(rig, 1e-3 * (1.0 + 0.3 * np.sin(frequency_Hz * turns)))
         assert len(found.segments) == 1
+    told: Any = [SimpleNamespace(file="a.csv", commands=steady), SimpleNamespace(file="b.csv", commands=found)]
+    (finding,) = assembling._changing(told)
+    assert finding.in_words().startswith("changing         b.csv: commands: in 4 of 6 s speed or vibration change within 0.3 s")
         assert np.ptp(found.drive) == 0.0
 
 
@@ -76,7 +83,8 @@ def test_a_stop_has_no_velocity(rig, noise_m, zero_m):
 
 
 def test_what_changes_too_soon_is_counted(rig):
-    assert read(rig, velocity_mps(0.0)).changing_s == pytest.approx(0.0, abs=0.2)
+    steady = read(rig, velocity_mps(0.0))
+    assert steady.changing_s == pytest.approx(0.0, abs=0.2)
     t_s = (np.arange(BLOCKS) + 0.5) * 1e-3
     sweep = {
         "vibration_frequency_Hz": np.where(t_s < 4.0, 1000.0 + 100.0 * t_s, 0.0),
@@ -87,3 +95,6 @@ def test_what_changes_too_soon_is_counted(rig):
     found = commands_of(run, rig, {"drive_position_m": position_m})
     assert found.changing_s == pytest.approx(4.0, abs=0.01)
     assert len(found.segments) == 1
+    told: Any = [SimpleNamespace(file="a.csv", commands=steady), SimpleNamespace(file="b.csv", commands=found)]
+    (finding,) = assembling._changing(told)
+    assert finding.in_words().startswith("changing         b.csv: commands: in 4 of 6 s speed or vibration change within 0.3 s")
