@@ -114,9 +114,8 @@ class _Process:
                         stale = False
                 if received.topic is SENSORS and not started:
                     started = True
-                    if (
-                        not self._lockstep
-                    ):  # not before: the plant waits with its first block until the recorder listens
+                    if not self._lockstep:
+                        # not before: the plant waits with its first block until the recorder listens
                         self.event("START", granted)
             if time.monotonic() < due_s:
                 continue
