@@ -48,7 +48,8 @@ def calibration_error(pairs: Sequence[tuple[float, bool]]) -> Score | None:
     if found is None:
         return None
     # drawn anew the same cases are off by chance once more, so the bootstrap's quantiles are mirrored at the value
-    return found._replace(low=max(2.0 * found.value - found.high, 0.0), high=2.0 * found.value - found.low)
+    low, high = 2.0 * found.value - found.high, 2.0 * found.value - found.low
+    return found._replace(low=max(low, 0.0), high=max(high, found.value))
 
 
 def error_of_perfect(pairs: Sequence[tuple[float, bool]]) -> Score | None:

@@ -56,13 +56,10 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     sealed = _taken_up(
         part, f"--generator {name} --cases {cases} --seed {seed} with version {tool_version('tests/blind')}"
     )
-    drawn = draw(source, cases, seed)
-    todo = [
-        case for case in drawn if case.seed not in {secret.answer["counterfactual_seed"] for secret in sealed.values()}
-    ]
-    secrets.SystemRandom().shuffle(
-        todo
-    )  # drawn they lie by kind, and which was made first can be seen in some file systems
+    done = {secret.answer["counterfactual_seed"] for secret in sealed.values()}
+    todo = [case for case in draw(source, cases, seed) if case.seed not in done]
+    # drawn they lie by kind, and which was made first can be seen in some file systems
+    secrets.SystemRandom().shuffle(todo)
     try:
         for case, answer in made(source, {secrets.token_hex(6): case for case in todo}, part / _SET, jobs, known):
             sealed[case] = Secret(secrets.token_hex(16), answer)
