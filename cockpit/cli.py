@@ -140,9 +140,8 @@ def recorder(
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         path = log_path(log, made.name)
-        if (
-            not child
-        ):  # `stickslip run` writes its log anew; started by hand after an incident, this holds what happened
+        if not child:
+            # `stickslip run` writes its log anew; started by hand after an incident, the one there holds what happened
             keep_aside(path)
         record(path, made.bus, ["plant", "controller"], about_run(made, lockstep), lockstep, stop_event(child))
 

@@ -53,7 +53,7 @@ Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
 _SURE = COST_OF_EFFECT + 14.0
-_CHECKS = 3
+_CHECKS = 3  # names that may fall one after the other
 _LEADING = 2  # fits that are refitted further: one that was not had a second effect named for what it left
 _CONTENDERS, _CONTENDS = 3, 0.3  # single effects, if they close this share of what the best one closes,
 _RIVALS = 0.9  # this one where two effects explain what none does alone
