@@ -68,6 +68,12 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
             track=3,
         ),
     ),
+    # the same in a third of the time: dwells of 0.25 to 0.8 s only
+    "short": (
+        RunPlan(_steps((0.0, 0.002), (2.5, -0.002)), duration_s=5.0, track=0),
+        RunPlan(_constant(0.0006), _vibration((1.5, 3000.0), (2.7, 1200.0), (3.9, 4500.0)), duration_s=5.0, track=1),
+        RunPlan(_constant(0.0015), _vibration((2.5, 2500.0)), duration_s=4.0, holdout=True, track=2),
+    ),
     "constant": (
         RunPlan(_constant(0.0005), track=0),
         RunPlan(_constant(0.002), track=1),

@@ -1,8 +1,8 @@
 """Whether the gap was found where the effect is: cells of signal x regime x run.
 
 True are the cells in which the measured evidence differs from its counterfactual, the same rig with the same seed without the
-effect, by more than 2 floors rms and which hold 5 % or more of the whole difference. Said are those with a share of 5 % or
-more of the gap, bands taken together. The counterfactual is not retuned, the gap is: what tuning can hide counts as missed.
+effect, by more than 2 floors and which hold 5 % or more of the whole difference. Said are those with a share of 5 % or more of
+the gap. Bands are taken together. The counterfactual is not retuned, the gap is: what tuning can hide counts as missed.
 """
 
 from collections import Counter

@@ -9,8 +9,6 @@ from diagnosis.making import Case, make_evidence
 from tests.blind.generators import Plan
 from tests.blind.plant_sizes import EFFECT_SIZES, Sizes, possible
 
-PROTOCOL = "ladder"
-
 
 class PlantEffect(NamedTuple):
     """An effect as in a rig file, with the size that counts as strength 1."""
@@ -33,7 +31,12 @@ class PlantEffect(NamedTuple):
 
 
 class Plant:
-    """Rigs of the plant on the protocol of the blind sets."""
+    """Rigs of the plant.
+
+    Args:
+        protocol: of every evidence, in `diagnosis/protocols`.
+
+    """
 
     library = tuple(possible("spring", vibrated=True))
     outside = ()
@@ -41,6 +44,9 @@ class Plant:
     backbones = ()
     strongest = 1.0  # beyond, some rigs cannot be: static friction below the Coulomb friction
     wide = 1.5  # no number is drawn beyond three tolerances
+
+    def __init__(self, protocol: str = "ladder") -> None:
+        self._protocol = protocol
 
     def draw(self, random: np.random.Generator, name: str) -> PlantEffect:
         forms = EFFECT_SIZES[name]
@@ -51,7 +57,7 @@ class Plant:
 
     def make(self, folder: Path, plan: Plan, seed: int) -> None:
         effects = {effect.name: effect.numbers for effect in plan.effects}
-        case = Case(PROTOCOL, effects, leave_out=plan.leave_out, spread=plan.tolerances, rough=not plan.smooth)
+        case = Case(self._protocol, effects, leave_out=plan.leave_out, spread=plan.tolerances, rough=not plan.smooth)
         make_evidence(folder, case, seed)
 
 

@@ -10,6 +10,7 @@ A linear estimate (the difference freed of the nuisances' directions) is not eno
 """
 
 import math
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -80,15 +81,18 @@ class Bench:
         return floor_of(problem, self._described, replicates(problem, self._described, self._roughness, REPLICATES, 1))
 
     def cells(self, folder: Path) -> list[list[Any]]:
-        """Where this evidence differs: signal, regime, run, and the root mean square in floors, compressed."""
+        """Where this evidence differs: signal, regime, run, and compressed floors.
+
+        The bands' mean squares are added up, as their shares of a gap are.
+        """
         runs = _runs(folder)
-        squares: dict[tuple[str, str, str], list[float]] = {}
+        squares: dict[tuple[str, str, str], float] = defaultdict(float)
         for problem, floor in self._parts:
             there = _measured(problem, runs, self._described)
             found = cell_squares(floor, _differences(floor, problem, there))
             for (signal, regime, _, run), square in zip(cell_names(floor), found.tolist(), strict=True):
-                squares.setdefault((signal, regime, run), []).append(square)
-        return [[*cell, round(float(np.sqrt(np.mean(found))), 3)] for cell, found in squares.items()]
+                squares[signal, regime, run] += square
+        return [[*cell, round(math.sqrt(total), 3)] for cell, total in squares.items()]
 
 
 def _refitted(fitter: Fitter, deviations: Floats) -> Fit:

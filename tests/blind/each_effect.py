@@ -1,0 +1,108 @@
+"""Diagnose rigs of the plant, twenty of every effect, from barely visible to large, twenty of none, and twenty of two.
+
+14 s of runs a rig. What is done is kept in OUT and not done again by the same version; the scores are of all that is there.
+"""
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+
+from diagnosis.blind.oracle import shrinkage_with
+from diagnosis.blind.outcomes import Opened
+from diagnosis.blind.scoring import score
+from diagnosis.blind.sealing import tool_version
+from diagnosis.blind.table import TOOL, table
+from diagnosis.diagnose import diagnose
+from diagnosis.evidence import load_evidence
+from diagnosis.result import to_json
+from diagnosis.strict_json import write_json
+from tests.blind.generators import Plan
+from tests.blind.plant_cases import Plant, PlantEffect, drawn
+from tests.blind.plant_sizes import EFFECT_SIZES
+from tests.blind.sizing import Bench
+
+NONE, TWO = "no-gap", "two-effects"
+VISIBLE = 2.0  # detection limits
+ORACLE_EVERY = 4  # cases: it takes half as long as the diagnosis
+SOURCE = Plant("short")
+
+
+def done(out: Path, kind: str, number: int, seed: int, tool: str) -> tuple[Opened, float | None]:
+    """One case as it was before, or made, measured and diagnosed; with the shrinkage of the oracle where it is asked."""
+    path = out / f"{kind}-{number:02d}-of-seed-{seed}.json"
+    kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    if kept.get("tool") != tool:
+        random = np.random.default_rng([seed, number, *kind.encode()])
+        kept = {"tool": tool, **_one(kind, random, ask_oracle=kind not in {NONE, TWO} and number % ORACLE_EVERY == 0)}
+        write_json(path, kept)
+    return Opened(path.stem, kept["answer"], kept["said"]), kept["oracle"]
+
+
+def _one(kind: str, random: np.random.Generator, ask_oracle: bool) -> dict[str, Any]:
+    names = {NONE: [], TWO: random.choice(SOURCE.library, 2, replace=False).tolist()}.get(kind, [kind])
+    effects = [_effect(random, name) for name in names]
+    seed = int(random.integers(1 << 31))
+    with tempfile.TemporaryDirectory() as scratch:
+
+        def made(folder: str, plan: Plan) -> Path:
+            SOURCE.make(Path(scratch) / folder, plan, seed)
+            return Path(scratch) / folder
+
+        case = made("case", Plan(tuple(effects)))
+        bench = Bench(made("rough", Plan()), made("smooth", Plan(smooth=True))) if effects else None
+        limits = [bench.detectability(made(one.name, Plan((one,), smooth=True))) for one in effects] if bench else []
+        said = to_json(diagnose(load_evidence(case), lambda *_: None))
+        oracle = shrinkage_with(case, names) if ask_oracle else None
+    answer = {
+        "stratum": kind if kind in {NONE, TWO} else "one-effect",
+        "verdict": "effect" if effects else "no-gap",
+        "effects": [
+            {"name": one.name, "formula": SOURCE.formula(one), "detectability": round(worth, 3)}
+            for one, worth in zip(effects, limits, strict=True)
+        ],
+        "group": names if len(names) == 1 else [],
+        "tolerances": 1.0,
+        "backbone": None,
+        "leave_out": [],
+        "cells": [],
+    }
+    return {"answer": answer, "said": said, "oracle": oracle}
+
+
+def _effect(random: np.random.Generator, name: str) -> PlantEffect:
+    sizes = EFFECT_SIZES[name][random.integers(len(EFFECT_SIZES[name]))]
+    weakest = min(sizes.barely / sizes.large, sizes.large / sizes.barely)
+    return drawn(random, name, sizes).scaled(weakest ** random.random())
+
+
+parser = argparse.ArgumentParser(prog="python -m tests.blind.each_effect", description=__doc__)
+parser.add_argument("out", type=Path, metavar="OUT", help="folder of the results")
+parser.add_argument("--cases", type=int, default=20, help="of each kind")
+parser.add_argument("--seed", type=int, default=1)
+parser.add_argument("--jobs", type=int, default=joblib.cpu_count())
+
+if __name__ == "__main__":
+    asked = parser.parse_args()
+    asked.out.mkdir(parents=True, exist_ok=True)
+    version = tool_version("tests/blind")
+    work = [
+        joblib.delayed(done)(asked.out, kind, number, asked.seed, version)
+        for number in range(asked.cases)
+        for kind in (*SOURCE.library, NONE, TWO)
+    ]
+    cases: list[Opened] = []
+    oracle: dict[str, float | None] = {}
+    for case, closed in joblib.Parallel(asked.jobs, return_as="generator")(work):
+        cases.append(case)
+        if closed is not None:
+            oracle[case.name] = closed
+        said = " + ".join(sorted(case.named)) or case.verdict
+        print(f"{len(cases):4d} of {len(work)}  {case.name:45s} {case.detectability:6.2f} limits: {said}", flush=True)
+    seen = [case for case in cases if case.stratum != "one-effect" or case.detectability >= VISIBLE]
+    print(f"\n{len(cases) - len(seen)} single effects of less than {VISIBLE:g} limits are left out.")
+    print(table({TOOL: score(seen, oracle)}, sealed=False))
