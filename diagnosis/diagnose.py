@@ -45,6 +45,7 @@ from diagnosis.verdict import (
     hidden_by_noise,
     judge,
     much_left,
+    of_another_place,
     refittable,
 )
 from diagnosis.workers import one_thread
@@ -161,10 +162,18 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     gone: Fit | None = None  # what won, and is refuted
     if unseen:
         problem = Problem(evidence.rig, unseen)
+        expected = expected_chi2 / len(retuned.residual)
         held_out = HeldOut(problem, fitter.nuisances, best, retuned, roughness, jobs)
-        if verdict.named is not None and held_out.refutes(best, expected_chi2 / len(retuned.residual)):
+        if verdict.named is not None and held_out.refutes(best, expected):
             gone, best = best, retuned
-            verdict = judge(retuned, singles, pairs, expected_chi2, random, refuted=True)
+            random = random or [_random(effect, fitter, retuned, singles) for effect in RANDOM_EFFECTS]
+            other = of_another_place(gone, retuned, singles, expected_chi2, random)
+            if other is not None and other.named is not None:
+                there = HeldOut(problem, fitter.nuisances, other.named, retuned, roughness, jobs)
+                if not there.refutes(other.named, expected):
+                    gone, best, verdict, held_out = None, other.named, other, there
+            if gone is not None:
+                verdict = judge(retuned, singles, pairs, expected_chi2, random, refuted=True)
         elif verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
             verdict = doubted(verdict)
     if any(run.pick_up for run in evidence.runs):

@@ -16,6 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from diagnosis.axis_features import friction_share
 from diagnosis.commands import Commands
+from diagnosis.cycles import turning_points
 from diagnosis.form import Axis, Form
 from diagnosis.gap import whitened
 from diagnosis.problem import Problem
@@ -25,7 +26,9 @@ from diagnosis.waves import friction_series
 
 Floats = npt.NDArray[np.floating[Any]]
 RANDOM: Final = "random"  # form
-_OVER: Final = {"normal-load-fluctuation": "time", "position-dependent-friction": "position"}
+LOAD: Final = "normal-load-fluctuation"
+TRACK: Final = "position-dependent-friction"
+_OVER: Final = {LOAD: "time", TRACK: "position"}
 RANDOM_EFFECTS: Final = tuple(_OVER)
 # turns in the longest run of 10 s or so: 1, 2.5, 6 Hz; in the longest way, which is of some mm: every 5, 2, 0.8 mm
 _TURNS: Final = {"time": (10.0, 25.0, 60.0), "position": (1.0, 2.5, 6.0)}
@@ -34,6 +37,10 @@ _LEAST_RATIO = 0.005
 _DRAWS = 16
 _INDEPENDENT = 0.3  # share of the covariance that is taken as independent, as so few draws know few correlations
 _SPREAD: Final = {"ratio": 0.35, "length": 0.45}  # of the estimates, relative: the grid's
+# Third and fourth standardized moment of what breakaways scatter by: 0 and 1.5 of a sine, 0 and 3 of noise. Of 19 rigs with bursts
+# of debris, made or of opened sets, all are beyond one of the two, of 23 with a load that varies narrow-band 3.
+_ONE_SIDED, _RARE = 0.4, 3.5
+_FEWEST, _FEWEST_IN_SEGMENT = 8, 2  # breakaways
 
 
 class Scattered(NamedTuple):
@@ -72,6 +79,7 @@ class RandomFriction:
 
     def __init__(self, effect: str, fitter: Fitter, base: Fit) -> None:
         self.effect = effect
+        self.in_bursts = in_bursts(fitter.problem)
         problem, over = fitter.problem, _OVER[effect]
         ratio = max(_scatter(problem, over), _LEAST_RATIO)
         if over == "time":
@@ -136,6 +144,23 @@ class RandomFriction:
 def is_random(form: Form) -> bool:
     """Whether a form has an effect whose path no prediction knows."""
     return RANDOM in form.forms.values()
+
+
+def in_bursts(problem: Problem) -> bool:
+    """Whether breakaways scatter to one side, or most of them hardly at all; also where they are too few to tell."""
+    shares: list[Floats] = []
+    for run in problem.runs:
+        for segment in run.commands.segments if "drive_force_N" in run.signals else ():
+            force_N = segment.sign * run.signals["drive_force_N"][segment.first : segment.last]
+            tops, bottoms = turning_points(force_N, problem.scales.drop_N)
+            if len(bottoms) >= _FEWEST_IN_SEGMENT:
+                share = force_N[tops[: len(bottoms)]] / problem.scales.force_N
+                shares.append((share - share.mean()) * math.sqrt(len(share) / (len(share) - 1)))
+    values = np.concatenate(shares) if shares else np.zeros(0)
+    if len(values) < _FEWEST or not values.any():
+        return True
+    values = values / values.std()
+    return float(np.mean(values**3)) > _ONE_SIDED or float(np.mean(values**4)) > _RARE
 
 
 def _scatter(problem: Problem, over: str) -> float:

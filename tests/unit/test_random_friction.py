@@ -5,13 +5,15 @@ import copy
 import numpy as np
 import pytest
 
+from diagnosis.evidence import load_evidence
 from diagnosis.form import NOTHING
 from diagnosis.gap import replicates
 from diagnosis.heldout import HeldOut
-from diagnosis.problem import Problem
-from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction
+from diagnosis.problem import Problem, prepare
+from diagnosis.random_friction import RANDOM_EFFECTS, RandomFriction, in_bursts
 from diagnosis.retuning import retuned_rig
 from diagnosis.verdict import JITTER
+from tests.blind.generator import Case, draw_effect, make
 from tests.prepared import prepared
 
 RATIO = 0.03
@@ -61,3 +63,10 @@ def test_a_random_track_is_not_taken_for_a_random_load(rig):
     track = {"form": "random", "ratio": RATIO, "wavelength_m": 1.5e-3, "seed": 7}
     gained = gained_on(rig, {"position-dependent-friction": track})
     assert gained["position-dependent-friction"] > max(gained["normal-load-fluctuation"], 0.0) + 10.0
+
+
+@pytest.mark.parametrize(("effect", "expected"), [("debris-bursts", True), ("normal-load-fluctuation", False)])
+def test_bursts_are_not_taken_for_a_load_that_goes_on(tmp_path, effect, expected):
+    make(tmp_path / "rig", Case((draw_effect(np.random.default_rng(2), effect),)), 7)
+    evidence = load_evidence(tmp_path / "rig")
+    assert in_bursts(Problem(evidence.rig, prepare(evidence))) == expected

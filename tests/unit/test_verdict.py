@@ -5,9 +5,9 @@ import pytest
 
 from diagnosis.assembling import compared_fits
 from diagnosis.form import NOTHING, Axis, Form
-from diagnosis.random_friction import Scattered
+from diagnosis.random_friction import Scattered, is_random
 from diagnosis.refit import Fit
-from diagnosis.verdict import JITTER, although_outside, doubted, judge
+from diagnosis.verdict import JITTER, although_outside, doubted, judge, of_another_place
 
 FEATURES = 100
 NUISANCES = 2
@@ -164,8 +164,8 @@ def test_no_gap_stays_the_likeliest_where_it_is_the_verdict():
 class Scatter:
     """Stands in for a random effect: what it leaves on top of a fit, and what log evidence that is worth."""
 
-    def __init__(self, left, gained, more=0.0, effect="normal-load-fluctuation"):
-        self.left, self.gained, self.more, self.effect = left, gained, more, effect
+    def __init__(self, left, gained, more=0.0, effect="normal-load-fluctuation", in_bursts=False):
+        self.left, self.gained, self.more, self.effect, self.in_bursts = left, gained, more, effect, in_bursts
 
     def on(self, under, noise):
         form = Form(under.form.forms | {self.effect: "random"}, under.form.axes)
@@ -201,12 +201,28 @@ def test_what_was_refuted_is_compared_on_the_runs_kept_aside_also_where_it_scatt
     assert [one.form.effects for one in compared_fits(refuted, named)] == [("coulomb-level",)]
 
 
-def test_what_varies_at_random_over_time_may_be_no_load():
-    load = "normal-load-fluctuation"
-    verdict = judge(fit(1000.0), [fit(900.0, "coulomb-level")], [], EXPECTED, [Scatter(50.0, 100.0)])
+def test_what_comes_in_bursts_may_be_no_load():
+    load, singles = "normal-load-fluctuation", [fit(900.0, "coulomb-level")]
+    verdict = judge(fit(1000.0), singles, [], EXPECTED, [Scatter(50.0, 100.0, in_bursts=True)])
     assert (verdict.kind, verdict.named, verdict.refuted) == ("unexplained", None, ())
     assert list(verdict.probabilities)[:2] == ["unexplained", load]
     assert 0.2 < verdict.probabilities[load] < 0.4
+    steady = judge(fit(1000.0), singles, [], EXPECTED, [Scatter(50.0, 100.0)])
+    assert steady.named is not None
+    assert steady.named.form.effects == (load,)
+    assert 0.2 < steady.probabilities["unexplained"] < 0.4
+
+
+def test_waves_that_another_place_refutes_may_be_a_track_at_random():
+    waves, scatter = fit(60.0, TRACK), [Scatter(50.0, 100.0, effect=TRACK)]
+    base, other = fit(1000.0), fit(900.0, "coulomb-level")
+    verdict = of_another_place(waves, base, [waves, other], EXPECTED, scatter)
+    assert verdict is not None
+    assert verdict.named is not None
+    assert is_random(verdict.named.form)
+    assert of_another_place(other, base, [other], EXPECTED, scatter) is None  # no track was named
+    assert of_another_place(verdict.named, base, [waves], EXPECTED, scatter) is None  # at random already
+    assert of_another_place(waves, base, [waves], EXPECTED, [Scatter(500.0, 100.0, effect=TRACK)]) is None
 
 
 def test_a_path_is_judged_by_what_it_can_explain_not_by_what_noise_takes_from_it():
