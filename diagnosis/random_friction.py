@@ -37,8 +37,8 @@ _LEAST_RATIO = 0.005
 _DRAWS = 16
 _INDEPENDENT = 0.3  # share of the covariance that is taken as independent, as so few draws know few correlations
 _SPREAD: Final = {"ratio": 0.35, "length": 0.45}  # of the estimates, relative: the grid's
-# Third and fourth standardized moment of what breakaways scatter by: 0 and 1.5 of a sine, 0 and 3 of noise. Of 19 rigs with bursts
-# of debris, made or of opened sets, all are beyond one of the two, of 23 with a load that varies narrow-band 3.
+# Third and fourth standardized moment of what breakaways scatter by: 0 and 1.5 of a sine, 0 and 3 of noise. All of 19 rigs with
+# bursts of debris, made or of opened sets, are beyond one of the two, of 39 with a load that varies narrow-band 7.
 _ONE_SIDED, _RARE = 0.4, 3.5
 _FEWEST, _FEWEST_IN_SEGMENT = 8, 2  # breakaways
 
