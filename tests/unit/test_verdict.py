@@ -181,6 +181,7 @@ class Scatter:
         (900.0, 500.0, 100.0, "unexplained", []),  # much is left that is no such scatter
         (400.0, 50.0, 90.0, "effect", ["coulomb-level", TRACK]),  # both
         (45.0, 40.0, 90.0, "effect", ["coulomb-level"]),  # nothing was left for it
+        (70.0, 48.0, 90.0, "effect", ["coulomb-level"]),  # little, which may be another formula's
     ],
 )
 def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind, effects):
