@@ -71,9 +71,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             + (f"; {numbers}." if numbers else ".")
         )
         if candidate.form == "random":
-            sentences.append(
-                "It varies at random and is known by what it scatters, not by its path: bursts would look the same."
-            )
+            sentences.append("It varies at random and is known by what it scatters, not by its path.")
         if has_own_phases(candidate.parameters):
             sentences.append("It begins in another phase in every run, so it is scatter where its phase is not known.")
     sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]

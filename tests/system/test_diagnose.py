@@ -32,8 +32,8 @@ def quiet(_text: str, _share: float) -> None:
 @pytest.fixture(scope="module")
 def short():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(PROTOCOLS, "short", SHORT)
-        yield "short"
+        patch.setitem(PROTOCOLS, "shortest", SHORT)
+        yield "shortest"
 
 
 @pytest.fixture(scope="module")

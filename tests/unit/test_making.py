@@ -21,8 +21,8 @@ BACKLASH = {"drive-backlash": {"gap_m": 1e-4}}
 @pytest.fixture
 def short(monkeypatch) -> str:
     """A protocol of two short runs."""
-    monkeypatch.setitem(PROTOCOLS, "short", SHORT)
-    return "short"
+    monkeypatch.setitem(PROTOCOLS, "shortest", SHORT)
+    return "shortest"
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -35,7 +35,8 @@ def test_every_protocol_loads_without_a_doubt(tmp_path, protocol):
     evidence = load_evidence(tmp_path)
     wrong = [finding for finding in evidence.findings if finding.kind != "missing"]
     assert not wrong
-    assert [run.holdout for run in evidence.runs] == [False, False, False, True]
+    *fitted, last = (run.holdout for run in evidence.runs)
+    assert (any(fitted), last) == (False, True)
     assert all(run.t_s[0] == 0.0 for run in evidence.runs)
 
 
