@@ -52,8 +52,7 @@ JITTER = 1.5
 _COST_OF_SECOND = 16.0  # on top, for a second effect,
 _SECOND_CLOSES = 0.5  # which must also close this share of what the first leaves,
 # and this share of what both close: less is what the first one's formula does not fit, unless it leaves much and both do not,
-# or it has no other formula. Beside a gain of 13 limits a hardening of 1.7 added 0.022 and 35 of log evidence. What varies at
-# random always leaves little: beside friction that differs by direction, of 13 limits, a track added 0.02 and was named.
+# or it has no other formula. Beside a gain of 13 limits a hardening of 1.7 added 0.022 and 35 of log evidence.
 _SECOND_ADDS = 0.025
 _UNDER_RANDOM = 2  # single effects that a random one is tried on top of
 _TEMPERATURE = 3.0  # of the probabilities: a guess
@@ -195,9 +194,10 @@ def judge(
         closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
         adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
         completes = much_left(ranked[0].fit, expected_chi2) and not much_left(double.fit, expected_chi2)
-        completes = completes and not double.scatters
+        # a path leaves little of anything: beside friction that differs by direction, at 208 of 90 expected, a track was named
+        for_nothing = double.scatters and ranked[0].fit.chi2 <= _left_by_right(base, ranked[0], expected_chi2)
         is_mismatch = adds < _SECOND_ADDS and not completes and not _is_exact(ranked[0].fit)
-        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or is_mismatch:
+        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or is_mismatch or for_nothing:
             double = None
     best = double or (ranked[0] if ranked else None)
     certain = max(base.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
