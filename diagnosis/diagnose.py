@@ -43,6 +43,7 @@ from diagnosis.verdict import (
     although_outside,
     doubted,
     hidden_by_noise,
+    is_of_one_place,
     judge,
     much_left,
     of_another_place,
@@ -166,14 +167,15 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
         held_out = HeldOut(problem, fitter.nuisances, best, retuned, roughness, jobs)
         if verdict.named is not None and held_out.refutes(best, expected):
             gone, best = best, retuned
-            random = random or [_random(effect, fitter, retuned, singles) for effect in RANDOM_EFFECTS]
-            other = of_another_place(gone, retuned, singles, expected_chi2, random)
-            if other is not None and other.named is not None:
-                there = HeldOut(problem, fitter.nuisances, other.named, retuned, roughness, jobs)
-                if not there.refutes(other.named, expected):
-                    gone, best, verdict, held_out = None, other.named, other, there
-            if gone is not None:
-                verdict = judge(retuned, singles, pairs, expected_chi2, random, refuted=True)
+            verdict_there = None
+            if is_of_one_place(gone):
+                paths = random or [_random(effect, fitter, retuned, singles) for effect in RANDOM_EFFECTS]
+                verdict_there = of_another_place(retuned, singles, expected_chi2, paths)
+            verdict = judge(retuned, singles, pairs, expected_chi2, random, refuted=True)
+            if verdict_there is not None and verdict_there.named is not None:
+                there = HeldOut(problem, fitter.nuisances, verdict_there.named, retuned, roughness, jobs)
+                if not there.refutes(verdict_there.named, expected):
+                    gone, best, verdict, held_out = None, verdict_there.named, verdict_there, there
         elif verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
             verdict = doubted(verdict)
     if any(run.pick_up for run in evidence.runs):

@@ -195,9 +195,9 @@ def judge(
         adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
         completes = much_left(ranked[0].fit, expected_chi2) and not much_left(double.fit, expected_chi2)
         # a path leaves little of anything: beside friction that differs by direction, at 208 of 90 expected, a track was named
-        for_nothing = double.scatters and ranked[0].fit.chi2 <= _left_by_right(base, ranked[0], expected_chi2)
+        needless = double.scatters and ranked[0].fit.chi2 <= _left_by_right(base, ranked[0], expected_chi2)
         is_mismatch = adds < _SECOND_ADDS and not completes and not _is_exact(ranked[0].fit)
-        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or is_mismatch or for_nothing:
+        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or is_mismatch or needless:
             double = None
     best = double or (ranked[0] if ranked else None)
     certain = max(base.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
@@ -241,16 +241,19 @@ def judge(
     return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
 
 
+def is_of_one_place(fit: Fit) -> bool:
+    """Whether a fit is waves of the track alone: elsewhere it may have others."""
+    return fit.form.effects == (TRACK,) and not is_random(fit.form)
+
+
 def of_another_place(
-    gone: Fit, base: Fit, singles: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
+    base: Fit, singles: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
 ) -> Verdict | None:
-    """The verdict without the waves of a track that another run refutes: they may be of one place, and at random in others.
+    """The verdict without the track's waves, which another run refutes, if that is friction that varies at random.
 
     A track of three waves, told by two of them, left 3.98 of 5.63 floors of a run elsewhere; what it scatters closes 0.61.
     """
-    if gone.form.effects != (TRACK,) or is_random(gone.form):
-        return None
-    verdict = judge(base, [fit for fit in singles if fit.form.effects != (TRACK,)], [], expected_chi2, random)
+    verdict = judge(base, [fit for fit in singles if not is_of_one_place(fit)], [], expected_chi2, random)
     return verdict if verdict.named is not None and is_random(verdict.named.form) else None
 
 

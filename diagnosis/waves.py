@@ -46,6 +46,7 @@ class Series(NamedTuple):
     value: Floats  # relative to the mean of its stretch
     weight: float = 1.0
     run: str = ""  # file
+    of_slips: bool = False  # one value a breakaway; else as it goes on
 
 
 def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, harmonics: int = 1) -> list[Wave]:
@@ -111,7 +112,7 @@ def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Ser
             tops, bottoms = turning_points(cut, scales.drop_N)
             if len(bottoms) >= 2:
                 at = tops[: len(bottoms)]
-                series.append(Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0, run=run.file))
+                series.append(Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0, run=run.file, of_slips=True))
             elif len(tops) == 0 and len(cut) > 500:
                 # where nothing slips the slide moves evenly, once the climb to that level is over
                 even = cut[len(cut) // 3 :]

@@ -7,7 +7,7 @@ from diagnosis.assembling import compared_fits
 from diagnosis.form import NOTHING, Axis, Form
 from diagnosis.random_friction import Scattered, is_random
 from diagnosis.refit import Fit
-from diagnosis.verdict import JITTER, although_outside, doubted, judge, of_another_place
+from diagnosis.verdict import JITTER, although_outside, doubted, is_of_one_place, judge, of_another_place
 
 FEATURES = 100
 NUISANCES = 2
@@ -217,13 +217,12 @@ def test_what_comes_in_bursts_may_be_no_load():
 def test_waves_that_another_place_refutes_may_be_a_track_at_random():
     waves, scatter = fit(60.0, TRACK), [Scatter(50.0, 100.0, effect=TRACK)]
     base, other = fit(1000.0), fit(900.0, "coulomb-level")
-    verdict = of_another_place(waves, base, [waves, other], EXPECTED, scatter)
+    verdict = of_another_place(base, [waves, other], EXPECTED, scatter)
     assert verdict is not None
     assert verdict.named is not None
     assert is_random(verdict.named.form)
-    assert of_another_place(other, base, [other], EXPECTED, scatter) is None  # no track was named
-    assert of_another_place(verdict.named, base, [waves], EXPECTED, scatter) is None  # at random already
-    assert of_another_place(waves, base, [waves], EXPECTED, [Scatter(500.0, 100.0, effect=TRACK)]) is None
+    assert of_another_place(base, [waves], EXPECTED, [Scatter(500.0, 100.0, effect=TRACK)]) is None
+    assert [is_of_one_place(one) for one in (waves, other, verdict.named)] == [True, False, False]
 
 
 def test_a_path_is_judged_by_what_it_can_explain_not_by_what_noise_takes_from_it():
