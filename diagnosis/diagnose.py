@@ -176,7 +176,7 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
                 there = HeldOut(problem, fitter.nuisances, verdict_there.named, retuned, roughness, jobs)
                 if not there.refutes(verdict_there.named, expected):
                     gone, best, verdict, held_out = None, verdict_there.named, verdict_there, there
-        elif verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
+        if verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
             verdict = doubted(verdict)
     if any(run.pick_up for run in evidence.runs):
         verdict = although_outside(verdict)
