@@ -10,12 +10,11 @@ import pyarrow as pa
 
 from bridge.faults import Fault
 from bridge.logfile import STREAMING, Damage, LogReader, block_period_ns, iter_pieces, sample_times_s
-from bridge.messages import Records
+from bridge.messages import CHANNELS, Records
 from bridge.reading import check_file
 from bridge.table_writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
 
 SUFFIXES = (".parquet", ".csv", ".mat")
-CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
 
 
 class Exported(NamedTuple):

@@ -19,6 +19,8 @@ from bridge.faults import Fault
 
 SCHEMA_VERSION = 1
 NO_BLOCK = 2**64 - 1
+# the sensors of a rig, in the order of the wire
+CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
 
 Records = npt.NDArray[Any]
 M = TypeVar("M", bound=Message)

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
+from bridge.reading import check_file
 from bridge.tables import Table, read_table
 from diagnosis.evidence_checks import Columns, checked
 from diagnosis.findings import Finding
@@ -71,6 +72,8 @@ def load_evidence(folder: Path) -> Evidence:
         for name, share in manifest.rig.tolerance.items()
         if share > 0.0 and manifest.rig.values()[name] == 0.0
     ]
+    for table in manifest.run:
+        check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
     read = [read_columns(folder / table.file, manifest.channels) for table in manifest.run]
     _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
     for table, (columns, damaged) in zip(manifest.run, read, strict=True):

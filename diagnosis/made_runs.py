@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.messages import CHANNELS
 from diagnosis.made_sensors import Chain, measured
 from diagnosis.protocols import AxisPlan, RunPlan
 from diagnosis.reduced import BLOCK_S
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.disturb import even_m, extension_m
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 from plant.simulate import run_blocks
 
 Floats = npt.NDArray[np.float64]

@@ -35,6 +35,7 @@ _FASTEST_RAD_PER_S = {
     "drive_stiffness_N_per_m": 3e4,  # likewise: 88 on the paper's rig, the plant refuses 3.14e4
 }
 _LONGEST_SLIP_S = 5.0
+_FASTEST_MPS = 10.0  # of a drive: in mm/s a slow one already is faster
 
 
 class RigTable(Strict):
@@ -110,7 +111,7 @@ class RunTable(Strict):
     """One run."""
 
     file: Annotated[str, Field(min_length=1)]
-    drive_velocity_mps: float | None = None
+    drive_velocity_mps: Annotated[float, Field(ge=-_FASTEST_MPS, le=_FASTEST_MPS)] | None = None
     holdout: bool = False
 
     @model_validator(mode="after")

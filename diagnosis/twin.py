@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
+from bridge.messages import CHANNELS
 from diagnosis.commands import Commands
 from diagnosis.lanes import LANES
 from diagnosis.manifest import RigTable
@@ -25,7 +26,7 @@ from diagnosis.side_by_side import advance_lanes
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.disturb import even_m, extension_m
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
 Effects = dict[str, dict[str, float | str]]

@@ -6,11 +6,11 @@ import numpy as np
 
 from bridge.faults import Fault
 from bridge.messages import APPLIED as APPLIED_LAYOUT
+from bridge.messages import CHANNELS, sensor_block
 from bridge.messages import COMMAND as COMMAND_LAYOUT
-from bridge.messages import sensor_block
 from bridge.topics import APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
-from plant.records import CHANNELS, NO_COMMAND, TRUTH, build
+from plant.records import NO_COMMAND, TRUTH, build
 from plant.simulate import drive_velocity_mps
 from plant.step import step
 

@@ -11,9 +11,7 @@ from plant.config import RigConfig
 from plant.disturb import LAG_CELL_S, ageing_N
 from plant.effects import LONGEST_DELAY, LONGEST_LAG_S
 
-# Rows of the array that a block fills, one column a sample. The first five are the sensors of the rig, in the order of
-# the wire; the others are what no sensor sees.
-CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+# Rows of the array that a block fills beside the sensors, one column a sample: what no sensor sees.
 TRUTH = (
     "true_drive_force_N",
     "true_friction_force_N",

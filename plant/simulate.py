@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import kernel
+from bridge.messages import CHANNELS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
 

@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from bridge.config import validate
+from bridge.messages import CHANNELS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 from plant.simulate import run_blocks
 
 BLOCK_S = 1e-3

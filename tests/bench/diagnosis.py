@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from bridge.messages import CHANNELS
 from diagnosis.commands import Commands
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence import load_evidence
@@ -17,7 +18,7 @@ from diagnosis.lanes import LANES
 from diagnosis.making import Case, make_evidence
 from diagnosis.twin import Start, built, predict_many
 from plant.config import RigConfig
-from plant.records import CHANNELS, TRUTH
+from plant.records import TRUTH
 from plant.simulate import run_blocks
 from tests.bench import case as paper
 

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bridge.messages import CHANNELS
 from plant.config import RigConfig
 from plant.effects import EFFECTS
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 from plant.simulate import run_blocks
 from tests.bench import case as paper
 

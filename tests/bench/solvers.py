@@ -8,8 +8,9 @@ import numpy as np
 from scipy.integrate import odeint, solve_ivp
 
 from bridge.kernel import kernel
+from bridge.messages import CHANNELS
 from plant.config import RigConfig
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 from plant.simulate import run_blocks
 from tests.bench import case as paper
 from tests.bench.case import Case, Floats, derivatives

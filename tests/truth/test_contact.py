@@ -8,13 +8,14 @@ from scipy.integrate import solve_ivp
 
 from bridge.config import validate
 from bridge.faults import Fault
+from bridge.messages import CHANNELS
 from cockpit.reproduce_runs import AMPLITUDE_M, STEEL_PAIRS
 from diagnosis.cycles import find_cycles
 from plant.config import RigConfig
 from plant.contact import step
 from plant.core import advance
 from plant.pairs import PAIRS
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 from plant.simulate import simulate
 
 PAIR = "C45-C45 @ 0.063"

@@ -84,8 +84,9 @@ def test_sag_by_heat_begins_when_the_piezo_is_switched_on():
 
 
 def test_a_pause_cools_it():
+    from bridge.messages import CHANNELS
     from plant.core import advance_disturbed
-    from plant.records import CHANNELS, TRUTH, build
+    from plant.records import TRUTH, build
 
     params, state = build(rig({"piezo-sag": {"form": "heat", "ratio": 0.4, "settling_s": 0.1}}))
     analogue, truth = np.empty((len(CHANNELS), 20)), np.empty((len(TRUTH), 20))

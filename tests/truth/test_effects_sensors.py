@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from bridge.messages import CHANNELS
 from plant.core import advance_disturbed
 from plant.effects import LONGEST_DELAY
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 from tests.effects_rig import HEAVY_KG, TAU, rig, run
 
 SAMPLE_S = 5e-5

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from bridge.messages import CHANNELS
 from diagnosis import twin
 from diagnosis.by_run import as_in_rig_file
 from diagnosis.commands import Commands
@@ -18,7 +19,7 @@ from diagnosis.side_by_side import advance_lanes
 from diagnosis.twin import Entry, Roughness, Start, built, predict, predict_many, rig_config
 from plant.core import advance, advance_disturbed
 from plant.effects import EFFECTS
-from plant.records import CHANNELS, TRUTH
+from plant.records import TRUTH
 from tests.prepared import prepared
 
 FORMS = [(name, form) for name, effect in EFFECTS.items() if name not in SENSOR_EFFECTS for form in effect.forms]

@@ -8,10 +8,11 @@ import pytest
 from scipy.special import lambertw
 
 from bridge.config import validate
+from bridge.messages import CHANNELS
 from cockpit.stability_map import stability_map as draw_map
 from plant.config import RigConfig
 from plant.core import advance
-from plant.records import CHANNELS, TRUTH, build
+from plant.records import TRUTH, build
 from plant.simulate import simulate
 from plant.stability import (
     contact,

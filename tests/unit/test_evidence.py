@@ -85,7 +85,12 @@ def test_a_good_folder(tmp_path: Path) -> None:
         ),
         ("run-01.parquet", "../run-01.parquet", "file = '../run-01.parquet': must lie in the evidence folder"),
         ("run-01.parquet", "run-01.xlsx", "file = 'run-01.xlsx': must end in .parquet, .csv, .mat, .mcap"),
-        ("run-01.parquet", "run-07.parquet", "run-07.parquet: no such file"),
+        ("run-01.parquet", "run-07.parquet", "run-07.parquet: no such file; correct run.file in manifest.toml"),
+        (
+            "drive_velocity_mps = 0.0005",
+            "drive_velocity_mps = 1e300",
+            "drive_velocity_mps = 1e+300: must be less than or equal to 10",
+        ),
         ("drive_velocity_mps = 0.0005", "holdout = true", "run.holdout = true for every run"),
         ("[[run]]", "[[run", "manifest.toml: not valid TOML"),
         ("[[run]]", "[run]", "manifest.toml: run: is one table: must be a list of them; write [[run]] above each"),

@@ -11,9 +11,10 @@ import pytest
 import scipy.io
 from typer.testing import CliRunner
 
-from bridge.export import CHANNELS, export
+from bridge.export import export
 from bridge.faults import Fault
 from bridge.logfile import STREAMING, LogReader, iter_pieces, read_run
+from bridge.messages import CHANNELS
 from cockpit.log_commands import log_app
 from tests.logs import short_log
 

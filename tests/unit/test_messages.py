@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 
 from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
-from bridge.messages import APPLIED, COMMAND, STATE, TRACE, Layout, sensor_block, sequence_and_time
-
-CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+from bridge.messages import APPLIED, CHANNELS, COMMAND, STATE, TRACE, Layout, sensor_block, sequence_and_time
 
 
 @pytest.mark.parametrize("layout", [COMMAND, APPLIED, TRACE, STATE, sensor_block(20), sensor_block(50)])
