@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from diagnosis.advice import UNCOUPLE
 from diagnosis.commands import SHORTEST_S
+from diagnosis.contest import Contest
 from diagnosis.evidence import Evidence
 from diagnosis.findings import Finding
 from diagnosis.flexible import flexible_differences
@@ -17,6 +18,7 @@ from diagnosis.form import Axis
 from diagnosis.gap import DEFINITION, Floor, cell_names, cell_squares, differences
 from diagnosis.heldout import Closed, HeldOut
 from diagnosis.imitation import imitators
+from diagnosis.kept_aside import Outcome
 from diagnosis.library import Trial
 from diagnosis.next_experiment import next_experiment
 from diagnosis.phases import is_phase
@@ -24,7 +26,7 @@ from diagnosis.pictures import pictures
 from diagnosis.problem import Prepared, Problem
 from diagnosis.random_friction import is_random
 from diagnosis.reduced import BLOCK_S
-from diagnosis.refit import Fit, Fitter
+from diagnosis.refit import Fit
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.summary import summary
 from diagnosis.verdict import Verdict, refittable
@@ -36,14 +38,9 @@ _MUCH_CHANGING = 0.2  # of a run: ramps of a drive and a piezo take less
 def assembled(
     evidence: Evidence,
     runs: list[Prepared],
-    fitter: Fitter,
-    retuned: Fit,
-    best: Fit,
-    gone: Fit | None,
-    singles: list[Fit],
-    verdict: Verdict,
+    contest: Contest,
+    outcome: Outcome,
     tried: list[Trial],
-    held_out: HeldOut | None,
     began: float,
     jobs: int,
 ) -> Diagnosis:
@@ -51,33 +48,30 @@ def assembled(
 
     Args:
         evidence, runs: what was read, and its runs, those kept aside among them.
-        fitter: with the floors that the fits were made on.
-        retuned: the rig without effects.
-        best: the model that is named, or `retuned`.
-        gone: what won, and is refuted.
-        singles: single effects, best first.
-        verdict: what came of the competition.
+        contest: what was fitted.
+        outcome: what came of it.
         tried: the library's trials.
-        held_out: the runs kept aside, if there are any.
         began: `time.monotonic()` when the work did.
         jobs: processes.
 
     """
+    fitter, retuned = contest.rig.fitter, contest.rig.fit
+    verdict, best, _, held_out = outcome
     nuisances = fitter.nuisances
     cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(retuned.deviations, {})))
     judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
     if held_out is not None:
         cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
-        judged = _judged(fitter, held_out, retuned, best, gone, verdict, tried, jobs)
+        judged = _judged(contest, outcome, held_out, tried, jobs)
     cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
-    by_effect = {fit.form.effects[0]: fit for fit in reversed(singles)}
+    by_effect = {fit.form.effects[0]: fit for fit in reversed(contest.singles)}
     if verdict.named is not None:
         by_effect |= dict.fromkeys(verdict.named.form.effects, verdict.named)
     elif verdict.ranked and is_random(verdict.ranked[0].fit.form):
         by_effect[verdict.ranked[0].fit.form.effects[0]] = verdict.ranked[0].fit
-    alone = {"none": retuned.chi2} | {fit.form.effects[0]: fit.chi2 for fit in reversed(singles)}
+    alone = {"none": retuned.chi2} | {fit.form.effects[0]: fit.chi2 for fit in reversed(contest.singles)}
     candidates = tuple(
         _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
         for name, probability in verdict.probabilities.items()
@@ -126,16 +120,9 @@ def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
     return [first] if again else [first, second]
 
 
-def _judged(
-    fitter: Fitter,
-    held_out: HeldOut,
-    retuned: Fit,
-    best: Fit,
-    gone: Fit | None,
-    verdict: Verdict,
-    tried: list[Trial],
-    jobs: int,
-) -> Gap:
+def _judged(contest: Contest, outcome: Outcome, held_out: HeldOut, tried: list[Trial], jobs: int) -> Gap:
+    verdict, best, gone, _ = outcome
+    fitter, retuned = contest.rig.fitter, contest.rig.fit
     closed = held_out.closed_by(best)
     compared = [
         _shrinkage(" and ".join(fit.form.effects), held_out.closed_by(fit)) for fit in compared_fits(verdict, gone)

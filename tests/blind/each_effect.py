@@ -97,7 +97,7 @@ if __name__ == "__main__":
     ]
     cases: list[Opened] = []
     oracle: dict[str, float | None] = {}
-    for case, closed in joblib.Parallel(asked.jobs, return_as="generator")(work):
+    for case, closed in joblib.Parallel(asked.jobs, return_as="generator", batch_size=1)(work):
         cases.append(case)
         if closed is not None:
             oracle[case.name] = closed
@@ -105,4 +105,7 @@ if __name__ == "__main__":
         print(f"{len(cases):4d} of {len(work)}  {case.name:45s} {case.detectability:6.2f} limits: {said}", flush=True)
     seen = [case for case in cases if case.stratum != "one-effect" or case.detectability >= VISIBLE]
     print(f"\n{len(cases) - len(seen)} single effects of less than {VISIBLE:g} limits are left out.")
+    both = [case.set_f1 for case in cases if case.stratum == TWO and case.detectability >= VISIBLE]
+    if both:
+        print(f"{len(both)} pairs have two effects of {VISIBLE:g} limits or more: mean F1 {np.mean(both):.2f}.")
     print(table({TOOL: score(seen, oracle)}, sealed=False))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis import diagnose
+from diagnosis import contest
 from diagnosis.refit import Fit
 from diagnosis.retuning import ROUGHNESS, Retuned
 from diagnosis.verdict import judge
@@ -26,9 +26,9 @@ def checked(monkeypatch, found: list[Fit], middles: dict[str, float]):
         asked.append(name)
         return none, fit(middles[name], name)
 
-    monkeypatch.setattr(diagnose, "middle_fits", middle_fits)
+    monkeypatch.setattr(contest, "middle_fits", middle_fits)
     rig = Retuned(np.nan, fit(BASE), ROUGHNESS, EXPECTED)
-    singles, verdict = diagnose._checked(rig, found, [], judge(rig.fit, found, [], EXPECTED), 1)
+    singles, verdict = contest.checked(rig, found, [], judge(rig.fit, found, [], EXPECTED), 1)
     return asked, singles, verdict
 
 

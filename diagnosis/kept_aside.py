@@ -1,0 +1,42 @@
+"""What becomes of a verdict on the runs that no fit has seen."""
+
+from typing import NamedTuple
+
+from diagnosis.contest import Contest
+from diagnosis.heldout import MORE_THAN_RIGHT, HeldOut
+from diagnosis.problem import Problem
+from diagnosis.refit import Fit
+from diagnosis.verdict import Verdict, doubted, is_of_one_place
+
+
+class Outcome(NamedTuple):
+    """The last word."""
+
+    verdict: Verdict
+    best: Fit  # what is named, or the rig without effects
+    gone: Fit | None  # what won, and is refuted
+    held_out: HeldOut | None  # the runs kept aside, if there are any
+
+
+def borne_out(contest: Contest, unseen: Problem | None, jobs: int) -> Outcome:
+    """The verdict of a contest if the runs kept aside bear it out; what else is left if they refute it."""
+    rig, verdict = contest.rig, contest.verdict
+    best = verdict.named or rig.fit
+    if unseen is None:
+        return Outcome(verdict, best, None, None)
+
+    def on(fit: Fit) -> HeldOut:
+        return HeldOut(unseen, rig.fitter.nuisances, fit, rig.fit, rig.roughness, jobs)
+
+    expected = rig.expected_chi2 / len(rig.fit.residual)
+    held_out, gone = on(best), None
+    if verdict.named is not None and held_out.refutes(best, expected):
+        verdict, gone, best = contest.refuted(), best, rig.fit
+        elsewhere = contest.elsewhere() if is_of_one_place(gone) else None
+        if elsewhere is not None and elsewhere.named is not None:
+            there = on(elsewhere.named)
+            if not there.refutes(elsewhere.named, expected):
+                verdict, gone, best, held_out = elsewhere, None, elsewhere.named, there
+    if verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
+        verdict = doubted(verdict)
+    return Outcome(verdict, best, gone, held_out)
