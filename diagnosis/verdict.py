@@ -152,6 +152,38 @@ def judge(
         refuted: the runs kept aside do not bear out the effect that wins here.
 
     """
+    alone, doubles, scale = _models(base, singles, pairs, expected_chi2, random)
+    ranked = sorted(alone, key=lambda one: -one.evidence)
+    double = max(doubles, key=lambda one: one.evidence, default=None)
+    if double is not None and ranked and not _pays(double, ranked[0], base, expected_chi2):
+        double = None
+    best = double or (ranked[0] if ranked else None)
+    scores = _of_no_effect(base, best, scale, expected_chi2) | _of_effects(ranked, double)
+    top = max(scores, key=lambda name: scores[name])
+    a_load = best is not None and best.scatters and best.fit.form.effects == (LOAD,) == (top,)
+    behind = _REFUTED if refuted else _IN_BURSTS if a_load and any(one.in_bursts for one in random) else 0.0
+    if behind > 0.0:
+        scores["unexplained"] = scores[top] + behind
+        top = "unexplained"
+    leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
+    mistaken = _mistaken(leaders, best is not None and best.scatters)
+    probabilities = _with_mistakes(_softmax(scores), leaders, mistaken)
+    if best is None or top == "none":
+        return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
+    followed = [one.fit for one in ranked if not is_random(one.fit.form)]  # no run separates a path from a path
+    if top == "unexplained":
+        nearest = followed[0] if followed and is_random(best.fit.form) else best.fit
+        gone = best.fit.form.effects if refuted else ()
+        return Verdict("unexplained", None, probabilities, nearest, tuple(ranked), scale, gone)
+    others = [fit for fit in followed if fit is not best.fit and fit.form.effects[0] not in best.fit.form.effects]
+    runner_up = others[0] if others else None
+    return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
+
+
+def _models(
+    base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
+) -> tuple[list[Model], list[Model], float]:
+    """Single effects and pairs with their evidence, and the misfit that it is divided by."""
 
     def scattered(noise: float) -> list[tuple[Fit, str, Scattered]]:
         """What lies under a random effect, the effect, and both."""
@@ -186,59 +218,46 @@ def judge(
                 alone.append(Model(wave, model(under).evidence + both.gained, scatters=True))
         else:
             doubles.append(Model(both.fit, model(under).evidence + both.gained, scatters=True))
-    ranked = sorted(alone, key=lambda one: -one.evidence)
-    double = max(doubles, key=lambda one: one.evidence, default=None)
-    if double is not None and ranked:
-        gained = double.evidence - ranked[0].evidence
-        left = max(ranked[0].fit.chi2 - expected_chi2, 1.0)
-        closed = (ranked[0].fit.chi2 - double.fit.chi2) / left
-        adds = (ranked[0].fit.chi2 - double.fit.chi2) / max(base.chi2 - double.fit.chi2, 1.0)
-        completes = much_left(ranked[0].fit, expected_chi2) and not much_left(double.fit, expected_chi2)
-        # a path leaves little of anything: beside friction that differs by direction, at 208 of 90 expected, a track was named
-        needless = double.scatters and ranked[0].fit.chi2 <= _left_by_right(base, ranked[0], expected_chi2)
-        is_mismatch = adds < _SECOND_ADDS and not completes and not _is_exact(ranked[0].fit)
-        if gained < _COST_OF_SECOND or closed < _SECOND_CLOSES or is_mismatch or needless:
-            double = None
-    best = double or (ranked[0] if ranked else None)
+    return alone, doubles, scale
+
+
+def _pays(double: Model, first: Model, base: Fit, expected_chi2: float) -> bool:
+    """Whether a second effect is worth naming beside the best single one."""
+    taken = first.fit.chi2 - double.fit.chi2
+    closed = taken / max(first.fit.chi2 - expected_chi2, 1.0)
+    adds = taken / max(base.chi2 - double.fit.chi2, 1.0)
+    completes = much_left(first.fit, expected_chi2) and not much_left(double.fit, expected_chi2)
+    # a path leaves little of anything: beside friction that differs by direction, at 208 of 90 expected, a track was named
+    needless = double.scatters and first.fit.chi2 <= _left_by_right(base, first, expected_chi2)
+    is_mismatch = adds < _SECOND_ADDS and not completes and not _is_exact(first.fit)
+    gained = double.evidence - first.evidence
+    return gained >= _COST_OF_SECOND and closed >= _SECOND_CLOSES and not is_mismatch and not needless
+
+
+def _of_no_effect(base: Fit, best: Model | None, scale: float, expected_chi2: float) -> dict[str, float]:
+    """Log evidence of `none` and `unexplained`."""
     certain = max(base.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
     against_none = 0.5 * certain / JITTER
-    scores: dict[str, float] = {"none": COST_OF_EFFECT - against_none}
+    none = COST_OF_EFFECT - against_none
     unknown = 0.5 * (base.chi2 - expected_chi2) / (scale * JITTER)
     if best is not None:  # what nobody wrote down would pay as much for its freedom as the best that somebody did
         unknown = best.evidence + 0.5 * (best.fit.chi2 - _left_by_right(base, best, expected_chi2)) / (scale * JITTER)
     unknown -= _COST_OF_UNKNOWN
     if against_none > 0.0:
-        scores["unexplained"] = max(unknown, min(against_none, COST_OF_EFFECT))
-    else:
-        scores["unexplained"] = min(unknown, scores["none"] - _NO_ALARM)
+        return {"none": none, "unexplained": max(unknown, min(against_none, COST_OF_EFFECT))}
+    return {"none": none, "unexplained": min(unknown, none - _NO_ALARM)}
+
+
+def _of_effects(ranked: list[Model], double: Model | None) -> dict[str, float]:
+    """Log evidence of every effect of the library."""
     alone = {one.fit.form.effects[0]: one.evidence for one in reversed(ranked)}  # the better one of two forms last
+    scores: dict[str, float] = {}
     if double is not None:  # both as probable, so the stronger one first
         for name in sorted(double.fit.form.effects, key=lambda name: -alone.get(name, -math.inf)):
             scores[name] = double.evidence - math.log(2.0)
-    scores |= {name: evidence for name, evidence in alone.items() if name not in scores}
-    for name in EFFECTS:
-        scores.setdefault(name, -30.0)
-    top = max(scores, key=lambda name: scores[name])
-    if refuted:
-        scores["unexplained"] = scores[top] + _REFUTED
-        top = "unexplained"
-    a_load = best is not None and best.scatters and best.fit.form.effects == (LOAD,) == (top,)
-    if a_load and any(one.in_bursts for one in random):
-        scores["unexplained"] = scores[top] + _IN_BURSTS
-        top = "unexplained"
-    leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
-    mistaken = _mistaken(leaders, best is not None and best.scatters)
-    probabilities = _with_mistakes(_softmax(scores), leaders, mistaken)
-    if best is None or top == "none":
-        return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
-    followed = [one.fit for one in ranked if not is_random(one.fit.form)]  # no run separates a path from a path
-    if top == "unexplained":
-        nearest = followed[0] if followed and is_random(best.fit.form) else best.fit
-        gone = best.fit.form.effects if refuted else ()
-        return Verdict("unexplained", None, probabilities, nearest, tuple(ranked), scale, gone)
-    others = [fit for fit in followed if fit is not best.fit and fit.form.effects[0] not in best.fit.form.effects]
-    runner_up = others[0] if others else None
-    return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
+    for name in (*alone, *EFFECTS):
+        scores.setdefault(name, alone.get(name, -30.0))
+    return scores
 
 
 def is_of_one_place(fit: Fit) -> bool:
