@@ -110,6 +110,12 @@ class Contest:
         """The verdict where the runs kept aside do not bear out what is named."""
         return self._judged(refuted=True)
 
+    def without_random(self) -> Verdict:
+        """The verdict where they do not scatter as friction that varies at random would make them."""
+        self.random = []
+        self.verdict = self._judged()
+        return self.verdict
+
     def elsewhere(self) -> Verdict | None:
         """The verdict where they have another place of the track than its waves were fitted to."""
         paths = self.random or self._random_frictions()

@@ -5,8 +5,13 @@ from typing import NamedTuple
 from diagnosis.contest import Contest
 from diagnosis.heldout import MORE_THAN_RIGHT, HeldOut
 from diagnosis.problem import Problem
+from diagnosis.random_friction import is_random
 from diagnosis.refit import Fit
 from diagnosis.verdict import Verdict, doubted, is_of_one_place
+
+# Floors that the rig without effects leaves. What varies at random scatters in every run: of 15 rigs of 2 limits or more
+# two left less, and showed no gap in the fitted runs; of 60 without a gap half, and one of them had been called a rough track.
+_NO_GAP = 1.0
 
 
 class Outcome(NamedTuple):
@@ -30,6 +35,10 @@ def borne_out(contest: Contest, unseen: Problem | None, jobs: int) -> Outcome:
 
     expected = rig.expected_chi2 / len(rig.fit.residual)
     held_out, gone = on(best), None
+    if is_random(best.form) and held_out.retuned <= _NO_GAP:
+        verdict = contest.without_random()
+        best = verdict.named or rig.fit
+        held_out = on(best)
     if verdict.named is not None and held_out.refutes(best, expected):
         verdict, gone, best = contest.refuted(), best, rig.fit
         elsewhere = contest.elsewhere() if is_of_one_place(gone) else None

@@ -13,7 +13,7 @@ _SMALL_SHARE = 0.05
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Sentences for a person at the machine."""
-    gap = diagnosis.gap
+    gap, unexplained = diagnosis.gap, diagnosis.verdict == "unexplained"
     sentences: list[str] = []
     if diagnosis.verdict == "no-gap":
         if cannot_tell(diagnosis):
@@ -27,7 +27,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             "An effect too small to show here is not excluded, and the probabilities leave room for it: in sealed tests more "
             "than a quarter of the rigs without a visible gap had one."
         )
-    elif diagnosis.verdict == "unexplained":
+    elif unexplained:
         sentences.append("There is a gap, and nothing in the library explains it.")
         if gap.refuted:
             names = " and ".join(gap.refuted)
@@ -52,8 +52,13 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         sentences.append(f"{vibrating[0].where} {vibrating[0].text}." + (f" So in {others}." if others else ""))
     if gap.runs and math.isfinite(gap.nominal):
         sentences.append(
-            f"Rig and model are {times(gap.nominal)} noise floors apart as described, and {times(gap.retuned)} after "
-            "refitting the rig's numbers inside their tolerances; 1 is a perfect model."
+            f"On {', '.join(gap.runs)}, kept aside, rig and model are {times(gap.nominal)} noise floors apart as described, and "
+            f"{times(gap.retuned)} after refitting the rig's numbers inside their tolerances; 1 is a perfect model."
+            + (
+                " So the gap shows in the fitted runs alone."
+                if unexplained and not vibrating and gap.retuned <= 1.0
+                else ""
+            )
         )
     if diagnosis.where and diagnosis.verdict != "no-gap":
         sentences.append(_where(diagnosis))

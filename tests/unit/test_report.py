@@ -199,6 +199,15 @@ def test_words_fit_what_the_runs_kept_aside_say():
     assert wording.percent(-0.003) == "0 %"
 
 
+@pytest.mark.parametrize(("retuned", "said"), [(0.97, True), (1.3, False)])
+def test_a_gap_that_the_runs_kept_aside_do_not_show_is_said_to_be_in_the_others(retuned, said):
+    made = made_up.diagnosis()
+    gap = made.gap._replace(retuned=retuned)
+    told = " ".join(summary(made._replace(verdict="unexplained", effects=(), gap=gap)))
+    assert f"kept aside, rig and model are {gap.nominal:g} noise floors apart" in told
+    assert ("So the gap shows in the fitted runs alone." in told) is said
+
+
 @pytest.mark.parametrize(
     ("left", "effects", "said"),
     [(2.2, ("drive-backlash",), False), (5.54, ("drive-backlash",), True), (5.54, (), False)],
