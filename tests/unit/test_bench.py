@@ -3,6 +3,7 @@
 import pytest
 
 from tests.bench.case import Case, error_ms, unvibrated
+from tests.bench.kernel import STEPS_S
 from tests.bench.mujoco_joint import mujoco
 from tests.bench.solvers import lsoda, ours
 
@@ -20,6 +21,11 @@ def test_truth_slips_once(first_slip: Case) -> None:
 def test_our_kernel_agrees_with_the_truth(first_slip: Case) -> None:
     run = ours(first_slip, 1e-5)
     assert error_ms(first_slip, run.t_s, run.velocity_mps) < 0.005
+
+
+@pytest.mark.parametrize("step_s", STEPS_S)
+def test_the_rig_takes_every_step_of_the_bench(first_slip: Case, step_s: float) -> None:
+    assert ours(first_slip, step_s).wall_s > 0.0
 
 
 def test_lsoda_agrees_with_the_truth(first_slip: Case) -> None:
