@@ -134,9 +134,8 @@ class Contest:
 
     def _refit_contenders(self) -> None:
         """The rig without effects from where the best effect ended, and the leading effects from each other's ends."""
-        if (
-            self.singles
-        ):  # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
+        if self.singles:
+            # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
             again = self.rig.fitter.refit(NOTHING, self.singles[0].deviations, np.zeros(0))
             self.rig = self.rig._replace(fit=min(self.rig.fit, again, key=lambda fit: fit.chi2))
         if self._shows_more():
