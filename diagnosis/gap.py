@@ -87,6 +87,11 @@ def slope_of_compress(z: Floats, knee: float = KNEE) -> Floats:
     return 1.0 / np.sqrt(1.0 + (z / knee) ** 2)
 
 
+def chi2_of(left: Floats) -> float:
+    """chi2 of what is left, whitened [compared]."""
+    return float(left @ left)
+
+
 def replicates(
     problem: Problem,
     point: Point,

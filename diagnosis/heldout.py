@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from diagnosis.by_run import Table
 from diagnosis.form import NOTHING, Form
-from diagnosis.gap import Floor, cell_squares, differences, floor_of, replicates, whitened
+from diagnosis.gap import Floor, cell_squares, chi2_of, differences, floor_of, replicates, whitened
 from diagnosis.nuisance import Nuisances
 from diagnosis.phases import PHASE, has_own_phases
 from diagnosis.problem import Problem
@@ -98,10 +98,10 @@ class HeldOut:
             left = self.left_by(fit)
             return left > _SCATTERED and self.retuned - left < _LEAST_OF_MUCH * (self.retuned - 1.0)
         residual = self._left(fit)
-        if _square(residual - self._left_retuned) < _CHANCE:
+        if chi2_of(residual - self._left_retuned) < _CHANCE:
             return False  # nothing of it would show in these runs
         expected = expected_chi2 * len(self.floor.whitening)
-        left, before = _square(residual), _square(self._left_retuned)
+        left, before = chi2_of(residual), chi2_of(self._left_retuned)
         above = max(before - expected, 0.0)
         if left > _MUCH * expected and left > before - _LEAST_OF_MUCH * above:
             return True
@@ -167,10 +167,6 @@ class HeldOut:
     @staticmethod
     def _gap(squares: Floats) -> float:
         return float(np.sqrt(squares.mean())) if len(squares) else math.nan
-
-
-def _square(values: Floats) -> float:
-    return float(values @ values)
 
 
 def _follows(table: Table) -> bool:

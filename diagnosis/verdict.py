@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.gap import chi2_of
 from diagnosis.random_friction import LOAD, TRACK, RandomFriction, Scattered, is_random
 from diagnosis.refit import Fit
 from plant.effects import EFFECTS
@@ -200,7 +201,7 @@ def _models(
     scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> Model:
-        closer = _square(base.residual) - _square(fit.residual)
+        closer = chi2_of(base.residual) - chi2_of(fit.residual)
         likelier = (base.chi2 - fit.chi2) - closer
         return Model(fit, 0.5 * closer / (scale * JITTER) + 0.5 * likelier - occam(fit))
 
@@ -296,10 +297,6 @@ def although_outside(verdict: Verdict) -> Verdict:
     swapped = {"none": verdict.probabilities["unexplained"], "unexplained": verdict.probabilities["none"]}
     probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
     return verdict._replace(kind="unexplained", probabilities=probabilities, outside=True)
-
-
-def _square(values: Floats) -> float:
-    return float(values @ values)
 
 
 def _softmax(scores: dict[str, float]) -> dict[str, float]:
