@@ -9,6 +9,7 @@ import json
 import queue
 import threading
 import time
+import uuid
 from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Annotated, Any, NamedTuple, Self
@@ -151,6 +152,7 @@ class Bus:
         self._lockstep = lockstep
         self._keep: list[Any] = []
         self._alive: set[str] = set()
+        self._claims: set[str] = set()
         self._alive_changed = threading.Condition()
         zenoh.init_log_from_env_or("off")
         self._session = (
@@ -177,12 +179,19 @@ class Bus:
         return f"{self._config.prefix}/{name}"
 
     def _on_alive(self, sample: Any) -> None:
-        role = str(sample.key_expr).rsplit("/", 1)[-1]
+        self._keep_up(self._alive, sample)
+
+    def _on_claim(self, sample: Any) -> None:
+        self._keep_up(self._claims, sample)
+
+    def _keep_up(self, names: set[str], sample: Any) -> None:
+        """Enter or strike out the last part of a token's key."""
+        name = str(sample.key_expr).rsplit("/", 1)[-1]
         with self._alive_changed:
             if sample.kind == zenoh.SampleKind.PUT:
-                self._alive.add(role)
+                names.add(name)
             else:
-                self._alive.discard(role)
+                names.discard(name)
             self._alive_changed.notify_all()
 
     def publisher(self, topic: Topic) -> Callable[[bytes], None]:
@@ -237,6 +246,20 @@ class Bus:
     def announce(self) -> None:
         """Say that this role is ready: its subscriptions are in place and its kernels are compiled."""
         self._keep.append(self._session.liveliness().declare_token(self._key(f"alive/{self._role}")))
+
+    def claim(self) -> tuple[str, Callable[[], set[str]]]:
+        """Say that this process wants its role: its claim, and a function that tells those of others."""
+        mine = uuid.uuid4().hex
+        liveliness = self._session.liveliness()
+        self._keep.append(liveliness.declare_token(self._key(f"claim/{self._role}/{mine}")))
+        listener = zenoh.handlers.Callback(self._on_claim, indirect=False)
+        self._keep.append(liveliness.declare_subscriber(self._key(f"claim/{self._role}/*"), listener, history=True))
+
+        def others() -> set[str]:
+            with self._alive_changed:
+                return self._claims - {mine}
+
+        return mine, others
 
     def alive(self, role: str) -> bool:
         """Whether `role` is on the bus now."""

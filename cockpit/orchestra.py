@@ -146,12 +146,11 @@ def _fault(failed: list[Child]) -> Fault:
             )
     followers = {FAULTS["PEER_DIED"].exit_status, FAULTS["NO_PEER"].exit_status}
     first = next((child for child in failed if child.process.returncode not in followers), failed[0])
-    kinds = {kind.exit_status: kind for kind in FAULTS.values()}
     words = first.last_words()
-    kind = kinds.get(first.process.returncode)
-    if kind is None:
+    code, _, line = words.removeprefix("stickslip: ").partition(": ")  # several faults share one exit status
+    if code not in FAULTS:
         return Fault("PEER_DIED", f"the {first.role} ended with status {first.process.returncode}: {words}")
-    return Fault(kind.code, words.removeprefix(f"stickslip: {kind.code}: ") or f"the {first.role} gave up")
+    return Fault(code, line)
 
 
 def _stop(children: list[Child]) -> None:

@@ -47,14 +47,18 @@ def run(
 
 
 def _refuse_a_second(bus: Bus, endpoint: str) -> None:
-    """Two controllers would pull one piezo to and fro, each inside its own slew limit. Raises Fault ENDPOINT_BUSY."""
+    """Two controllers would pull one piezo to and fro, each inside its own slew limit. Raises Fault ENDPOINT_BUSY.
+
+    Two that wait for one rig meet when it comes: the claims, made before, tell each of the other, and the higher one yields.
+    """
+    mine, others = bus.claim()
     bus.wait_for(["plant"], _TOLD_S)  # by then it is known who else is there, but for a moment
-    if bus.wait_for(["controller"], _AT_ONCE_S):
-        return
-    until_s = time.monotonic() + _OTHER_GONE_S
-    while bus.alive("controller"):
+    time.sleep(_AT_ONCE_S)
+    since_s = time.monotonic()
+    while (rivals := others()) or bus.alive("controller"):
         time.sleep(_AT_ONCE_S)
-        if time.monotonic() > until_s:
+        patience_s = _OTHER_GONE_S if any(rival < mine for rival in rivals) else 2.0 * _OTHER_GONE_S
+        if time.monotonic() > since_s + patience_s:
             line = f"{endpoint}: another controller is on this bus: must be one"
             raise Fault("ENDPOINT_BUSY", f"{line}; end that one, or choose another --endpoint or --prefix")
 

@@ -11,6 +11,7 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(gt=0, le=1)]
 LONGEST_WINDOW_BLOCKS = 128
+FEWEST_WINDOW_BLOCKS = 8  # below this a slope is noise: 8 blocks of 6 mN give 0.9 N/s against 5.85 N/s
 MOST_BANDS = 8
 _FEWEST_SILENT_BLOCKS = 2
 
@@ -114,9 +115,11 @@ class ControllerConfig(Strict):
             )
         for name, window_s in (("window_s", onset.window_s), ("velocity_window_s", onset.velocity_window_s)):
             blocks = window_s / self.block_s
-            if not 5 <= blocks <= LONGEST_WINDOW_BLOCKS:
+            if not FEWEST_WINDOW_BLOCKS <= blocks <= LONGEST_WINDOW_BLOCKS:
                 raise ValueError(
-                    f"onset.{name} = {window_s:g}: must hold 5 to {LONGEST_WINDOW_BLOCKS} blocks of {self.block_s:g} s"
+                    f"onset.{name} = {window_s:g}: must hold {FEWEST_WINDOW_BLOCKS} to {LONGEST_WINDOW_BLOCKS} blocks of "
+                    f"{self.block_s:g} s; write {FEWEST_WINDOW_BLOCKS * self.block_s:g} to "
+                    f"{LONGEST_WINDOW_BLOCKS * self.block_s:g}"
                 )
         if policy.too_late_from <= policy.gentle_from:
             raise ValueError(

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from bridge.kernel import Record, kernel
 from controller.codes import BLOCK
 from controller.limits import allow
-from controller.onset import contact, drive_velocity
+from controller.onset import contact, drive_velocity, fill_gap
 from controller.policy import decide, want
 from controller.vibration import burst, measure, skip
 
@@ -55,12 +55,12 @@ def step(
         position_m /= samples
         # one sample that is no number would stay in the filters for ever: such a block is as good as lost
         usable = math.isfinite(force_N + position_m + accel_mps2)
-        missing_blocks = gap_blocks if usable else gap_blocks + 1
-        if missing_blocks > 0:  # the rings hold blocks one period apart: a slope across a gap would be wrong
-            s.force_count = 0
-            s.position_count = 0
-            skip(p, s, missing_blocks)
+        s.missing_blocks += gap_blocks if usable else gap_blocks + 1
         if usable:
+            if s.missing_blocks > 0:
+                fill_gap(p, s, s.missing_blocks, force_N, position_m)
+                skip(p, s, s.missing_blocks)
+                s.missing_blocks = 0
             measure(p, s, block.base_accel_mps2)
             drive_velocity(p, s, position_m)
             contact(p, s, force_N, burst(p, s, block.mass_accel_mps2, scratch))

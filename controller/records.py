@@ -93,6 +93,7 @@ STATE = np.dtype(
         # bookkeeping
         ("steps", "i8"),
         ("block", "i8"),
+        ("missing_blocks", "i8"),  # since the last one that could be used
     ],
     align=True,
 )

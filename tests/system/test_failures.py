@@ -348,7 +348,7 @@ def test_a_rig_whose_numbers_run_away_is_no_quiet_one(tmp_path: Path) -> None:
     for more in (["--in-process"], ["--endpoint", free_endpoint()]):
         result = call("run", *endless, *more, "--log", str(tmp_path / "run.mcap"))
         assert result.returncode == FAULTS["CONFIG"].exit_status
-        assert "paper-c45-c45: the slide's velocity is no number at 0.00" in result.stderr
+        assert result.stderr.startswith("stickslip: CONFIG: paper-c45-c45: the slide's velocity is no number at 0.00")
         assert "solver.step_s = 1e-05" in result.stderr
         assert len(result.stderr.strip().splitlines()) == 1
 

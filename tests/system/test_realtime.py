@@ -68,6 +68,31 @@ def test_a_recorder_that_comes_last_misses_nothing(tmp_path: Path) -> None:
     ]
 
 
+def test_of_two_controllers_that_wait_for_one_rig_one_stays() -> None:
+    config = BusConfig(endpoint=free_endpoint())
+    controllers = [
+        subprocess.Popen([*COMMAND, "controller", "--endpoint", config.endpoint], stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    try:
+        time.sleep(2.0)  # both dial by now, or the second comes late and is refused like any other
+        with Bus(config, "plant", lockstep=False) as plant:
+            plant.announce()
+            assert not plant.wait_for({"controller"}, 60.0)
+            until_s = time.monotonic() + 30.0
+            while all(controller.poll() is None for controller in controllers) and time.monotonic() < until_s:
+                time.sleep(0.05)
+            time.sleep(1.0)
+            ended = [controller for controller in controllers if controller.poll() is not None]
+            assert [controller.returncode for controller in ended] == [FAULTS["ENDPOINT_BUSY"].exit_status]
+            assert ended[0].stderr is not None
+            assert "another controller is on this bus: must be one" in ended[0].stderr.read()
+    finally:
+        for controller in controllers:
+            controller.kill()
+            controller.communicate()
+
+
 def test_operator_stop_and_reset(tmp_path: Path) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
     arguments = ["--set", "duration_s=12.0", "--set", "controller.policy.enabled_from_s=0.0"]

@@ -83,6 +83,10 @@ from plant.config import RigConfig
             ["limits.frequency_max_Hz = 2490", "limits.frequency_min_Hz = 2420", "raise it to 2500 or more"],
         ),
         (["controller.onset.window_s=1.0"], ["window_s", "128"]),
+        (
+            ["controller.onset.window_s=0.007"],
+            ["onset.window_s = 0.007", "8 to 128 blocks of 0.001 s", "0.008 to 0.128"],
+        ),
         (["bus.endpoint=here"], ["bus.endpoint", "here"]),
         (["bus.endpoint=tls/127.0.0.1:7447"], ["bus.endpoint", "tls/127.0.0.1:7447", "tcp/"]),
         (["bus.endpoint=tcp/127.0.0.1:99999"], ["bus.endpoint", "tcp/127.0.0.1:99999", "from 1 to 65535"]),
