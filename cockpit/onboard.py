@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from bridge import stickslip_pb2 as wire
 from bridge.runlog import RunLog
@@ -13,18 +13,27 @@ from controller.replay import Change
 from plant.node import PlantNode
 
 
+class Word(NamedTuple):
+    """An operator's STOP or RESET, of `wire.Operator.Action`, that the step at `t_ns` is to obey."""
+
+    t_ns: int
+    action: int
+
+
 def run_onboard(
     scenario: Scenario,
     path: Path,
     about: dict[str, Any],
     progress: Callable[[float], None] | None = None,
     changes: Sequence[Change] = (),
+    words: Sequence[Word] = (),
 ) -> None:
     """Run a scenario and write its log, with a duration of 0 until Ctrl-C. Raises Fault LOG_WRITE.
 
     Args:
         progress: called now and then with the simulated time [s].
         changes: of the controller's configuration during the run, in order of time.
+        words: of an operator during the run, in order of time.
 
     """
     plant = PlantNode(scenario.rig, scenario.seed)
@@ -38,7 +47,7 @@ def run_onboard(
     blocks = round(scenario.duration_s / scenario.rig.solver.block_s) if scenario.duration_s > 0 else 2**62
     log.write(PLANT_EVENT, _event("plant", 0, 0, "START", "lockstep"))
     commands: list[bytes] = []
-    ahead = list(changes)
+    ahead, to_say = list(changes), list(words)
     try:
         while plant.block < blocks:
             sensors, applied = plant.advance(commands)
@@ -46,6 +55,8 @@ def run_onboard(
             log.write(*applied)
             while ahead and plant.block * plant.block_ns >= ahead[0].t_ns:
                 controller.reconfigure(ahead.pop(0).config)
+            while to_say and plant.block * plant.block_ns >= to_say[0].t_ns:
+                controller.operator(to_say.pop(0).action)
             command = controller.block(sensors.payload)
             if command is not None:
                 log.write(*command)

@@ -7,12 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bridge import stickslip_pb2 as wire
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
 from bridge.logfile import RunData, read_run
-from cockpit.onboard import run_onboard
+from cockpit.onboard import Word, run_onboard
+from cockpit.running import about_run
 from cockpit.scenario import Scenario, header
 from cockpit.verdict import judge_run
+from controller.codes import RESET, STOP
 from controller.config import ControllerConfig
 from controller.replay import Change, Replay, replay
 
@@ -36,7 +39,7 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
     recorded = table = run.configuration("controller")
     source = f"{run.path.name} with --set"
     timed: dict[int, list[str]] = {0: []}
-    for setting in settings:
+    for setting in [*_timed_then(run), *settings]:
         plain, _, time = setting.rpartition("@")
         t_ns = 0
         if plain:
@@ -51,6 +54,21 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
                 raise Fault("CONFIG", line)
         changes.append(Change(t_ns, validate(ControllerConfig, table, source)))
     return changes
+
+
+def _timed_then(run: RunData) -> list[str]:
+    """What `--closed-loop` had set from a time on when it made this log; what it set from the start is in the header."""
+    try:
+        return [setting for setting in json.loads(run.headers.get("run", {}).get("settings", "[]")) if "@" in setting]
+    except (ValueError, TypeError):
+        line = f"{run.path}: the settings of its run are damaged; take another copy of the log"
+        raise Fault("BAD_LOG", line) from None
+
+
+def _words_of(run: RunData) -> list[Word]:
+    """What the operator said, and when."""
+    words = ((STOP, wire.Operator.STOP), (RESET, wire.Operator.RESET))
+    return [Word(int(row["t_ns"]), action) for row in run.trace for bit, action in words if int(row["events"]) & bit]
 
 
 def replay_logs(paths: list[Path], from_s: float, settings: list[str], as_json: bool) -> int:
@@ -161,7 +179,11 @@ def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> in
     table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": int(run.sensors["t_ns"][-1]) * 1e-9}
     table["controller"] = changes[0].config.model_dump(mode="json")
     scenario = validate(Scenario, table, path.name)
-    run_onboard(scenario, log, {"closed_loop_of": str(path), "settings": settings}, changes=changes[1:])
+    about = about_run(scenario, lockstep=True) | {
+        "closed_loop_of": str(path),
+        "settings": [*_timed_then(run), *settings],
+    }
+    run_onboard(scenario, log, about, changes=changes[1:], words=_words_of(run))
     was, now = outcome(run), outcome(read_run(log))
     if as_json:
         print(json.dumps({"was": was._asdict(), "now": now._asdict(), "log": str(log)}))

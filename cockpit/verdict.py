@@ -1,5 +1,6 @@
 """What came of a run, read from its log alone: in numbers for scripts and in words for a mechanic."""
 
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -46,6 +47,7 @@ class Verdict(NamedTuple):
     lost_blocks: int
     lost_messages: int
     enabled_from_s: float
+    stopped_s: float  # by an operator, and no part of `after`
     before: Phase | None
     after: Phase | None
     velocity_ratio_min: float
@@ -91,9 +93,10 @@ def judge_run(run: RunData) -> Verdict:
     unreadable = [name for name in _CONTROLLED if not np.isfinite(run.sensors[name]).all()]
     t_s, force_N = t_s[finite], force_N[finite]
     sample_s = (t_s[:, None] + (np.arange(samples) + 1 - samples) * (block_s / samples)).ravel()
-    cycles = find_cycles(sample_s, force_N.ravel()) if len(t_s) else None
+    cycles = find_cycles(sample_s, force_N.ravel(), slowest_fall_s=_slowest_fall_s(run)) if len(t_s) else None
     mean_N = force_N.mean(axis=1)
     trace = run.trace
+    stops = _stops(trace, block_s)
     excited = _vibrating(trace, block_s) & (trace["t_ns"] * 1e-9 > in_charge_s)
     ratio = trace["vibration_velocity_mps"][excited] / np.maximum(trace["drive_velocity_mps"][excited], 1e-9)
     faults = [
@@ -110,13 +113,33 @@ def judge_run(run: RunData) -> Verdict:
         lost_blocks=_lost(run.sensors),
         lost_messages=sum(map(_lost, (run.sensors, run.applied, run.command, run.trace, run.state))),
         enabled_from_s=enabled_from_s,
-        before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds)),
-        after=_phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds),
+        stopped_s=sum(min(until_s - _SETTLING_S, seconds) - from_s for from_s, until_s in stops),
+        before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds), []),
+        after=_phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, stops),
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
         latency=_latency(run),
         faults=faults + [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, run.path)],
     )
+
+
+def _slowest_fall_s(run: RunData) -> float:
+    """How long a slip may last: 1.6 times that of the plant's slide on its spring, and never less than 0.1 s."""
+    if "plant" not in run.headers:
+        return 0.1
+    try:
+        rig = run.configuration("plant")["rig"]
+        return max(0.1, 3.0 * math.sqrt(rig["slide"]["mass_kg"] / rig["drive"]["stiffness_N_per_m"]))
+    except (KeyError, TypeError, ValueError, ZeroDivisionError):  # another rig need not tell
+        return 0.1
+
+
+def _stops(trace: Any, block_s: float) -> list[tuple[float, float]]:
+    """When an operator had stopped the controller, and until it was in charge again; in s."""
+    stopped = np.concatenate([[False], trace["mode"] == wire.STOPPED, [False]])
+    starts, ends = np.flatnonzero(np.diff(stopped.astype(int))).reshape(-1, 2).T
+    t_s = trace["t_ns"] * 1e-9
+    return [(t_s[start] - block_s, t_s[end - 1] + _SETTLING_S) for start, end in zip(starts, ends, strict=True)]
 
 
 def _vibrating(trace: Any, block_s: float) -> Any:
@@ -135,12 +158,17 @@ def _lost(table: Any) -> int:
     return int(sequence.max() - sequence.min() + 1 - len(np.unique(sequence)))
 
 
-def _phase(cycles: Cycles | None, t_s: Any, mean_N: Any, from_s: float, to_s: float) -> Phase | None:
-    inside = (t_s > from_s) & (t_s <= to_s)
+def _phase(
+    cycles: Cycles | None, t_s: Any, mean_N: Any, from_s: float, to_s: float, without: list[tuple[float, float]]
+) -> Phase | None:
+    def counts(at_s: Any) -> Any:
+        return ~sum(((at_s > first_s) & (at_s <= last_s) for first_s, last_s in without), np.zeros(len(at_s), bool))
+
+    inside = (t_s > from_s) & (t_s <= to_s) & counts(t_s)
     if cycles is None or not inside.any():
         return None
-    slips = cycles.between(from_s, to_s).slips
-    seconds = to_s - from_s
+    slips = int(np.count_nonzero(counts(cycles.between(from_s, to_s).breakaway_t_s)))
+    seconds = to_s - from_s - sum(max(min(last_s, to_s) - max(first_s, from_s), 0.0) for first_s, last_s in without)
     # the first ramp of a run starts from an unloaded spring: no part of the swing of what follows
     later = inside & (t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
     steady = later if later.any() else inside
@@ -172,6 +200,8 @@ def in_words(verdict: Verdict) -> list[str]:
         lines.append(
             f"after    {v.after.slips} slips in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
         )
+    if v.stopped_s > 0:
+        lines.append(f"stopped  by an operator for {v.stopped_s:.1f} s, which is no part of what came after")
     if v.velocity_ratio_max > 0:
         low = "ok" if v.velocity_ratio_min >= _ALARM_RATIO else f"below {_ALARM_RATIO}: stick-slip may return"
         lines.append(f"v_a/v_d  {v.velocity_ratio_min:.2f} to {v.velocity_ratio_max:.2f} while vibrating ({low})")

@@ -94,11 +94,12 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
     events = trace["events"][order].astype(np.int64)
     t_ns = trace["t_ns"][order].astype(np.int64)
     gaps = trace["gap_blocks"][order].astype(np.int64)
-    twice = np.flatnonzero((np.diff(sequence) == 0) & (np.diff(t_ns) != 0))
+    twice = np.flatnonzero(np.diff(sequence) == 0)
     if len(twice):
         at_s, again_s = 1e-9 * t_ns[twice[0]], 1e-9 * t_ns[twice[0] + 1]
         line = f"/trace: step {sequence[twice[0]]} is there at {at_s:.3f} s and again at {again_s:.3f} s"
-        raise Fault("BAD_LOG", f"{line}: the controller was started again; record every controller in a log of its own")
+        why = "the controller was started again, or two answered"
+        raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a log of its own")
     rows = _rows(run.sensors, block, events)
     sensors = _writable(run.sensors)
 

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
 from bridge.logfile import RunData, read_run
 from bridge.runlog import RunLog
 from bridge.topics import SENSORS
 from cockpit.cli import app
-from cockpit.onboard import run_onboard
+from cockpit.onboard import Word, run_onboard
 from cockpit.replaying import changes_of
 from cockpit.scenario import Scenario, header, load_scenario
+from cockpit.verdict import in_words, judge_run
 from controller.node import ControllerNode
 from controller.replay import replay
 from plant.node import PlantNode
@@ -137,6 +139,13 @@ def test_a_controller_that_was_started_again_is_refused(log: Path) -> None:
         replay(restarted, changes_of(run, []))
 
 
+def test_two_controllers_that_answered_at_once_are_refused(log: Path) -> None:
+    run = read_run(log)
+    both = run._replace(trace=np.repeat(run.trace, 2))
+    with pytest.raises(Fault, match=r"/trace: step 0 is there at 0.001 s and again at 0.001 s: .*or two answered"):
+        replay(both, changes_of(both, []))
+
+
 def test_what_if_names_the_change_and_says_what_it_cannot_know(log: Path) -> None:
     result = CliRunner().invoke(app, ["replay", str(log), "--set", "limits.v_ratio=1.1"])
     assert result.exit_code == 1
@@ -181,6 +190,34 @@ def test_closed_loop_compares_both(log: Path, tmp_path: Path) -> None:
     changed = json.loads(CliRunner().invoke(app, ["replay", str(log), *arguments]).stdout)
     assert changed["now"]["vibration_dose_mm2_per_s"] < changed["was"]["vibration_dose_mm2_per_s"]
     assert changed["now"]["velocity_ratio_min"] < 1.15 < changed["was"]["velocity_ratio_min"]
+
+
+def test_the_log_of_a_closed_loop_with_a_change_replays(log: Path, tmp_path: Path) -> None:
+    out, third = tmp_path / "again.mcap", tmp_path / "third.mcap"
+    change = ["--closed-loop", "--set", "limits.v_ratio=1.1@3s", "--log", str(out)]
+    assert CliRunner().invoke(app, ["replay", str(log), *change]).exit_code == 0
+    result = CliRunner().invoke(app, ["replay", str(out)])
+    assert result.exit_code == 0, result.stdout
+    assert {"scenario", "rig", "seed", "clock"} <= read_run(out).headers["run"].keys()
+    assert CliRunner().invoke(app, ["replay", str(out), "--closed-loop", "--log", str(third)]).exit_code == 0
+    assert read_run(third).trace.tobytes() == read_run(out).trace.tobytes()
+
+
+def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_the_controllers(tmp_path: Path) -> None:
+    stopped, again = tmp_path / "stopped.mcap", tmp_path / "again.mcap"
+    run = load_scenario("from-the-start", ["duration_s=14.0"])
+    words = [Word(4_000_000_000, wire.Operator.STOP), Word(9_000_000_000, wire.Operator.RESET)]
+    run_onboard(run, stopped, {}, words=words)
+    slips = judge_run(read_run(stopped))
+    assert (slips.before, slips.good) == (None, True)
+    assert slips.after is not None
+    assert slips.after.seconds == pytest.approx(8.0, abs=0.01)
+    assert slips.stopped_s == pytest.approx(5.0, abs=0.01)
+    assert "stopped  by an operator for 5.0 s, which is no part of what came after" in in_words(slips)
+    assert int(read_run(stopped).trace["slips"][-1]) >= 3
+    figures = CliRunner().invoke(app, ["replay", str(stopped), "--closed-loop", "--json", "--log", str(again)])
+    compared = json.loads(figures.stdout)
+    assert compared["was"] == compared["now"]
 
 
 def test_closed_loop_of_a_run_that_was_cut_short_takes_as_long_as_was_recorded(log: Path, tmp_path: Path) -> None:

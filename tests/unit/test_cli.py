@@ -14,8 +14,10 @@ from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
 from bridge.logfile import read_run
 from cockpit.cli import app
+from cockpit.onboard import run_onboard
 from cockpit.replaying import outcome
 from cockpit.running import keep_aside
+from cockpit.scenario import load_scenario
 from cockpit.verdict import judge_run
 from tests.logs import doctored, empty_log, short_log
 
@@ -151,6 +153,16 @@ def test_what_was_not_measured_is_no_velocity_ratio(tmp_path: Path) -> None:
         "NOT_FINITE: /sensors base_accel_mps2: 50 blocks hold a sample that is no number, first 250; they were left out"
     ]
     assert (verdict.velocity_ratio_min, verdict.velocity_ratio_max) == (pytest.approx(1.2), pytest.approx(1.2))
+
+
+def test_a_slip_of_a_heavy_slide_is_slow_and_counts(tmp_path: Path) -> None:
+    log = tmp_path / "heavy.mcap"
+    settings = ["duration_s=12.0", "rig.slide.mass_kg=60.0", "controller.policy.enabled_from_s=100.0"]
+    run_onboard(load_scenario("paper-c45-c45", settings), log, {})
+    before = judge_run(read_run(log)).before
+    assert before is not None
+    assert before.slips >= 4
+    assert before.swing_N > 3.0
 
 
 def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_path: Path) -> None:
