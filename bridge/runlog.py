@@ -3,10 +3,11 @@
 import contextlib
 import fcntl
 import json
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
@@ -18,6 +19,17 @@ FLUSH_PERIOD_S = 0.1  # a kill loses at most the open chunk: this, and never mor
 LARGEST_CHUNK_BYTES = 1 << 20  # a run in one process fills more than this in 0.1 s
 _LATEST_MESSAGES = 256  # what is further behind was not delayed: its sender began anew
 LIBRARY = f"stickslip schema {SCHEMA_VERSION}"
+
+
+def _locked(file: IO[bytes]) -> bool:
+    """Keep everybody else from writing or replacing the file; False where somebody does already."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        pass
+    return True
 
 
 class RunLog:
@@ -39,9 +51,14 @@ class RunLog:
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("wb")
-            with contextlib.suppress(OSError):  # where the file system has no locks
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # nobody may replace it meanwhile
+            # not emptied: what is there may be the log of a run that goes on
+            self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666), "wb")
+            if not _locked(self._file):
+                self._file.close()
+                line = f"{path}: is being recorded: must be another file than that of a run that goes on"
+                raise Fault("LOG_WRITE", f"{line}; wait for the end of that one, or choose another --log")
+            if path.is_file():
+                self._file.truncate(0)
         except OSError as error:
             raise Fault("LOG_WRITE", f"{path}: cannot be written: {error.strerror}; choose another --log") from None
         self._channels: dict[str, int] = {}

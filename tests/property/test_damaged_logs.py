@@ -219,9 +219,13 @@ def test_a_log_that_is_being_recorded_is_not_replaced(tmp_path: Path) -> None:
         log.write(SENSORS, block(number))
     with pytest.raises(Fault, match=r"LOG_WRITE: .*run.mcap: is being recorded: must be closed .* give another --out"):
         recover(path, path)
+    with pytest.raises(Fault, match=r"LOG_WRITE: .*run.mcap: is being recorded: .* or choose another --log"):
+        RunLog(path, lockstep=True)
     assert recover(path, other).messages > 0
     log.close()
     assert recover(path, path).messages == 3000
+    RunLog(path, lockstep=True).close()
+    assert recover(path, other).messages == 0
 
 
 def test_a_chunk_of_which_nothing_is_readable_is_no_table(tmp_path: Path) -> None:
