@@ -19,6 +19,7 @@ _INBOX_LIMIT = 256
 _PLANT_LOST_S = 1.0
 _TOLD_S = 1.0  # a rig without a token costs this
 _AT_ONCE_S = 0.05
+_UNSEEN = "is its transducer at the end of its range, or loose? without v_d nothing is vibrated"
 _OTHER_GONE_S = 0.5  # one that was killed is missed after the lease of 0.1 s
 
 
@@ -152,6 +153,10 @@ class _Process:
                 self._send[COMMAND.name](command.payload)
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
                 self._tell_unreadable()
+                if node.slipped_unmoved:
+                    self.event(
+                        "DRIVE_UNSEEN", f"block {node.last_block}: a slip, while the drive position stands: {_UNSEEN}"
+                    )
             return command is not None
         if received.topic is OPERATOR:
             self._obey(received.payload)

@@ -44,6 +44,7 @@ class ControllerNode:
         self._block_t_ns = 0  # of the last block
         self._length_checked = False
         self._operator_events = 0
+        self.slipped_unmoved = False  # in the last step a slip began while the drive position stood
 
     @property
     def amplitude_m(self) -> float:
@@ -114,11 +115,16 @@ class ControllerNode:
 
     def _step(self, sensors: Any, events: int, gap_blocks: int) -> Outgoing:
         self._operator_events = 0
+        state: Any = self._state[0]
+        slips_before = int(state.slips)
         step(
             self._params, self._state, sensors, events, gap_blocks, self.t_ns,
             self._command, self._trace, self._scratch,
         )  # fmt: skip
         self.steps += 1
+        self.slipped_unmoved = (
+            state.slips > slips_before and state.drive_velocity_mps <= self._params[0]["standstill_mps"]
+        )
         return Outgoing(COMMAND, self._command.tobytes())
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:

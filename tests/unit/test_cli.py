@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -163,6 +164,21 @@ def test_a_slip_of_a_heavy_slide_is_slow_and_counts(tmp_path: Path) -> None:
     assert before is not None
     assert before.slips >= 4
     assert before.swing_N > 3.0
+
+
+def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
+    """Here by a transducer that ends after 2 mm; 16 s at 0.5 mm/s are 8 mm."""
+    log = tmp_path / "short-range.mcap"
+    scenario = load_scenario("from-the-start", [])
+    rig = scenario.rig.model_copy(
+        update={"sensors": scenario.rig.sensors.model_copy(update={"position_range_m": 2e-3})}
+    )
+    run_onboard(scenario.model_copy(update={"rig": rig}), log, {})
+    verdict = judge_run(read_run(log))
+    assert not verdict.good
+    assert re.search(
+        r"DRIVE_UNSEEN: \d+ slips while the drive position stood, first at [4-6]\.", "\n".join(verdict.faults)
+    )
 
 
 def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_path: Path) -> None:

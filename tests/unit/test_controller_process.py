@@ -95,6 +95,18 @@ def test_a_repeated_block_is_not_fresh() -> None:
     assert bus.codes() == ["START", "STALE", "END"]
 
 
+def test_a_slip_of_a_drive_that_seems_to_stand_is_an_event() -> None:
+    controller, bus = process()
+    for number in range(60):
+        sensors = np.frombuffer(bytearray(block(number)), sensor_block(20).dtype)
+        sensors["drive_force_N"] = 10.0 - 0.3 * max(number - 50, 0)  # falls by 0.9 N in 3 ms
+        sensors["mass_accel_mps2"] = 2.0 if number > 50 else 0.0
+        bus.say(SENSORS, sensors.tobytes())
+    bus.say(PLANT_EVENT, END)
+    controller.loop(threading.Event(), "")
+    assert bus.codes() == ["START", "DRIVE_UNSEEN", "END"]
+
+
 def wait_for(true: Callable[[], bool]) -> None:
     pause = threading.Event()
     for _ in range(5000):
