@@ -75,6 +75,7 @@ class Contest:
         self.singles: list[Fit] = []
         self.pairs: list[Fit] = []
         self.random: list[RandomFriction] = []
+        self._overturned = False  # a check has taken a name back: the pairs, which hold it as it was, compete no more
         self.verdict = self._judged()
         self._tried = tried
         self._jobs = jobs
@@ -97,7 +98,7 @@ class Contest:
             self.random = self._random_frictions()
             self.verdict = self._judged()
         self._give_the_named_all_its_starts()
-        self.singles, self.verdict = checked(self.rig, self.singles, self.random, self.verdict, self._jobs)
+        self.check()
         nearest = self._nearest()
         if self.verdict.kind == "unexplained" and nearest is not None:
             progress(
@@ -105,6 +106,12 @@ class Contest:
                 0.77,
             )
             self._contest_on_floor_of(nearest)
+
+    def check(self) -> None:
+        """Let a name of little evidence stand up to several refits, or fall."""
+        found = self.verdict
+        self.singles, self.verdict = checked(self.rig, self.singles, self.random, found, self._jobs)
+        self._overturned = self.verdict is not found
 
     def refuted(self) -> Verdict:
         """The verdict where the runs kept aside do not bear out what is named."""
@@ -190,9 +197,10 @@ class Contest:
     def _contest_on_floor_of(self, nearest: Fit) -> None:
         """The leading effects on the floors of the model that comes nearest; what they were stays where none is named there."""
         rig, singles, pairs = on_floor_of(nearest, self.rig, self.singles, self.pairs, self._jobs)
-        verdict = judge(rig.fit, singles, pairs, rig.expected_chi2)
-        singles, verdict = checked(rig, singles, [], verdict, self._jobs)
+        found = judge(rig.fit, singles, pairs, rig.expected_chi2)
+        singles, verdict = checked(rig, singles, [], found, self._jobs)
         if verdict.named is not None:
+            self._overturned = verdict is not found
             self.rig, self.singles, self.pairs, self.random, self.verdict = rig, singles, pairs, [], verdict
 
     def _may_scatter(self) -> bool:
@@ -237,7 +245,8 @@ class Contest:
         return much_left(fit, self.rig.expected_chi2)
 
     def _judged(self, refuted: bool = False) -> Verdict:
-        return judge(self.rig.fit, self.singles, self.pairs, self.rig.expected_chi2, self.random, refuted)
+        pairs = [] if self._overturned else self.pairs
+        return judge(self.rig.fit, self.singles, pairs, self.rig.expected_chi2, self.random, refuted)
 
     def _finished(self, fits: list[Fit]) -> list[Fit]:
         """The fits, best first, the leading ones refitted as long as that gains where they leave much."""

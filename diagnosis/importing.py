@@ -19,7 +19,16 @@ from bridge.topics import SENSORS
 from bridge.units import unit_of
 from diagnosis.evidence import examine
 from diagnosis.findings import Finding
-from diagnosis.manifest import MANIFEST, STANDARD, ChannelMap, RigTable, RunTable, check_channel_names, read_manifest
+from diagnosis.manifest import (
+    MANIFEST,
+    STANDARD,
+    ChannelMap,
+    DriveVelocity,
+    RigTable,
+    RunTable,
+    check_channel_names,
+    read_manifest,
+)
 from diagnosis.manifest_text import manifest_text
 
 Floats = npt.NDArray[np.float64]
@@ -43,7 +52,7 @@ class SourceMap(Strict):
 class RunMap(Strict):
     """What the manifest says of the run."""
 
-    drive_velocity_mps: float | None = None
+    drive_velocity_mps: DriveVelocity | None = None
     holdout: bool = False
 
 

@@ -36,6 +36,7 @@ _FASTEST_RAD_PER_S = {
 }
 _LONGEST_SLIP_S = 5.0
 _FASTEST_MPS = 10.0  # of a drive: in mm/s a slow one already is faster
+DriveVelocity = Annotated[float, Field(ge=-_FASTEST_MPS, le=_FASTEST_MPS)]
 
 
 class RigTable(Strict):
@@ -111,7 +112,7 @@ class RunTable(Strict):
     """One run."""
 
     file: Annotated[str, Field(min_length=1)]
-    drive_velocity_mps: Annotated[float, Field(ge=-_FASTEST_MPS, le=_FASTEST_MPS)] | None = None
+    drive_velocity_mps: DriveVelocity | None = None
     holdout: bool = False
 
     @model_validator(mode="after")

@@ -57,11 +57,13 @@ class Nuisances:
         return self._tolerance[name] * self._described[name] / self.value(name, deviation)
 
     def parameters(self, deviations: Floats) -> tuple[Parameter, ...]:
-        """The rig's numbers at these deviations, the shape of its Stribeck curve included."""
+        """The rig's numbers at these deviations, as the model has them, the shape of its Stribeck curve included."""
         own = len(self.rig_names)
+        values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
+        values = self._described | values
+        values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
         numbers = [
-            Parameter(name, self._described[name], self.value(name, float(deviations[i])), self._tolerance[name])
-            for i, name in enumerate(self.rig_names)
+            Parameter(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
         ]
         return (*numbers, Parameter("stribeck_tail", 0.0, _TAIL * float(deviations[own]), _TAIL))
 

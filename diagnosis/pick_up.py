@@ -27,7 +27,7 @@ _HIGHEST = 0.45  # of the sampling rate: above it the vibration is folded down
 class PickUp(NamedTuple):
     """A vibration in the force signal of one run."""
 
-    frequency_Hz: float  # median
+    frequency_Hz: float  # as commanded; of a sweep the median
     force_N: float  # amplitude, median over the windows
     spring_N: float  # what the spring would carry
     limit_N: float  # above which it is told
@@ -60,7 +60,8 @@ def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.flo
     """The vibration in the force signal of a run of a spring drive; None where it is ordinary or cannot be known.
 
     Force, mass acceleration and the vibration's frequency are needed in `columns`, [samples] as `t_s`. Every window of 20 ms is
-    multiplied with the commanded vibration (a lock-in amplifier), the median window counts: a slip is in few of them.
+    multiplied with the commanded vibration (a lock-in amplifier), the median window of each frequency counts: a slip is in few
+    of them. Of several frequencies the one where it stands out most is told: a pick-up of a voltage grows with the frequency.
     """
     needed = {"drive_force_N", "mass_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}
     if rig.drive_stiffness_N_per_m is None or not needed <= columns.keys():
@@ -78,18 +79,26 @@ def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.flo
     if len(used) < _FEWEST_WINDOWS:
         return None
     turns = np.concatenate(([0.0], np.cumsum(frequency_Hz[1:] * np.diff(t_s))))
+    weights = np.hanning(rows)
 
     def amplitude(name: str, apart_Hz: float = 0.0) -> Floats:
         turned = columns[name] * np.exp(-2j * np.pi * (turns + apart_Hz * (t_s - t_s[0])))
-        own = turned[: windows * rows].reshape(windows, rows)[used]
-        weights = np.hanning(rows)
+        own = turned[: windows * rows].reshape(windows, rows)
         return np.abs(own @ weights) * 2.0 / float(weights.sum())
 
-    force_N = float(np.median(amplitude("drive_force_N")))
-    beside_N = max(float(np.median(amplitude("drive_force_N", apart_Hz))) for apart_Hz in (-_BESIDE_HZ, _BESIDE_HZ))
-    angular = 2.0 * np.pi * lowest_Hz[used]
-    yields = np.abs(rig.drive_stiffness_N_per_m + 1j * angular * (rig.drive_damping_Ns_per_m or 0.0))
-    spring_N = float(np.median(yields * amplitude("mass_accel_mps2") / angular**2))
-    limit_N = max(_SHARE * rig.static_force_N, _OF_SPRING * spring_N, _OF_BESIDE * beside_N)
-    found = PickUp(float(np.median(lowest_Hz[used])), force_N, spring_N, limit_N)
-    return found if force_N > limit_N else None
+    force_N, accel_mps2 = amplitude("drive_force_N"), amplitude("mass_accel_mps2")
+    beside_N = [amplitude("drive_force_N", apart_Hz) for apart_Hz in (-_BESIDE_HZ, _BESIDE_HZ)]
+
+    def of(own: npt.NDArray[np.int64]) -> PickUp:
+        angular = 2.0 * np.pi * lowest_Hz[own]
+        yields = np.abs(rig.drive_stiffness_N_per_m + 1j * angular * (rig.drive_damping_Ns_per_m or 0.0))
+        spring_N = float(np.median(yields * accel_mps2[own] / angular**2))
+        around_N = max(float(np.median(each[own])) for each in beside_N)
+        limit_N = max(_SHARE * rig.static_force_N, _OF_SPRING * spring_N, _OF_BESIDE * around_N)
+        return PickUp(float(np.median(lowest_Hz[own])), float(np.median(force_N[own])), spring_N, limit_N)
+
+    steady = used[lowest_Hz[used] == highest_Hz[used]]
+    alike = [steady[lowest_Hz[steady] == each_Hz] for each_Hz in np.unique(lowest_Hz[steady])]
+    each = [of(own) for own in alike if len(own) >= _FEWEST_WINDOWS] or [of(used)]
+    found = max(each, key=lambda one: one.limits)
+    return found if found.limits > 1.0 else None

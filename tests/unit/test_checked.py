@@ -51,3 +51,21 @@ def test_where_all_fall_nothing_is_named(monkeypatch, found):
     asked, _, verdict = checked(monkeypatch, found, {"coulomb-level": 158.0, "drive-backlash": 159.0})
     assert asked == ["coulomb-level", "drive-backlash"]
     assert verdict.named is None
+
+
+def test_what_the_runs_kept_aside_refute_is_what_they_were_asked_about(monkeypatch):
+    """Two effects that did not pay beside the name that fell would pay beside the next one."""
+    middles = {("coulomb-level",): fit(124.0, "coulomb-level"), ("drive-backlash",): fit(67.0, "drive-backlash")}
+    monkeypatch.setattr(
+        contest, "middle_fits", lambda _fitter, none, _singles, named, _jobs: (none, middles[named.form.effects])
+    )
+    monkeypatch.setattr(contest, "screened", lambda *_: [])
+    monkeypatch.setattr(contest.Contest, "_leaves_much", lambda *_: False)
+    made = contest.Contest(Retuned(np.nan, fit(125.0), ROUGHNESS, EXPECTED), [], 1)
+    made.singles = [fit(60.0, "coulomb-level"), fit(65.0, "drive-backlash")]
+    made.pairs = [fit(10.0, "coulomb-level", "static-level")]
+    made.verdict = judge(fit(125.0), made.singles, made.pairs, EXPECTED)
+    assert made.verdict.named.form.effects == ("coulomb-level",)
+    made.check()
+    assert made.verdict.named.form.effects == ("drive-backlash",)
+    assert made.refuted().refuted == ("drive-backlash",)

@@ -95,6 +95,14 @@ def test_a_file_becomes_evidence(tmp_path: Path, suffix: str) -> None:
     assert "# assumed, not measured" in (tmp_path / "evidence" / "manifest.toml").read_text()
 
 
+def test_a_drive_speed_in_mm_per_s_is_refused(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    channel_map.write_text(MAP.replace("drive_velocity_mps = 0.0005", "drive_velocity_mps = 20.0"))
+    with pytest.raises(Fault, match=r"CONFIG: .*run.drive_velocity_mps = 20"):
+        import_file(source, channel_map, tmp_path / "evidence")
+    assert not (tmp_path / "evidence").exists()
+
+
 def test_a_second_run_is_added_to_its_rig_only(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".csv")
     out = tmp_path / "evidence"

@@ -60,6 +60,28 @@ def test_it_is_found_above_the_slips_and_below_what_the_sampling_shows(frequency
     assert told.force_N == pytest.approx(1.0, rel=0.05)
 
 
+def test_of_several_frequencies_the_one_that_stands_out_is_told():
+    """A cable picks up a voltage that grows with the frequency; the run ends in a sweep."""
+    rows = round(RATE_HZ)
+    frequency_Hz = np.concatenate([np.repeat([3000.0, 1000.0, 4500.0, 2000.0], rows), np.linspace(500.0, 800.0, rows)])
+    t_s = np.arange(frequency_Hz.size) / RATE_HZ
+    wave = np.sin(2.0 * np.pi * np.cumsum(frequency_Hz) / RATE_HZ)
+    random = np.random.default_rng(1)
+    told = found(
+        {
+            "t_s": t_s,
+            "drive_force_N": 15.0 + 0.5 * (frequency_Hz / 3000.0) ** 2 * wave + random.normal(0.0, 0.02, t_s.size),
+            "mass_accel_mps2": wave + random.normal(0.0, 0.1, t_s.size),
+            "vibration_frequency_Hz": frequency_Hz,
+            "vibration_amplitude_m": np.full(t_s.size, 35e-9),
+        }
+    )
+    assert told is not None
+    assert told.frequency_Hz == 4500.0
+    assert told.force_N == pytest.approx(0.5 * 1.5**2, rel=0.02)
+    assert told.spring_N == pytest.approx(11700.0 / (2.0 * np.pi * 4500.0) ** 2, rel=0.05)
+
+
 @pytest.mark.parametrize("missing", ["mass_accel_mps2", "vibration_amplitude_m", "drive_force_N"])
 def test_nothing_is_said_of_what_cannot_be_known(missing):
     data = columns(1.0)

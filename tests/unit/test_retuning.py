@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem
 from diagnosis.retuning import retuned_rig
+from diagnosis.twin import rig_config
 from tests.prepared import prepared
 
 
@@ -42,3 +44,16 @@ def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs, straight):
 def test_evidence_without_a_gap_leaves_about_what_is_expected(straight):
     _, fit, _, expected_chi2 = straight
     assert 0.5 * expected_chi2 < fit.chi2 < 2.0 * expected_chi2
+
+
+def test_the_numbers_told_are_those_of_the_model(evidence_and_runs):
+    """Friction levels that cross: no contact breaks away below the force that it slides under."""
+    evidence, _ = evidence_and_runs
+    rig = evidence.rig.model_copy(update={"tolerance": {"coulomb_force_N": 0.1, "static_force_N": 0.1}})
+    nuisances = Nuisances(rig)
+    deviations = np.zeros(len(nuisances))
+    deviations[nuisances.rig_names.index("coulomb_force_N")] = 3.0
+    told = {parameter.name: parameter.retuned for parameter in nuisances.parameters(deviations)}
+    contact = rig_config(rig, nuisances.point(deviations, {}).values, {}, None).contact
+    assert told["coulomb_force_N"] == pytest.approx(1.3 * rig.coulomb_force_N)
+    assert told["static_force_N"] == contact.static_force_N == told["coulomb_force_N"]
