@@ -32,7 +32,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
     except UnicodeDecodeError as error:
         raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # of Python's own as well: a number of 5000 digits, brackets 1000 deep
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}") from None
 
 
@@ -45,7 +48,7 @@ def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, 
             raise Fault("CONFIG", f"--set {setting}: expected key=value, for example --set rig.slide.mass_kg=1.4")
         try:
             value = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):
             value = text
         at = result
         parts = key.strip().split(".")

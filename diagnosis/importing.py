@@ -42,7 +42,7 @@ _PRESLIDING_M = 0.22e-6
 class SourceMap(Strict):
     """How the file is written."""
 
-    sample_rate_Hz: Annotated[float, Field(gt=0)] | None = None  # where no column holds the time
+    sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = None  # where no column holds the time
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] = ","
     decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
     skip_rows: Annotated[int, Field(ge=0)] = 0

@@ -177,3 +177,10 @@ def test_pair_fills_in_what_is_not_given() -> None:
     rig = validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063", "static_force_N": 18.0}}, "test")
     assert rig.contact.static_force_N == 18.0
     assert rig.contact.stiffness_N_per_m == 77.52e6
+
+
+@pytest.mark.parametrize("text", ["mass_kg = 1" + 5000 * "0", "a = " + 5000 * "["], ids=["digits", "depth"])
+def test_a_file_that_is_too_much_for_pythons_own_reader_is_told(tmp_path: Path, text: str) -> None:
+    (tmp_path / "rig.toml").write_text(text)
+    with pytest.raises(Fault, match=r"CONFIG: .*rig.toml: not valid TOML: "):
+        read_toml(tmp_path / "rig.toml")

@@ -256,6 +256,19 @@ def test_a_time_of_any_clock_is_read(tmp_path: Path) -> None:
     assert np.diff(read_table(path).column("timestamp_ns")) == pytest.approx(500_000, abs=256)
 
 
+@pytest.mark.parametrize(
+    ("byte", "value", "expected"), [(145, 11, "its reader died of signal"), (144, 0, "it is damaged")]
+)
+def test_a_damaged_file_of_matlab_is_told(tmp_path: Path, byte: int, value: int, expected: str) -> None:
+    """The first says of a column of real numbers that it is one of complex ones: SciPy reads on behind the end of the file."""
+    scipy.io.savemat(tmp_path / "run.mat", raw())
+    damaged = bytearray((tmp_path / "run.mat").read_bytes())
+    damaged[byte] = value
+    (tmp_path / "run.mat").write_bytes(damaged)
+    with pytest.raises(Fault, match=rf"BAD_TABLE: run.mat: cannot be read as mat: .*{expected}.*; take another copy"):
+        read_table(tmp_path / "run.mat")
+
+
 def test_a_damaged_compressed_file_of_matlab_is_told(tmp_path: Path) -> None:
     path = tmp_path / "run.mat"
     scipy.io.savemat(path, {"force": np.random.default_rng(1).normal(size=4000)}, do_compression=True)
@@ -309,6 +322,27 @@ def test_a_csv_file_of_another_kind_names_place_and_remedy(tmp_path: Path, text:
         import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out")
     assert expected in caught.value.line
     assert not (tmp_path / "out").exists()
+
+
+def test_a_cell_in_another_encoding_is_told_with_its_row(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(CSV + "0,1;ü\n", encoding="latin-1")
+    table = read_table(tmp_path / "a.csv", Dialect(";", ","))
+    with pytest.raises(Fault, match=r"a.csv: column F: row 4001 = b'\\xfc': must be a number, and is no UTF-8; remove"):
+        table.column("F")
+
+
+def test_a_name_with_a_control_character_stays_readable(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    import_file(source.rename(tmp_path / "odd\x7f.csv"), channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].file == "odd\x7f.parquet"
+
+
+@pytest.mark.parametrize("rate_Hz", ["1e-9", "1e300"])
+def test_a_sample_rate_that_no_recorder_has_is_refused(tmp_path: Path, rate_Hz: str) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    channel_map.write_text(f"[source]\nsample_rate_Hz = {rate_Hz}\n" + MAP)
+    with pytest.raises(Fault, match=r"CONFIG: .*source.sample_rate_Hz = .*must be"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
 
 
 def test_a_csv_file_in_another_encoding(tmp_path: Path) -> None:
