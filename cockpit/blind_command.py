@@ -32,7 +32,10 @@ class Source(StrEnum):
 @blind_app.command("make")
 def blind_make(
     cases: Annotated[int, typer.Option(help="How many; 200 or more tell something.")],
-    seed: Annotated[int, typer.Option(min=0, help="The same seed makes the same evidence, under other names.")],
+    seed: Annotated[
+        int,
+        typer.Option(min=0, help="The same seed makes the same evidence, under other names; once opened it is spent."),
+    ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="The set: a new folder.")],
     key: Key,
     generator: Annotated[

@@ -9,7 +9,7 @@ from diagnosis.blind.oracle import oracle
 from diagnosis.blind.outcomes import Opened, opened
 from diagnosis.blind.running import missing, results
 from diagnosis.blind.scoring import Oracle, Scores, score
-from diagnosis.blind.sealing import mark_opened, opened_answers, was_published
+from diagnosis.blind.sealing import mark_opened, opened_answers
 from diagnosis.blind.table import TOOL
 from diagnosis.blind.trees import tree_probabilities
 
@@ -29,7 +29,8 @@ def open_set(folder: Path, key: Path, partial: bool) -> tuple[list[Opened], bool
         raise Fault("BAD_SET", line + " makes them" + ("" if partial else ", --partial scores without them"))
     said = results(folder, list(answers))
     cases = [opened(name, answers[name], result) for name, result in said.items()]
-    return cases, mark_opened(folder) and not was_published(key)
+    published = any(answer.get("published", True) for answer in answers.values())
+    return cases, mark_opened(folder) and not published
 
 
 def scored(folder: Path, cases: list[Opened], with_baselines: bool, jobs: int, progress: Progress) -> dict[str, Scores]:

@@ -4,7 +4,7 @@
     SET/<case>/         evidence
     SET/results/        what the tool said, `<case>.json`
     SET/opened.json     when the set was scored for the first time, and what the results were then
-    KEY                 per case nonce and answer, and whether this set, made anew, was published before
+    KEY                 per case nonce and answer, which also says whether this set, made anew, was published before
 
 Who has the set cannot know an answer; who has the key cannot change one afterwards.
 """
@@ -67,10 +67,10 @@ def write_set(folder: Path, cases: Mapping[str, Secret]) -> None:
     write_json(folder / SET, {"format": SET_FORMAT, "cases": sealed})
 
 
-def write_key(path: Path, cases: Mapping[str, Secret], published: bool) -> None:
-    """Write nonces and answers, and whether the same set was published before. Raises OSError."""
+def write_key(path: Path, cases: Mapping[str, Secret]) -> None:
+    """Write nonces and answers. Raises OSError."""
     secrets = {name: cases[name]._asdict() for name in sorted(cases)}
-    write_json(path, {"format": KEY_FORMAT, "published": published, "cases": secrets})
+    write_json(path, {"format": KEY_FORMAT, "cases": secrets})
 
 
 def read_set(folder: Path) -> dict[str, Sealed]:
@@ -81,11 +81,6 @@ def read_set(folder: Path) -> dict[str, Sealed]:
 def read_key(path: Path) -> dict[str, Secret]:
     """What a key holds. Raises Fault BAD_SET."""
     return {name: Secret(**row) for name, row in _read(path, KEY_FORMAT, Secret._fields).items()}
-
-
-def was_published(key: Path) -> bool:
-    """Whether the answers of this set were known before it was made. The key was read before."""
-    return bool(json.loads(key.read_text(encoding="utf-8")).get("published"))
 
 
 def _read(path: Path, wanted: str, fields: tuple[str, ...]) -> dict[str, dict[str, Any]]:

@@ -18,7 +18,7 @@ from diagnosis.blind.sealing import Answer, Secret, refuse_key_inside, tool_vers
 from diagnosis.strict_json import write_json
 from tests.blind.generators import Effect, Generator, Plan, generator
 from tests.blind.real_logs import real_cases
-from tests.blind.sizes import Sizes, known_sizes, write_sizes
+from tests.blind.sizes import OPENED, Sizes, known_sizes, write_sizes
 from tests.blind.sizing import Bench
 from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
 
@@ -53,6 +53,7 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     source = generator(name)
     part = out.parent / f".{out.name}-in-the-making"
     known = known_sizes(name, seed)
+    published = bool(known) or (name, seed) in OPENED
     sealed = _taken_up(
         part, f"--generator {name} --cases {cases} --seed {seed} with version {tool_version('tests/blind')}"
     )
@@ -62,7 +63,7 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     secrets.SystemRandom().shuffle(todo)
     try:
         for case, answer in made(source, {secrets.token_hex(6): case for case in todo}, part / _SET, jobs, known):
-            sealed[case] = Secret(secrets.token_hex(16), answer)
+            sealed[case] = Secret(secrets.token_hex(16), answer | {"published": published})
             write_json(part / _ANSWERS / f"{case}.json", sealed[case]._asdict())
             progress(f"{len(sealed)} of {cases} cases made", len(sealed) / cases)
     except BaseException:
@@ -72,7 +73,7 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     write_set(part / _SET, sealed)
     _make_alike(part / _SET)
     write_sizes(key.with_suffix(".sizes.toml"), [secret.answer for secret in sealed.values()])
-    write_key(key, sealed, published=bool(known))
+    write_key(key, sealed)
     try:
         (part / _SET).rename(out)
     except BaseException:

@@ -197,6 +197,14 @@ def test_known_sizes_make_the_same_set_without_sizing(made, tmp_path, monkeypatc
     assert "DEVELOPMENT DATA" in blind("score", tmp_path / "same", "--key", tmp_path / "same.json").stdout
 
 
+def test_that_a_set_was_published_is_sealed_too(made, tmp_path):
+    said = json.loads((made / "key.json").read_text())
+    assert {secret["answer"]["published"] for secret in said["cases"].values()} == {False}
+    next(iter(said["cases"].values()))["answer"]["published"] = True
+    (tmp_path / "other.json").write_text(json.dumps(said))
+    assert blind("score", made / "set", "--key", tmp_path / "other.json").exit_code == FAULTS["SEAL_BROKEN"].exit_status
+
+
 def test_without_the_source_tree_one_line_says_so(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "tests.blind.making", None)
     result = make(tmp_path)
