@@ -12,7 +12,7 @@ from bridge import stickslip_pb2 as wire
 from bridge.logfile import RunData
 from controller.loop_design import open_loop
 
-_DELAY_BLOCKS = 2  # of the loop, see controller/loop_design.py
+_DELAY_BLOCKS = 2  # in reserve, as in controller/loop_design.py
 _NEAR_LIMIT = 0.95
 
 

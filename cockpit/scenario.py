@@ -16,6 +16,7 @@ from bridge.messages import SCHEMA_VERSION
 from bridge.zenoh_link import BusConfig
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
+from plant.soundness import refuse_what_no_rig_does
 
 
 class Scenario(Strict):
@@ -31,6 +32,7 @@ class Scenario(Strict):
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Scenario":
+        refuse_what_no_rig_does(self.rig)
         solver, controller = self.rig.solver, self.controller
         for name in ("block_s", "samples_per_block"):
             theirs, ours = getattr(solver, name), getattr(controller, name)

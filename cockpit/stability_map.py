@@ -38,8 +38,9 @@ class MapResult(NamedTuple):
 def stability_map(rig: RigConfig, out: Path) -> MapResult:
     """Draw the map of `rig` to the PNG file `out` and return its numbers.
 
-    The operating point is the highest velocity of the drive's profile: it needs the most vibration. Raises
-    Fault CONFIG if the drive never moves, and OSError if `out` cannot be written.
+    The operating point is the velocity of the drive's profile that needs the most vibration: the highest one, but for a
+    damped drive, where the lower ones are the unstable ones. Raises Fault CONFIG if the drive never moves, and OSError
+    if `out` cannot be written.
     """
     import math
 
@@ -55,12 +56,18 @@ def stability_map(rig: RigConfig, out: Path) -> MapResult:
     effects, nominal = rig.effects, rig.model_copy(update={"effects": {}})
     alone = {name: with_constant_effects(rig.model_copy(update={"effects": {name: effects[name]}})) for name in effects}
     rig = with_constant_effects(rig)
-    v_d = max(velocity_mps for _, velocity_mps in rig.drive.profile)
-    if v_d == 0.0:
+    velocities_mps = sorted({velocity_mps for _, velocity_mps in rig.drive.profile if velocity_mps > 0.0})
+    if not velocities_mps:
         raise Fault("CONFIG", f"{rig.name}: drive.profile: the drive never moves; give it a velocity above 0")
     sustained_mps = float(self_sustained_velocity_mps(rig))
+
+    def needs_mps(velocity_mps: float) -> tuple[float, float]:
+        smallest_mps = stabilising_vibration_mps(rig, velocity_mps)
+        floor_mps = velocity_mps if velocity_mps < sustained_mps else 0.0
+        return math.inf if smallest_mps is None else max(smallest_mps, floor_mps), velocity_mps
+
+    removing_mps, v_d = max(map(needs_mps, velocities_mps))
     smallest_mps = stabilising_vibration_mps(rig, v_d)
-    floor_mps = v_d if v_d < sustained_mps else 0.0
     numbers = MapResult(
         picture=str(out),
         drive_velocity_mps=v_d,
@@ -68,7 +75,7 @@ def stability_map(rig: RigConfig, out: Path) -> MapResult:
         stable_without_vibration=bool(hurwitz_margin(rig, v_d) >= 0.0),
         growth_per_s=float(growth_map(rig, v_d)),
         smallest_vibration_velocity_mps=smallest_mps,
-        removing_vibration_velocity_mps=None if smallest_mps is None else max(smallest_mps, floor_mps),
+        removing_vibration_velocity_mps=removing_mps if math.isfinite(removing_mps) else None,
         critical_velocity_mps=critical_velocity_mps(rig),
         self_sustained_velocity_mps=sustained_mps if math.isfinite(sustained_mps) else None,
         left_out=tuple(name for name, changed in alone.items() if changed == nominal),

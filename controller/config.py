@@ -46,7 +46,7 @@ class PolicyConfig(Strict):
 class AmplitudeConfig(Strict):
     """The loop that makes the measured v_a what it should be; `loop_design` gives its margins."""
 
-    # phase margin 60 degrees and gain margin 6.3 with this filter and a delay of 2 blocks: controller/loop_design.py
+    # phase margin 60 degrees and gain margin 6.3 with this filter and commands 2 blocks late: controller/loop_design.py
     gain: Positive = 0.0826
     filter_s: Positive = 0.005
     accel_bandwidth_Hz: Positive = 10000.0  # of the base accelerometer, undone at f

@@ -79,7 +79,7 @@ def approach(w: Floats, dt: float, t_s: float, base_mps: float) -> None:
         holds = 0.0 if math.fabs(extension_m) < w[SLACK + i] else 1.0
         w[HELD + i] = holds
         w[HELD_STEP + i] = holds * (w[H_D + i] + w[RELAXING + i] * (1.0 - w[ARM_KEEP + i]))
-        w[PULL + i] = _spring_N(w, i, ahead_m) + w[ARM_KEEP + i] * w[ARM + i]
+        w[PULL + i] = _spring_N(w, i, ahead_m) + holds * w[ARM_KEEP + i] * w[ARM + i]
         # the base, and how fast the slide goes over it
         spring_mps2 = w[BASE_2 + i] * (w[BASE + i] + 0.5 * dt * w[BASE_V + i])
         w[FREE + i] = (w[BASE_V + i] - 0.5 * dt * spring_mps2) * w[BASE_KEEP + i]
@@ -151,7 +151,7 @@ def slide(w: Floats, dt: float, z_dt: float, base_mid_mps: float, base_mps2: flo
         frame_m, frame_mps = w[FRAME + i] + dt * w[FRAME_V + i], w[FRAME_V + i]
         force_N = _spring_N(w, i, s_d - frame_m - x) + w[HELD + i] * w[H_D + i] * (anchor_mps - v_end)
         keep = w[ARM_KEEP + i] * w[ARM_KEEP + i]
-        arm_N = keep * w[ARM + i] + w[HELD + i] * w[RELAXING + i] * (1.0 - keep) * (anchor_mps - v_mid)
+        arm_N = w[HELD + i] * (keep * w[ARM + i] + w[RELAXING + i] * (1.0 - keep) * (anchor_mps - v_mid))
         force_N += arm_N
         per_m = dt * w[FRAME_2 + i]
         gain_mps = per_m * (force_N * w[FRAME_GIVE + i] - frame_m) - 2.0 * w[FRAME_LOSS + i] * frame_mps

@@ -40,7 +40,7 @@ def _force_reading(p: Record, s: Record, force_N: float, t_s: float) -> float:
     offset_N = p.force_bias_N + p.force_drift_N_per_s * t_s
     if p.force_settling_s > 0.0:
         offset_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
-    return force_N * (1.0 + p.force_ratio) + offset_N
+    return force_N * (1.0 + p.force_ratio) + offset_N / p.force_gain  # which is applied to all of it, where it is read
 
 
 @kernel
@@ -177,6 +177,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     h_d_now = 0.0 if p.force_driven or slack else h_d
                     h_d_step = h_d_now
                     if p.relaxing_Ns_per_m > 0.0:  # what it keeps to mid-step, and a damper for what it gains
+                        arm_N = 0.0 if slack else arm_N  # it hangs on the slide across the gap, too
                         pull_N += arm_keep_half * arm_N
                         h_d_step += 0.0 if slack else p.relaxing_Ns_per_m * (1.0 - arm_keep_half)
                 else:

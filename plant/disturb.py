@@ -62,6 +62,7 @@ def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos
     result = 1.0 + p.drift_per_s * t_s
     if p.drift_settling_s > 0.0:
         result += p.drift_ratio * (1.0 - math.exp(-(p.drift_before_s + t_s) / p.drift_settling_s))
+    result = max(result, 0.0)
     if p.position_ratio != 0.0:
         if p.position_seed < 0.0:
             angle_rad = TWO_PI * x / p.position_wavelength_m + p.position_phase_rad
@@ -73,32 +74,41 @@ def level(p: Record, t_s: float, x: float, v_r: float, load_sin: float, load_cos
             if p.position_other_share != 0.0:
                 other_rad = TWO_PI * x / p.position_other_wavelength_m + p.position_other_phase_rad
                 along += p.position_other_share * math.sin(other_rad)
-            result *= 1.0 + p.position_ratio * along
         else:
-            result *= 1.0 + p.position_ratio * smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)
+            along = smooth_noise(2.0 * x / p.position_wavelength_m, p.position_seed)
+        result *= max(1.0 + p.position_ratio * along, 0.0)
     if p.load_ratio != 0.0:
         if p.load_seed < 0.0:
-            result *= 1.0 + p.load_ratio * with_second(load_sin, load_cos, p.load_sin_2, p.load_cos_2)
+            load = with_second(load_sin, load_cos, p.load_sin_2, p.load_cos_2)
         else:
-            result *= 1.0 + p.load_ratio * smooth_noise(2.0 * p.load_frequency_Hz * t_s, p.load_seed)
+            load = smooth_noise(2.0 * p.load_frequency_Hz * t_s, p.load_seed)
+        result *= max(1.0 + p.load_ratio * load, 0.0)
     if p.roughness_ratio != 0.0:
-        result *= 1.0 + p.roughness_ratio * smooth_noise(x / p.roughness_length_m, p.roughness_seed)
-    # noise has no bound: a slide that lifts off is not this model's
+        result *= max(1.0 + p.roughness_ratio * smooth_noise(x / p.roughness_length_m, p.roughness_seed), 0.0)
+    # a slide that lifts off is not this model's; nor do two factors below 0 make friction
     return max(result * (1.0 + (p.forward_ratio if v_r >= 0.0 else p.backward_ratio)), 0.01)
 
 
 @kernel
 def late_mps(p: Record, s: Record, t_s: float, speed_mps: float) -> float:
-    """The speed as it was `lag_dead_s` ago, from a line of cells that is filled up to now; 0 before t = 0."""
+    """The speed as it was `lag_dead_s` ago; 0 before t = 0.
+
+    Cell k of a line holds the speed at k cells: from the last one that is filled to now the speed is taken for straight, however
+    many cells a step is long.
+    """
     length = len(s.lag_line)
     now = t_s / LAG_CELL_S
-    while s.lag_at < now:
+    last = s.lag_at
+    speed_then_mps = s.lag_line[last % length]
+    while s.lag_at + 1 <= now:
         s.lag_at += 1
-        s.lag_line[s.lag_at % length] = speed_mps
+        s.lag_line[s.lag_at % length] = speed_then_mps + (speed_mps - speed_then_mps) * (s.lag_at - last) / (now - last)
     back = now - p.lag_dead_s / LAG_CELL_S
     whole = math.floor(back)
-    older, newer = s.lag_line[int(whole) % length], s.lag_line[(int(whole) + 1) % length]
-    return older + (back - whole) * (newer - older)
+    older = s.lag_line[whole % length]
+    if whole >= s.lag_at:  # less than a cell ago
+        return older + (back - whole) / max(now - whole, 1e-9) * (speed_mps - older)
+    return older + (back - whole) * (s.lag_line[(whole + 1) % length] - older)
 
 
 @kernel

@@ -30,6 +30,17 @@ def reference_m(force_N, extension_m, t_s):
     return solve_ivp(slope, (0, t_s[-1]), (0, 0), t_eval=t_s, rtol=1e-9, atol=1e-13, max_step=1e-3).y[0]
 
 
+def test_a_damper_that_relaxes_pulls_nothing_across_a_gap():
+    """Held in the middle of a gap of 2 mm, after it has pulled with 0.2 mm to go."""
+    damper = {"form": "relaxing", "damping_Ns_per_m": 1000.0, "relaxation_s": 1.0}
+    effects = {"drive-damping": damper, "drive-backlash": {"gap_m": 2e-3}}
+    config = rig(effects, contact=NO_FRICTION, slide={"mass_kg": HEAVY_KG})
+    held = run(config, [0.0] * 50, {"s_d": 0.5e-3, "arm_N": 5.0})
+    assert np.abs(held.true_drive_force_N).max() == 0.0
+    pulled = run(config, [0.0] * 50, {"s_d": 1.2e-3, "arm_N": 5.0})
+    assert pulled.true_drive_force_N[-1] == pytest.approx(0.2e-3 * 11700.0 + 5.0 * math.exp(-0.05), rel=1e-6)
+
+
 def test_damping_makes_the_free_oscillation_decay_as_its_closed_form():
     damping = 40.0
     result = released({"drive-damping": {"damping_Ns_per_m": damping - 10.0}}, damping_Ns_per_m=10.0)

@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from plant.disturb import level
+from plant.records import build
 from tests.effects_rig import HEAVY_KG, TAU, rig, run, stribeck_N, towed
 
 CONTACT = rig().contact
@@ -29,6 +31,16 @@ def test_a_stribeck_curve_with_a_tail(v_ratio):
     fall = 0.3 * math.exp(-(v_ratio**2)) + 0.7 / (1.0 + v_ratio**2)
     expected_N = CONTACT.coulomb_force_N + (CONTACT.static_force_N - CONTACT.coulomb_force_N) * fall
     assert result.true_friction_force_N[-1] == pytest.approx(expected_N, rel=1e-5)
+
+
+def test_two_factors_below_nothing_make_no_friction():
+    """A drift that has used up its friction, and a load whose wave falls below nothing."""
+    load = {"ratio": 0.9, "frequency_Hz": 1.0, "phase_rad": -0.5 * math.pi, "second_cos": 1.0}
+    effects = {"friction-drift": {"form": "linear", "rate_per_s": -0.1}, "normal-load-fluctuation": load}
+    params, _ = build(rig(effects))
+    low = [level(params[0], t_s, 0.0, 1e-3, -1.0, 0.0) for t_s in (5.0, 20.0, 30.0)]
+    assert low == [0.01, 0.01, 0.01]
+    assert level(params[0], 5.0, 0.0, 1e-3, 1.0, 0.0) == pytest.approx(0.5 * (1.0 + 0.9 * (1.0 - 1.0)))
 
 
 def test_friction_along_the_track_is_a_sine_with_its_second_harmonic():

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from plant.disturb import late_mps
+from plant.effects import LONGEST_LAG_S
+from plant.records import build
 from tests.effects_rig import BLOCK_S, HEAVY_KG, TAU, rig, run, stribeck_N
 
 CONTACT = rig().contact
@@ -133,6 +136,17 @@ def test_a_dead_time_shows_the_stribeck_curve_an_earlier_speed():
     later = t_s > 0.04  # the bristle has forgotten how it began
     assert result.true_friction_force_N[later] == pytest.approx(expected_N[later], abs=0.01)
     assert np.ptp(expected_N) > 1.5
+
+
+@pytest.mark.parametrize("step_s", [2.5e-6, 5e-6, 1e-5, 2e-5, 5e-5])
+@pytest.mark.parametrize("delay_s", [1e-5, 2.03e-3, LONGEST_LAG_S])
+def test_a_dead_time_is_as_long_as_it_says_at_every_step(step_s, delay_s):
+    params, state = build(rig({"frictional-lag": {"form": "dead-time", "delay_s": delay_s}}))
+    for n in range(round(0.05 / step_s)):
+        t_s = n * step_s
+        late_s = t_s - late_mps(params[0], state[0], t_s, t_s)  # a speed that grows as time does
+        if t_s > delay_s + 2.0 * step_s:
+            assert late_s == pytest.approx(delay_s, abs=1e-9)
 
 
 def test_a_lag_opens_a_loop_of_friction_over_velocity():

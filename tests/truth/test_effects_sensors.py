@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from bridge.messages import CHANNELS
+from bridge.messages import CHANNELS, sensor_block
 from plant.core import advance_disturbed
 from plant.effects import LONGEST_DELAY
+from plant.node import PlantNode
 from plant.records import TRUTH, build
 from tests.effects_rig import HEAVY_KG, TAU, rig, run
 
@@ -45,6 +46,15 @@ def test_without_a_fault_the_reading_is_the_force():
 def test_the_reading_is_off_by_the_formula(effect, values, reading):
     result = swinging({f"force-sensor-{effect}": values})
     assert result.drive_force_N == pytest.approx(reading(result.true_drive_force_N, result.t_s), abs=1e-9)
+
+
+def test_a_bias_is_what_is_read_whatever_the_amplifier():
+    def read_N(effects):
+        sensors = {"force_gain": 1.1, "force_noise_N": 0.0, "force_resolution_N": 0.0}
+        payload = PlantNode(rig(effects, sensors=sensors), 1).advance([])[0].payload
+        return sensor_block(20).read(payload, "sensors")["drive_force_N"][0]
+
+    assert read_N({"force-sensor-bias": {"bias_N": 5.0}}) - read_N({}) == pytest.approx(5.0, abs=1e-5)
 
 
 def test_a_drift_is_the_sensor_s_own_and_not_amplified_by_its_gain():

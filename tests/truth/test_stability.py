@@ -243,3 +243,12 @@ def test_the_picture_and_its_numbers(tmp_path):
     assert between.stable_without_vibration
     assert between.removing_vibration_velocity_mps == 0.002
     assert "a start at rest ends in stick-slip" in between.answer
+
+
+def test_of_several_drive_velocities_the_one_that_needs_most_is_told(tmp_path):
+    """A damped drive at 1 mm/s sticks and slips; at 10 mm/s, to which it goes later, it does not."""
+    profile = {"profile": [[0.0, 1e-3], [6.0, 1e-3], [6.1, 1e-2]], "damping_Ns_per_m": 50.0}
+    config = validate(RigConfig, {"contact": {"pair": "C45-C45 @ 0.063"}, "drive": profile}, "test")
+    result = draw_map(config, tmp_path / "map.png")
+    assert result.drive_velocity_mps == 1e-3
+    assert "at 1 mm/s: stick-slip without vibration" in result.answer

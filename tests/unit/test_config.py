@@ -84,6 +84,23 @@ from plant.config import RigConfig
         ),
         (["controller.onset.window_s=1.0"], ["window_s", "128"]),
         (
+            ["rig.slide.mass_kg=0.05"],
+            [
+                "contact.damping_Ns_per_m = 21500",
+                "here 1e+04 N s/m",
+                "(2 sqrt(stiffness x mass) is 3.94e+03)",
+                "4.7e-06",
+            ],
+        ),
+        (
+            ["rig.contact.stribeck_tail=-2.0", "rig.contact.coulomb_force_N=3.0"],
+            ["contact.stribeck_tail = -2", "17.4 N and 3 N", "must stay above 0", "raise the tail"],
+        ),
+        (
+            ["rig.effects.drive-speed-ripple={ratio = 0.9, second_cos = 0.3}"],
+            ["drive-speed-ripple.ratio = 0.9", "must not stop", "lower the ratio below 0.769"],
+        ),
+        (
             ["controller.onset.window_s=0.007"],
             ["onset.window_s = 0.007", "8 to 128 blocks of 0.001 s", "0.008 to 0.128"],
         ),
