@@ -22,6 +22,7 @@ from diagnosis.pick_up import PICK_UP, PickUp, pick_up
 
 Floats = npt.NDArray[np.float64]
 _LACKING = "column"  # kind of finding: one that the channel map names is not in this file
+_NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "drive_stiffness_N_per_m")
 _ALIKE = 0.85  # of two names, by `difflib`: a letter or the case is another
 SHAKE_RATE_HZ = 8000.0  # a slower accelerometer has too few samples a millisecond to tell how strongly it vibrates
 # what each column tells that no other one does, by kind of drive
@@ -72,6 +73,9 @@ def load_evidence(folder: Path) -> Evidence:
         for name, share in manifest.rig.tolerance.items()
         if share > 0.0 and manifest.rig.values()[name] == 0.0
     ]
+    if exact := [name for name in _NEVER_EXACT if manifest.rig.values()[name] and not manifest.rig.tolerance.get(name)]:
+        text = f"none for {', '.join(exact)}: known exactly, so an ordinary difference there will be called an effect"
+        findings.append(Finding("tolerance", f"{MANIFEST}: rig.tolerance", text))
     for table in manifest.run:
         check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
     read = [read_columns(folder / table.file, manifest.channels) for table in manifest.run]

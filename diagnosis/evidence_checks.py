@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
+from diagnosis.bending import told_stiffness_N_per_m
 from diagnosis.findings import Finding
 from diagnosis.manifest import RigTable, RunTable
 from diagnosis.signal_checks import look
@@ -30,6 +31,7 @@ _ANOTHER = 3.0  # times as fast, or as slow, or the other way: another drive tha
 _FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
 _LEAST_TRAVEL = 0.002  # of the way to the first slip; the noise of a drive at rest is less
 _FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
+_ANOTHER_UNIT = 5.0  # times: an acceleration in g is off by 9.8, a stiffness in N/mm by 1000
 _STRIDE_S = 0.1
 _FEWEST_IN_A_SLIP = 3.0  # samples
 _SHORTEST_S = 1.0  # of a run
@@ -120,6 +122,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         text = "pulls against the drive's motion: a positive force pulls towards larger positions; not used; change the sign of"
         note("sign", "drive_force_N", f"{text} channels.drive_force_N.scale")
         del usable["drive_force_N"]
+    _check_bending(usable, rig, note)
     return usable, clipped, findings
 
 
@@ -302,6 +305,26 @@ def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -
     if share < _LEAST_TRAVEL:
         text = f"{travel_m:.2g} m in all, {share:.2g} of what breaks the mass away: it stands still in the whole run"
         note("still", where, f"{text}: friction and drive are not tested")
+
+
+def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
+    """Drop a mass acceleration the wrong way round; note a drive stiffness in another unit."""
+    described = rig.drive_stiffness_N_per_m
+    told = told_stiffness_N_per_m(columns["t_s"], columns) if described else None
+    if not described or told is None:
+        return
+    if told < 0.0:
+        text = (
+            "points backwards: the mass accelerates as the force that pulls it bends down; not used; change the sign of"
+        )
+        note("sign", "mass_accel_mps2", f"{text} channels.mass_accel_mps2.scale")
+        del columns["mass_accel_mps2"]
+    elif not 1.0 / _ANOTHER_UNIT < told / described < _ANOTHER_UNIT:
+        text = (
+            f"bends with the acceleration of the mass as a spring of {told:.2g} N/m makes it, rig.drive_stiffness_N_per_m says "
+            f"{described:g}: check the units of these three"
+        )
+        note("units", "drive_force_N", text)
 
 
 def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> bool:

@@ -15,7 +15,10 @@ MANIFEST = (
     + """
 [rig.tolerance]
 mass_kg = 0.005
+drive_stiffness_N_per_m = 0.02
 coulomb_force_N = 0.03
+static_force_N = 0.03
+stribeck_velocity_mps = 0.1
 [[run]]
 file = "run-01.parquet"
 drive_velocity_mps = 0.0005

@@ -1,6 +1,8 @@
 """Doubts about an evidence folder: every one is a finding, and what is doubtful is not used."""
 
 import math
+import shutil
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 
 from bridge.faults import Fault
 from diagnosis.evidence import load_evidence, read_columns
+from diagnosis.making import Case, make_evidence
 from tests.evidence_folder import MANIFEST, Columns, columns, folder, kinds
 from tests.logs import short_log
 
@@ -284,3 +287,49 @@ def test_a_mapped_column_that_one_run_lacks_is_told_and_one_that_all_lack_is_ref
         Fault, match=r"column acc: not in the file; known .*; no run has it: correct channels.mass_accel_mps2"
     ):
         load_evidence(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("bending") / "rig"
+    make_evidence(made, Case("short", {}), 1)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "kind", "expected"),
+    [
+        ("channels.mass_accel_mps2.scale", -1.0, "sign", "mass_accel_mps2: points backwards: the mass accelerates as"),
+        ("channels.mass_accel_mps2.scale", 0.10197, "units", "a spring of 1.1e+05 N/m makes it"),
+        ("rig.drive_stiffness_N_per_m", 11.7, "units", "rig.drive_stiffness_N_per_m says 11.7: check the units"),
+        ("rig.drive_stiffness_N_per_m", 6000.0, "", ""),
+    ],
+)
+def test_a_force_that_bends_otherwise_tells_a_sign_and_a_unit(
+    measured: Path, tmp_path: Path, key: str, value: float, kind: str, expected: str
+) -> None:
+    for path in measured.glob("*.parquet"):
+        shutil.copy(path, tmp_path)
+    manifest = tomllib.loads((measured / "manifest.toml").read_text())
+    rig, (first, *_) = manifest["rig"], manifest["run"]
+    section, name, *_ = key.split(".")
+    lines = ['format = "evidence/1"', "[rig]"]
+    if section == "rig":
+        rig[name] = value
+    lines += [f"{key} = {value!r}".replace("'", '"') for key, value in rig.items() if key != "tolerance"]
+    lines += ["[rig.tolerance]", *(f"{key} = {value}" for key, value in rig["tolerance"].items())]
+    if section == "channels":
+        lines += ["[channels]", f'{name} = {{ column = "{name}", scale = {value} }}']
+    lines += ["[[run]]", *(f"{key} = {value!r}".replace("'", '"') for key, value in first.items() if key != "holdout")]
+    (tmp_path / "manifest.toml").write_text("\n".join(lines))
+    found = load_evidence(tmp_path)
+    told = {finding.kind: f"{finding.where}: {finding.text}" for finding in found.findings}
+    assert expected in told.get(kind, "")
+    assert {"sign", "units"} & told.keys() == ({kind} if kind else set())
+    assert ("mass_accel_mps2" in found.runs[0].columns) == (kind != "sign")
+
+
+def test_numbers_without_a_tolerance_are_told(tmp_path: Path) -> None:
+    manifest = MANIFEST.replace("static_force_N = 0.03\nstribeck_velocity_mps = 0.1\n", "")
+    told = kinds(load_evidence(folder(tmp_path, columns(), manifest)))["tolerance"]
+    assert "rig.tolerance: none for static_force_N, stribeck_velocity_mps: known exactly, so" in told
