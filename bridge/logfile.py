@@ -253,7 +253,8 @@ class _Copy:
             )
 
 
-def _refuse_a_live_log(path: Path) -> None:
+def refuse_a_live_log(path: Path, option: str) -> None:
+    """Raise Fault LOG_WRITE where a log is being recorded; `option` is the one that names another."""
     if not path.is_file():
         return
     with path.open("rb") as file:
@@ -261,7 +262,7 @@ def _refuse_a_live_log(path: Path) -> None:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             line = f"{path}: is being recorded: must be closed before it is replaced, or what follows is lost"
-            raise Fault("LOG_WRITE", f"{line}; wait for the end of the run, or give another --out") from None
+            raise Fault("LOG_WRITE", f"{line}; wait for the end of the run, or give another {option}") from None
         except OSError:  # a file system without locks
             return
 
@@ -272,11 +273,12 @@ def recover(path: Path, out: Path) -> Recovered:
     Raises Fault BAD_LOG, and LOG_WRITE, also where `out` is being recorded.
     """
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
-    _refuse_a_live_log(out)
+    refuse_a_live_log(out, "--out")
     reader = LogReader(path)
     beside = out.with_name(out.name + ".part")
     messages = 0
     try:
+        out.parent.mkdir(parents=True, exist_ok=True)
         with beside.open("wb") as file:
             copy = _Copy(ChunkWriter(file, LIBRARY), reader)
             for data, rows in reader.messages():
@@ -288,9 +290,12 @@ def recover(path: Path, out: Path) -> Recovered:
                 copy.writer.flush()
             copy.take_metadata()
             copy.writer.finish()
+        if not messages:
+            line = f"{path}: holds no message that can be read, so nothing can be saved; the file stays as it is"
+            raise Fault("BAD_LOG", line)
         beside.replace(out)
     except OSError as error:
-        raise Fault("LOG_WRITE", f"{beside}: {error.strerror}; choose another --out") from None
+        raise Fault("LOG_WRITE", f"{out}: cannot be written: {error.strerror}; choose another --out") from None
     finally:
         beside.unlink(missing_ok=True)
     return Recovered(messages, reader.damage)

@@ -3,6 +3,7 @@
 import math
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from bridge import realtime
@@ -27,12 +28,14 @@ def run(
     about: dict[str, object],
     lockstep: bool,
     stop: threading.Event,
+    ready: Callable[[], None] = lambda: None,
 ) -> None:
     """Record until the plant and the controller have ended, or `stop` is set.
 
     Args:
         roles: whose configurations are waited for and kept.
         about: what else the log should say of its run.
+        ready: called once a rig has answered, before the log is begun.
 
     Raises Fault NO_PEER, PEER_DIED, LOG_WRITE.
 
@@ -43,6 +46,7 @@ def run(
             if topic.logged and topic.sender != "recorder":
                 bus.listen(topic, inbox.push)
         headers = bus.headers(roles, _HEADERS_WAIT_S, stop)
+        ready()
         log = RunLog(path, lockstep)
         log.add_metadata("run", about)
         for role in sorted(headers):

@@ -140,10 +140,14 @@ def recorder(
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         path = log_path(log, made.name)
-        if not child:
+
+        def ready() -> None:
             # `stickslip run` writes its log anew; started by hand after an incident, the one there holds what happened
-            keep_aside(path)
-        record(path, made.bus, ["plant", "controller"], about_run(made, lockstep), lockstep, stop_event(child))
+            if not child:
+                keep_aside(path)
+
+        about, stop = about_run(made, lockstep), stop_event(child)
+        record(path, made.bus, ["plant", "controller"], about, lockstep, stop, ready)
 
     sys.exit(guarded(work))
 

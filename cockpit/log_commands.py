@@ -85,8 +85,8 @@ def log_export(
     topic: Annotated[
         str, typer.Option("--topic", help="Comma-separated: sensors, applied, command, trace, state; all if not given.")
     ] = "",
-    from_s: Annotated[float, typer.Option("--from", help="From this time of the run on [s].")] = -math.inf,
-    until_s: Annotated[float, typer.Option("--until", help="Up to this time of the run [s].")] = math.inf,
+    from_s: Annotated[float, typer.Option("--from", help="From this time of the run on, in s.")] = -math.inf,
+    until_s: Annotated[float, typer.Option("--until", help="Up to this time of the run, in s.")] = math.inf,
     as_json: Json = False,
 ) -> None:
     """Write a log as tables: sensors one row a sample, the other topics one row a message."""
@@ -115,7 +115,12 @@ def log_export(
 def log_import(
     path: Annotated[Path, typer.Argument(help="Measured data: .csv, .parquet, .mat (v5 to v7) or .tdms.")],
     channel_map: Annotated[Path, typer.Option("--map", help="Channel map, .toml: columns, scales, rig.")],
-    out: Annotated[Path, typer.Option("--out", help="Evidence folder (a run is added), or FILE.mcap.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", help="Evidence folder (a run is added), or FILE.mcap for log check, export and diagnose."
+        ),
+    ],
     as_json: Json = False,
 ) -> None:
     """Turn measured data of another program into evidence for `stickslip diagnose`, or into a run log."""

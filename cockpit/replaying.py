@@ -44,6 +44,10 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
         t_ns = 0
         if plain:
             t_ns = round(time_s(f"--set {setting}", time, "key=value@20s") * 1e9)
+            end_ns = int(run.trace["t_ns"].max(initial=0))
+            if t_ns > end_ns:
+                line = f"--set {setting}: the log ends at {1e-9 * end_ns:g} s: must be a time before"
+                raise Fault("CONFIG", line)
         timed.setdefault(t_ns, []).append((plain or setting).removeprefix("controller."))
     changes: list[Change] = []
     for t_ns in sorted(timed):

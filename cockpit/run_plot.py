@@ -50,7 +50,7 @@ def plot_run(path: Path, out: Path) -> None:
     lower.set_ylabel("velocity [mm/s]")
     lower.set_ylim(bottom=0.0)
     lower.set_xlabel("time [s]")
-    lower.legend(loc="lower right", frameon=True)
+    lower.legend(handles=lower.lines, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
     figure.savefig(out, dpi=110, format="png")
 
 

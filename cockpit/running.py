@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 from bridge.faults import Fault
+from bridge.logfile import refuse_a_live_log
 from cockpit.processes import report
 from cockpit.scenario import Scenario, load_scenario
 
@@ -20,6 +21,7 @@ def keep_aside(path: Path) -> None:
     """Give a log that is there already a name of its own, after the time it was written at. Raises Fault LOG_WRITE."""
     if not path.is_file() or not path.stat().st_size:
         return
+    refuse_a_live_log(path, "--log")
     written = time.strftime("%Y%m%d-%H%M%S", time.localtime(path.stat().st_mtime))
     aside, number = path.with_stem(f"{path.stem}-{written}"), 1
     while aside.exists():

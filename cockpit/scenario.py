@@ -94,7 +94,16 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
 def load_rig(name: str, settings: list[str]) -> RigConfig:
     """A rig by name or path, with `key=value` settings applied. Raises Fault CONFIG."""
     path = _find(name, "rigs")
-    return validate(RigConfig, with_overrides(read_toml(path), settings), path.name)
+    return validate(RigConfig, with_overrides(_rig_table(path), settings), path.name)
+
+
+def _rig_table(path: Path) -> dict[str, Any]:
+    table = read_toml(path)
+    if "rig" in table:
+        raise Fault(
+            "CONFIG", f"{path}: is a scenario, not a rig; give the rig that it names, or the whole with --scenario"
+        )
+    return table
 
 
 def rig_setting(name: str) -> str:
@@ -108,14 +117,17 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
     Its table `rig` names a rig file (`file`) and may override any of its keys.
     """
     path = _find(name, "scenarios")
-    table = with_overrides({"name": path.stem} | read_toml(path), settings)
+    given = read_toml(path)
+    if "contact" in given and "rig" not in given:
+        raise Fault("CONFIG", f"{path}: is a rig, not a scenario; give it with --rig")
+    table = with_overrides({"name": path.stem} | given, settings)
     rig = table.get("rig")
     if isinstance(rig, dict) and "file" in rig:
         overrides = {key: value for key, value in rig.items() if key != "file"}
         rig_name = str(rig["file"])
         beside = path.parent / rig_name
         rig_path = beside if beside.suffix == ".toml" and beside.is_file() else _find(rig_name, "rigs")
-        table["rig"] = _merged(read_toml(rig_path), overrides)
+        table["rig"] = _merged(_rig_table(rig_path), overrides)
         return validate(Scenario, table, f"{path.name} with {rig_path.name}")
     return validate(Scenario, table, path.name)
 

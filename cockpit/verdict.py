@@ -51,6 +51,7 @@ class Verdict(NamedTuple):
     stopped_s: float  # by an operator, and no part of `after`
     before: Phase | None
     after: Phase | None
+    drive_velocity_max_mps: float  # as measured
     velocity_ratio_min: float
     velocity_ratio_max: float
     latency: Latency | None
@@ -126,6 +127,7 @@ def judge_run(run: RunData) -> Verdict:
         stopped_s=sum(min(until_s - _SETTLING_S, seconds) - from_s for from_s, until_s in stops),
         before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds), []),
         after=_phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, stops),
+        drive_velocity_max_mps=float(trace["drive_velocity_mps"].max(initial=0.0)),
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
         latency=_latency(run),
@@ -231,6 +233,10 @@ def in_words(verdict: Verdict) -> list[str]:
 def headline(verdict: Verdict) -> str:
     """The answer in one line."""
     v = verdict
+    if v.blocks == 0:
+        return "no block was recorded"
+    if v.drive_velocity_max_mps <= _STANDSTILL_MPS:
+        return "the drive never moved: nothing was tested"
     if v.after is None:
         return "the controller was not in charge in this run"
     if v.after.slips:

@@ -3,6 +3,7 @@
 A worker reads its folder itself, by the absolute path: the workers of a cluster need the same disk and the same version.
 """
 
+import re
 import signal
 import threading
 import traceback
@@ -131,6 +132,8 @@ def _workers(jobs: int, cluster: str) -> Generator[_Workers]:
     except ImportError:
         line = "--cluster: needs the package distributed, which is not installed; pip install 'stickslip[cluster]'"
         raise Fault("CONFIG", line) from None
+    if not re.fullmatch(r"(tcp|tls)://.+:\d+", cluster):  # Dask would try for 10 s, and say so with a traceback
+        raise Fault("CONFIG", f"--cluster {cluster}: must be tcp://HOST:PORT; write for example tcp://127.0.0.1:8786")
     try:
         client: Any = Client(cluster, timeout=_CLUSTER_WAIT_S, set_as_default=False)
     except (OSError, ValueError) as error:

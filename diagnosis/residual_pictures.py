@@ -15,6 +15,7 @@ from diagnosis.residual_axes import BREAKAWAY, SHOWN_BY, SHOWN_TWICE, TITLES, US
 from diagnosis.result import Curve, Picture
 
 Floats = npt.NDArray[np.floating[Any]]
+_ROUNDING = 1e-3  # of the noise: a drive told to be even is, but for the last bit, of which a picture makes a spike
 _CLOUD = 900
 _BINS = 50
 _BINS_OF_A_TRACK = 160  # of 15 mm, say: a ripple of 1 mm still shows
@@ -60,7 +61,8 @@ def _standing_out(rig: RigTable, runs: list[Prepared]) -> list[Over]:
     for run in runs:
         for residual in parity_residuals(rig, run):
             largest[residual.name] = max(largest.get(residual.name, 0.0), residual.rms)
-    return [(name, USUALLY_OVER[name]) for name in sorted(largest, key=lambda name: -largest[name])]
+    seen = [name for name, rms in largest.items() if rms > _ROUNDING]
+    return [(name, USUALLY_OVER[name]) for name in sorted(seen, key=lambda name: -largest[name])]
 
 
 def _all(rig: RigTable, runs: list[Prepared], scales: Scales, over: Over) -> list[_Series]:

@@ -161,7 +161,9 @@ def test_a_change_from_a_time_on_changes_nothing_before(log: Path) -> None:
     assert 3.0 <= result.difference.t_s < 3.1
 
 
-@pytest.mark.parametrize("setting", ["limits.v_ratio=9", "limits.v_ratio=1.1@later", "nothing.here=1"])
+@pytest.mark.parametrize(
+    "setting", ["limits.v_ratio=9", "limits.v_ratio=1.1@later", "limits.v_ratio=1.1@20s", "nothing.here=1"]
+)
 def test_bad_what_if(log: Path, setting: str) -> None:
     result = CliRunner().invoke(app, ["replay", str(log), "--set", setting])
     assert result.exit_code == 2

@@ -63,6 +63,11 @@ def test_a_cut_costs_only_the_open_chunk(tmp_path: Path, share: float) -> None:
     run = read_run(path)
     assert len(run.sensors) == min(40 * whole_chunks, 400)
     assert run.damage.cut_bytes < max(np.diff([8, *ends]).max(), 5000)
+    if not whole_chunks:
+        with pytest.raises(Fault, match=r"BAD_LOG: .*cut.mcap: holds no message that can be read.*stays as it is"):
+            recover(path, path)
+        assert path.read_bytes() == data[:cut]
+        return
     result = recover(path, saved)
     again = read_run(saved)
     assert again.damage == (0, 0, True, 0)
@@ -225,7 +230,8 @@ def test_a_log_that_is_being_recorded_is_not_replaced(tmp_path: Path) -> None:
     log.close()
     assert recover(path, path).messages == 3000
     RunLog(path, lockstep=True).close()
-    assert recover(path, other).messages == 0
+    with pytest.raises(Fault, match=r"BAD_LOG: .*run.mcap: holds no message"):
+        recover(path, tmp_path / "new folder" / "saved.mcap")
 
 
 def test_a_chunk_of_which_nothing_is_readable_is_no_table(tmp_path: Path) -> None:

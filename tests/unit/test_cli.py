@@ -14,12 +14,13 @@ from typer.testing import CliRunner
 from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
 from bridge.logfile import read_run
+from bridge.runlog import RunLog
 from cockpit.cli import app
 from cockpit.onboard import run_onboard
 from cockpit.replaying import outcome
 from cockpit.running import keep_aside
 from cockpit.scenario import load_scenario
-from cockpit.verdict import judge_run
+from cockpit.verdict import headline, judge_run
 from tests.logs import doctored, empty_log, short_log
 
 PNG = b"\x89PNG"
@@ -179,6 +180,39 @@ def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
     assert re.search(
         r"DRIVE_UNSEEN: \d+ slips while the drive position stood, first at [4-6]\.", "\n".join(verdict.faults)
     )
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        (["rig.drive.profile=[[0.0, 0.0]]"], "the drive never moved: nothing was tested"),
+        (["controller.policy.enabled_from_s=100.0"], "the controller was not in charge in this run"),
+    ],
+)
+def test_where_nothing_was_tested_the_headline_says_so(tmp_path: Path, settings: list[str], expected: str) -> None:
+    log = tmp_path / "still.mcap"
+    run_onboard(load_scenario("from-the-start", ["duration_s=0.5", *settings]), log, {})
+    assert headline(judge_run(read_run(log))) == expected
+
+
+def test_a_log_that_is_being_recorded_is_not_renamed(tmp_path: Path) -> None:
+    log = RunLog(tmp_path / "run.mcap", lockstep=True)
+    with pytest.raises(Fault, match=r"LOG_WRITE: .*run.mcap: is being recorded: .*or give another --log"):
+        keep_aside(log.path)
+    log.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["run", "--scenario", "deploy/rigs/paper-c45-c45.toml"], "is a rig, not a scenario; give it with --rig"),
+        (["run", "--rig", "deploy/scenarios/stop-and-go.toml"], "is a scenario, not a rig; give the rig that it names"),
+    ],
+)
+def test_a_rig_in_the_place_of_a_scenario_is_told(arguments: list[str], expected: str) -> None:
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert expected in result.stderr
 
 
 def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_path: Path) -> None:

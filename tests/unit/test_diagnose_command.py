@@ -222,6 +222,12 @@ def test_what_cannot_be_written_is_said_before_the_work(options, code, tmp_path,
     assert f"stickslip: {code}: {options[-2]}" in result.stderr
 
 
+def test_a_cluster_address_of_another_form_is_one_line(tmp_path):
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--cluster", "foo")
+    assert result.exit_code == 2
+    assert "CONFIG: --cluster foo: must be tcp://HOST:PORT; write for example tcp://127.0.0.1:8786" in result.stderr
+
+
 def test_a_cluster_without_the_package_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     result = diagnose(folders(tmp_path, "rig") / "rig", "--cluster", "tcp://127.0.0.1:1")
