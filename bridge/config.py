@@ -32,10 +32,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
     except UnicodeDecodeError as error:
         raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # of Python's own as well: a number of 5000 digits, brackets 1000 deep
+    except (ValueError, RecursionError) as error:  # Python's own too: 5000 digits, brackets 1000 deep
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}") from None
 
 

@@ -142,11 +142,7 @@ def _loaded(path: Path) -> dict[str, Any]:
         raise ValueError(f"it is damaged: its reader died of signal {-status}")
     try:
         return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
-    except (
-        UnboundLocalError,
-        ArithmeticError,
-        MemoryError,
-    ) as error:  # a type that SciPy does not know, a size that is none
+    except (UnboundLocalError, ArithmeticError, MemoryError) as error:  # an unknown type, a size that is none
         raise ValueError(f"it is damaged: {error}") from None
 
 

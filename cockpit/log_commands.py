@@ -85,8 +85,8 @@ def log_export(
     topic: Annotated[
         str, typer.Option("--topic", help="Comma-separated: sensors, applied, command, trace, state; all if not given.")
     ] = "",
-    from_s: Annotated[float, typer.Option("--from", help="From this time of the run on, in s.")] = -math.inf,
-    until_s: Annotated[float, typer.Option("--until", help="Up to this time of the run, in s.")] = math.inf,
+    start: Annotated[str, typer.Option("--from", help="From this time of the run on, e.g. 12.5s.")] = "",
+    end: Annotated[str, typer.Option("--until", help="Up to this time of the run, e.g. 20s.")] = "",
     as_json: Json = False,
 ) -> None:
     """Write a log as tables: sensors one row a sample, the other topics one row a message."""
@@ -94,7 +94,10 @@ def log_export(
     def work() -> None:
         from bridge.export import export
         from bridge.logfile import STREAMING
+        from cockpit.replaying import time_s
 
+        from_s = time_s(f"--from {start}", start, "12.5s") if start else -math.inf
+        until_s = time_s(f"--until {end}", end, "20s") if end else math.inf
         names = [name.strip() for name in topic.split(",")] if topic else STREAMING
         with _progress(f"exporting {path.name}", as_json) as progress:
             written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress)

@@ -16,7 +16,7 @@ _SETTLING_S = 1.0  # after the controller is enabled it has this long
 _ALARM_RATIO = 1.05
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
 _CONTROLLED = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m")
-_STANDSTILL_MPS = 2e-5  # where the controller does not tell its own
+_STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
 _RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
 
 
@@ -110,7 +110,7 @@ def judge_run(run: RunData) -> Verdict:
         faults.append(f"NOT_FINITE: {where} hold a sample that is no number, first {first}; they were left out")
     slips = trace["slips"].astype(np.int64)
     rose = np.diff(slips, prepend=slips[:1]) > 0
-    unmoved = rose & (trace["drive_velocity_mps"] <= controller.get("onset", {}).get("standstill_mps", _STANDSTILL_MPS))
+    unmoved = rose & (trace["drive_velocity_mps"] <= _STANDSTILL_MPS)
     if unmoved.any():
         first_s = float(trace["t_ns"][unmoved][0]) * 1e-9
         faults.append(

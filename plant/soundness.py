@@ -9,9 +9,8 @@ from plant.records import build
 
 # h_t dt / m of a vibrated slide: at 4.3 its velocity overshoots threefold, at 2.15 the mean force is off by 0.6 %
 _MOST_DAMPING = 2.0
-_VELOCITY_RATIOS = np.linspace(
-    0.0, 10.0, 2001
-)  # v / v_s: beyond, the Stribeck curve only rises or falls towards Coulomb
+# v / v_s: beyond, the Stribeck curve only rises or falls towards Coulomb
+_VELOCITY_RATIOS = np.linspace(0.0, 10.0, 2001)
 _ANGLES_RAD = np.linspace(0.0, 2.0 * math.pi, 2001)
 
 

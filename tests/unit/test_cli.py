@@ -195,6 +195,13 @@ def test_where_nothing_was_tested_the_headline_says_so(tmp_path: Path, settings:
     assert headline(judge_run(read_run(log))) == expected
 
 
+def test_export_takes_times_as_replay_does(log: Path, tmp_path: Path) -> None:
+    cut = ["log", "export", str(log), "--to", str(tmp_path / "a.csv"), "--topic", "trace", "--json"]
+    result = call(*cut, "--from", "0.1s", "--until", "0.2")
+    assert json.loads(result.stdout)["rows"] == {"trace": 100}
+    assert "--from soon: 'soon' is no time" in call(*cut, "--from", "soon").stdout
+
+
 def test_a_log_that_is_being_recorded_is_not_renamed(tmp_path: Path) -> None:
     log = RunLog(tmp_path / "run.mcap", lockstep=True)
     with pytest.raises(Fault, match=r"LOG_WRITE: .*run.mcap: is being recorded: .*or give another --log"):
