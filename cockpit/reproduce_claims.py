@@ -60,7 +60,7 @@ def paper_claims(runs: Mapping[Key, Run]) -> list[Row]:
     rows = [
         Row(
             PAPER_CLAIMS,
-            "v_a at 1, 2, 3, 4, 5 kHz and u0 = 0.02 µm is 0.126, 0.251, 0.377, 0.503, 0.628 mm/s",
+            "v_a at 1, 2, 3, 4, 5 kHz and u0 = 0.02 µm is 0.126, 0.251, 0.377, 0.503, 0.628 mm/s (2π f u0, no run)",
             ", ".join(f"{velocity:.3f}" for velocity in velocities) + " mm/s",
             "each within 0.001 mm/s",
             all(abs(ours - theirs) < 0.001 for ours, theirs in zip(velocities, expected, strict=True)),
@@ -73,7 +73,7 @@ def paper_claims(runs: Mapping[Key, Run]) -> list[Row]:
         rows.append(
             Row(
                 PAPER_CLAIMS,
-                f"{pair}: no stick-slip without vibration (friction values assumed, see below)",
+                f"{pair}: no stick-slip without vibration (it follows from friction values that are assumed, see below)",
                 f"{ours.mean.late_slips:.0f} slips; F_d {ours.mean.settled_force_N:.2f} N",
                 "no slip",
                 ours.mean.late_slips == 0,
