@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis import heldout
 from diagnosis.form import Axis, Form
 from diagnosis.gap import Floor
 from diagnosis.heldout import HeldOut, foretells
@@ -28,15 +29,25 @@ FORETELLS = [
 ]
 
 
-def stand_in(retuned: float, left: float, gap: float = 1.0, scattered: float = 1.0, shows: bool = True) -> Any:
+def stand_in(
+    retuned: float,
+    left: float,
+    gap: float = 1.0,
+    scattered: float = 1.0,
+    shows: bool = True,
+    left_open: float | None = None,
+) -> Any:
     """Held-out runs of 100 features, in chi2 by their course; gap and what is left of it in floors, by their scatter."""
-    return SimpleNamespace(
+    runs = SimpleNamespace(
+        _too_much=lambda left, expected: HeldOut._too_much(runs, left, expected),
+        _left_open=lambda _fit, _residual: left if left_open is None else left_open,
         _left_retuned=np.array([retuned**0.5, 0.0]),
         _left=lambda _fit: np.array([0.0, left**0.5]) if shows else np.array([retuned**0.5, 0.0]),
         floor=SimpleNamespace(whitening=range(100)),
         retuned=gap,
         left_by=lambda _fit: scattered,
     )
+    return runs
 
 
 def fit_of(form: Form) -> Any:
@@ -113,3 +124,35 @@ def test_where_nothing_can_be_compared_there_is_no_shrinkage():
     closed = held_out._closed(np.zeros(0), [np.zeros(0)])
     assert math.isnan(closed.gap)
     assert closed.shrinkage is closed.interval_90 is None
+
+
+@pytest.mark.parametrize(
+    ("left", "left_open", "refuted"), [(298.0, 84.0, False), (255.0, 250.0, True), (100.0, 300.0, False)]
+)
+def test_what_a_fit_leaves_open_may_be_otherwise_elsewhere(left, left_open, refuted):
+    """An ageing whose scale the fitted runs do not tell; a seal named as a static level; a name that needs no such help."""
+    held_out = stand_in(255.0, left, left_open=left_open)
+    assert HeldOut.refutes(held_out, fit_of(FORETELLS[0][0]), 0.4) is refuted
+
+
+def test_what_is_left_open_is_the_least_that_moved_parameters_leave(monkeypatch):
+    """A straight problem: the same as by least squares with the parameters' own covariance as a prior."""
+    random = np.random.default_rng(1)
+    rates, residual = random.normal(size=(30, 4)), random.normal(size=30)
+    covariance = np.cov(random.normal(size=(4, 9)))
+    at = random.normal(size=4)
+    monkeypatch.setattr(heldout, "whitened", lambda _floor, _problem, predicted: (predicted,))
+    held_out: Any = HeldOut.__new__(HeldOut)
+    held_out.floor = None
+    held_out._nuisances = SimpleNamespace(point=lambda deviations, tables: np.concatenate([deviations, tables]))
+    held_out.problem = SimpleNamespace(
+        predicted_many=lambda points: [residual + rates @ (point - at) for point in points]
+    )
+    fit = SimpleNamespace(
+        deviations=at[:3], w=at[3:], form=SimpleNamespace(tables=lambda w: w), covariance=lambda: covariance
+    )
+    spread = np.linalg.cholesky(covariance)
+    whole = np.vstack([rates @ spread, np.eye(4)])
+    least = np.linalg.lstsq(whole, np.concatenate([residual, np.zeros(4)]))[1][0]
+    assert held_out._left_open(fit, residual) == pytest.approx(least, rel=1e-6)
+    assert least < residual @ residual
