@@ -121,13 +121,19 @@ class HeldOut:
         """
         at = np.concatenate([fit.deviations, fit.w])
         own = len(fit.deviations)
-        moved = [at + step for step in np.linalg.cholesky(fit.covariance() + 1e-12 * np.eye(len(at))).T]
-        points = [self._nuisances.point(one[:own], fit.form.tables(one[own:])) for one in moved]
-        predicted = self.problem.predicted_many(points)
-        rates = np.stack([whitened(self.floor, self.problem, one)[0] - residual for one in predicted], axis=1)
-        towards = rates.T @ residual
-        gained = float(towards @ np.linalg.solve(np.eye(len(at)) + rates.T @ rates, towards))
-        return chi2_of(residual) - gained
+        spread = np.linalg.cholesky(fit.covariance() + 1e-12 * np.eye(len(at)))
+
+        def left(steps: list[Floats]) -> list[Floats]:
+            moved = [at + spread @ step for step in steps]
+            points = [self._nuisances.point(one[:own], fit.form.tables(one[own:])) for one in moved]
+            return [whitened(self.floor, self.problem, one)[0] for one in self.problem.predicted_many(points)]
+
+        rates = np.stack([one - residual for one in left(list(np.eye(len(at))))], axis=1)
+        step = -np.linalg.solve(np.eye(len(at)) + rates.T @ rates, rates.T @ residual)
+        # the features are bent: what a straight line promises is tried, and half of it
+        steps = [step, 0.5 * step]
+        tried = [chi2_of(one) + chi2_of(step) for one, step in zip(left(steps), steps, strict=True)]
+        return min(chi2_of(residual), *tried)
 
     def left_by(self, fit: Fit) -> float:
         """The gap under a fit, in floors."""
