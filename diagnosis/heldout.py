@@ -117,7 +117,7 @@ class HeldOut:
         """The least chi2 that is left where the fit's parameters move as far as the fitted runs leave them open, that included.
 
         An ageing of 5.7 limits, known only from dwells of one length, left 298 of another run, where the rig without it left
-        255; with what its scale leaves open it is 84.
+        255; what its scale leaves open takes it to 84 by a straight line.
         """
         at = np.concatenate([fit.deviations, fit.w])
         own = len(fit.deviations)
