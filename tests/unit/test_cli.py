@@ -20,7 +20,7 @@ from cockpit.onboard import run_onboard
 from cockpit.replaying import outcome
 from cockpit.running import keep_aside
 from cockpit.scenario import load_scenario
-from cockpit.verdict import headline, judge_run
+from cockpit.verdict import headline, in_words, judge_run
 from tests.logs import doctored, empty_log, short_log
 
 PNG = b"\x89PNG"
@@ -165,6 +165,17 @@ def test_a_slip_of_a_heavy_slide_is_slow_and_counts(tmp_path: Path) -> None:
     assert before is not None
     assert before.slips >= 4
     assert before.swing_N > 3.0
+
+
+@pytest.mark.parametrize(("code", "good"), [("STALE", True), ("DROPPED", False)])
+def test_a_pause_that_lost_nothing_is_told_and_no_fault(tmp_path: Path, code: str, good: bool) -> None:
+    log = tmp_path / "run.mcap"
+    run_onboard(load_scenario("from-the-start", ["duration_s=1.0"]), log, {})
+    run = read_run(log)
+    event = wire.Event(sequence=1, t_ns=5, source="controller", code=code, text="for 24 ms")
+    verdict = judge_run(run._replace(events=[*run.events, event]))
+    assert verdict.good is good
+    assert f"warning  {code}: for 24 ms" in in_words(verdict)
 
 
 def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
