@@ -17,7 +17,7 @@ _SMOOTH_BINS = (
 )
 _BESIDE_BINS = 61  # around a vibration, whose remainder in a mean over 1 ms is as large as a slip
 _FEWEST_BINS = 500
-_AS_ONE = 0.9  # correlation: on the paper's rig 0.99; without slips noise against noise, near 0
+_AS_ONE = 0.9  # correlation: 0.98 in the middle of 52 runs of made rigs; without slips it is noise against noise
 
 
 def told_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> float | None:
