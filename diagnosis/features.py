@@ -232,13 +232,24 @@ def _period(found: Features, number: int, slips: Slips, segment: Segment) -> Non
 
 
 def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment) -> None:
-    """Levels over whole cycles; over the segment where nothing slips."""
+    """Levels over whole cycles, as much as their slips count; over the segment where nothing slips.
+
+    A jump at the start of a segment, as a late force makes it, is a slip of no weight. Counted as one it moved a mean level by
+    six floors, and a slow sensor was named.
+    """
     name = "drive_force_N"
     still = segment.still and not segment.at_the_edge
-    whole = force_N[slips.tops[0] : slips.tops[-1]] if len(slips.tops) > 2 else force_N
+    whole, counts = force_N, np.ones(len(force_N))
+    weights = _pairs(slips)
+    if weights.sum() > 0.1:
+        whole, counts = force_N[slips.tops[0] : slips.tops[-1]], np.repeat(weights, np.diff(slips.tops))
     levels = np.full(4, np.nan)
     if still or (segment.slips > 2 and not segment.at_the_edge):
-        levels = np.array([whole.mean(), whole.std(), *np.quantile(whole, (0.05, 0.95))])
+        mean_N = np.average(whole, weights=counts)
+        deviation_N = np.average((whole - mean_N) ** 2, weights=counts) ** 0.5
+        levels = np.array(
+            [mean_N, deviation_N, *np.quantile(whole, (0.05, 0.95), weights=counts, method="inverted_cdf")]
+        )
     for level, value in zip(("mean level", "deviation", "low level", "high level"), levels.tolist(), strict=True):
         found.add(level, name, "steady", LOW, number, value)
     edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64)
@@ -310,28 +321,34 @@ def _vibration(found: Features, number: int, cut: Signals) -> None:
 
 
 def _parity(found: Features, signals: Signals, commands: Commands, scales: Scales) -> None:
-    """Force against extension, its rate, its cube, the direction and time: a massless linear spring has the first only."""
+    """Force against extension, its rate, its cube, time, the direction and its bend: a massless linear spring has the first only.
+
+    A force that comes T later is F - T F' + c T^2 F'' with c of 0.5, one behind n equal low-passes has c = (n + 1) / 2 n, and a
+    frame that swings bends as well: the bend tells them apart.
+    """
     if not {"drive_force_N", "mass_position_m", "drive_position_m"} <= signals.keys():
         return
     extension_m = signals["drive_position_m"] - signals["mass_position_m"]
     rate_mps = np.gradient(uniform_filter1d(extension_m, 5), BLOCK_S)
+    bend_mps2 = _bend_mps2(extension_m, scales)
     even = np.ones(len(extension_m), np.bool_)
     for segment in commands.segments:
         if segment.still or segment.slips > 0:  # the model jumps to the force that was measured there
             even[max(segment.first - _ROUND_ENTRY, 0) : segment.first + _ROUND_ENTRY] = False
-    force_N, extension_m, rate_mps = signals["drive_force_N"][even], extension_m[even], rate_mps[even]
+    force_N, extension_m = signals["drive_force_N"][even], extension_m[even]
     extension_m = extension_m - extension_m.mean() + force_N.mean() / scales.stiffness_N_per_m
     reach_m = scales.force_N / scales.stiffness_N_per_m
     both = force_N.min() < -0.3 * scales.force_N and force_N.max() > 0.3 * scales.force_N
     reaches = extension_m / reach_m
     columns = {
         "stiffness": reaches,
-        "rate": rate_mps * 1e3,
+        "rate": rate_mps[even] * 1e3,
         "cube": reaches * reaches * reaches,  # a power takes as long as all the rest of this
         "time": np.linspace(-1.0, 1.0, len(even))[even],
     }
     if both:
         columns["direction"] = np.sign(force_N)
+    columns["bend"] = bend_mps2[even]
     # one after the other, each freed of those before it: together they would pass noise on to each other
     centred = np.array([*columns.values(), force_N])
     centred -= centred.mean(axis=1, keepdims=True)
@@ -343,6 +360,14 @@ def _parity(found: Features, signals: Signals, commands: Commands, scales: Scale
     if not both:
         found.add("spring direction", "drive_force_N", "stick", LOW, -1, math.nan)
     found.add("spring rest", "drive_force_N", "stick", MIDDLE, -1, max(float(products[-1, -1]), 0.0) / len(force_N))
+
+
+def _bend_mps2(extension_m: Floats, scales: Scales) -> Floats:
+    """Second derivative over a quarter of a slip: the noise of displacement sensors grows with the square of frequency."""
+    width = max(round(0.25 * scales.slip_s / BLOCK_S), 1)
+    level_m = uniform_filter1d(extension_m, width)
+    padded = np.pad(level_m, width, mode="edge")
+    return (padded[2 * width :] - 2.0 * level_m + padded[: -2 * width]) / (width * BLOCK_S) ** 2
 
 
 def _drive(found: Features, position_m: Floats, commands: Commands) -> None:

@@ -288,6 +288,7 @@ def scales(name: str, form: str, rig: RigTable, runs: list[Prepared], highest_Hz
         },
         ("force-sensor-lag", "first-order"): {"lag_s": _Scale(0.02 * slip_s, True, 1.5)},
         ("force-sensor-lag", "second-order"): {"lag_s": _Scale(0.01 * slip_s, True, 1.5)},
+        ("force-sensor-lag", "fourth-order"): {"lag_s": _Scale(0.005 * slip_s, True, 1.5)},
         ("force-sensor-delay", ""): {"delay_s": _Scale(0.02 * slip_s, True, 1.5)},
         ("accelerometer-gain", "both"): {"ratio": _Scale(0.05, False)},
         ("accelerometer-gain", "mass"): {"ratio": _Scale(0.05, False)},

@@ -102,7 +102,8 @@ def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: floa
     s.frame_m, s.base_m = force_N * p.frame_m_per_N, force_N * p.base_m_per_N
     s.s_d = position_m + s.frame_m + extension_m(p, force_N)
     s.even_m = even_m(p, s.s_d)
-    s.drive_N = s.force_f = s.force_lag_1 = s.force_lag_2 = force_N
+    s.drive_N = s.force_f = force_N
+    s.force_lag[:] = force_N
     s.delay_line[:] = force_N
     s.mass_position_f, s.drive_position_f = s.x, s.s_d
 

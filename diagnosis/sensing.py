@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from diagnosis.reduced import BLOCK_S
 from diagnosis.twin import Effects
-from plant.effects import EFFECTS
+from plant.effects import EFFECTS, LAG_ORDERS
 
 Floats = npt.NDArray[np.floating[Any]]
 Signals = dict[str, Floats]
@@ -44,7 +44,7 @@ def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chai
         form = effects[name]["form"]
         value = {key: float(number) for key, number in effects[name].items() if key != "form"}
         if name == "force-sensor-lag":
-            for _ in range(1 if form == "first-order" else 2):
+            for _ in range(LAG_ORDERS[str(form)]):
                 force_N = low_pass(force_N, value["lag_s"])
         elif name == "force-sensor-delay":
             delay_s += value["delay_s"]
@@ -90,30 +90,37 @@ def _force_offset_N(effects: Effects, t_s: Floats) -> Floats:
 
 
 def delayed(values: Floats, delay_s: float) -> Floats:
-    """Shifted by a time of any sign, linear between blocks: as `np.interp`, which searches for every block."""
+    """Shifted by a time of any sign, a cubic through the four blocks about each instant; level beyond the ends.
+
+    A straight line between blocks would smooth as well, like a slow sensor: up to 0.125 ms2 of `spring bend`, where a delay and
+    two equal low-passes of 1 ms differ by 0.25.
+    """
     if delay_s == 0.0:
         return values
     whole = math.floor(delay_s / BLOCK_S)
-    later, earlier = _shifted(values, whole), _shifted(values, whole + 1)
-    return later + (delay_s / BLOCK_S - whole) * (earlier - later)
-
-
-def _shifted(values: Floats, blocks: int) -> Floats:
-    """By so many blocks, either way; what comes in is like the end."""
-    inside = min(abs(blocks), len(values))
-    if blocks >= 0:
-        return np.concatenate([np.full(inside, values[0]), values[: len(values) - inside]])
-    return np.concatenate([values[inside:], np.full(inside, values[-1])])
+    f = delay_s / BLOCK_S - whole
+    later, earlier = max(whole + 2, 0), max(1 - whole, 0)
+    padded = np.concatenate([np.full(later, values[0]), values, np.full(earlier, values[-1])])
+    weights = (
+        -f * (f - 1.0) * (f - 2.0) / 6.0,
+        (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0,
+        -(f + 1.0) * f * (f - 2.0) / 2.0,
+        (f + 1.0) * f * (f - 1.0) / 6.0,
+    )
+    starts = range(later - whole + 1, later - whole - 3, -1)
+    terms = (weight * padded[start : start + len(values)] for weight, start in zip(weights, starts, strict=True))
+    return sum(terms, np.zeros(len(values)))
 
 
 def low_pass(values: Floats, lag_s: float) -> Floats:
-    """First-order low-pass, exact for an input that is linear between blocks."""
+    """First-order low-pass by the trapezoidal rule, which is right up to the second derivative.
+
+    One that is exact for straight lines between blocks smooths by them as well: another 0.08 ms2 of `spring bend`.
+    """
     if lag_s < 1e-9:
         return values
-    r = BLOCK_S / lag_s
-    keep = float(np.exp(-r))
-    late = (1.0 - keep) / r - keep  # weight of the input one block ago
-    now = 1.0 - (1.0 - keep) / r
+    turns = 2.0 * lag_s / BLOCK_S
+    now, keep = 1.0 / (1.0 + turns), (turns - 1.0) / (turns + 1.0)
     # state: at rest on the first value
-    result, _ = lfilter([now, late], [1.0, -keep], values, zi=np.array([values[0] * (1.0 - now)]))
+    result, _ = lfilter([now, now], [1.0, -keep], values, zi=np.array([values[0] * (1.0 - now)]))
     return np.asarray(result)

@@ -24,11 +24,9 @@ def _force_reading(p: Record, s: Record, force_N: float, t_s: float) -> float:
     """What the force sensor's faults make of its signal; once a sample."""
     if p.force_lag_s > 0.0:
         share = 1.0 - math.exp(-p.dt_s * p.steps_per_sample / p.force_lag_s)
-        s.force_lag_1 += share * (force_N - s.force_lag_1)
-        force_N = s.force_lag_1
-        if p.force_lag_order == 2.0:
-            s.force_lag_2 += share * (force_N - s.force_lag_2)
-            force_N = s.force_lag_2
+        for i in range(int(p.force_lag_order)):
+            s.force_lag[i] += share * (force_N - s.force_lag[i])
+            force_N = s.force_lag[i]
     if p.force_delay_s > 0.0:
         s.delay_line[s.delay_at] = force_N
         back = p.force_delay_s / (p.dt_s * p.steps_per_sample)

@@ -40,6 +40,7 @@ class Effect(NamedTuple):
 
 
 LONGEST_DELAY = 254  # samples; 12.7 ms at 20 kHz
+LAG_ORDERS: Final = {"first-order": 1, "second-order": 2, "fourth-order": 4}  # low-passes of a slow force sensor
 LONGEST_LAG_S = 0.025  # of friction behind the velocity, as a dead time
 
 _TAU = 2.0 * math.pi
@@ -291,6 +292,7 @@ EFFECTS: Final[dict[str, Effect]] = {
         {
             "first-order": Form("reading through a first-order low-pass", (Parameter("lag_s", 0.0, 1.0, 1e-3),)),
             "second-order": Form("reading through two equal low-passes", (Parameter("lag_s", 0.0, 1.0, 5e-4),)),
+            "fourth-order": Form("reading through four equal low-passes", (Parameter("lag_s", 0.0, 1.0, 2.5e-4),)),
         },
     ),
     "force-sensor-delay": Effect("sensor", _one("reading comes delay_s later", Parameter("delay_s", 0.0, 0.012, 1e-3))),

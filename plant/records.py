@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bridge.kernel import record
 from plant.config import RigConfig
 from plant.disturb import LAG_CELL_S, ageing_N
-from plant.effects import LONGEST_DELAY, LONGEST_LAG_S
+from plant.effects import LAG_ORDERS, LONGEST_DELAY, LONGEST_LAG_S
 
 # Rows of the array that a block fills beside the sensors, one column a sample: what no sensor sees.
 TRUTH = (
@@ -88,9 +88,10 @@ STATE = np.dtype(
             *("mass_position_f", "drive_position_f"),
             # what the effects remember
             *("age_s", "v_lag", "frame_m", "frame_mps", "base_m", "base_mps", "vibrating_s", "drive_N", "t_s"),
-            *("arm_N", "force_lag_1", "force_lag_2"),
+            "arm_N",
         )
     ]
+    + [("force_lag", "f8", (max(LAG_ORDERS.values()),))]
     + [("delay_line", "f8", (DELAY_LINE,)), ("delay_at", "i8"), ("lag_line", "f8", (LAG_LINE,)), ("lag_at", "i8")],
     align=True,
 )
@@ -249,7 +250,7 @@ def _add_effect(p: Any, name: str, form: str, value: dict[str, float]) -> None:
         p.force_drift_N_per_s = value.get("rate_N_per_s", 0.0)
         p.force_drift_N, p.force_settling_s = value.get("drift_N", 0.0), value.get("settling_s", 0.0)
     elif name == "force-sensor-lag":
-        p.force_lag_s, p.force_lag_order = value["lag_s"], 1.0 if form == "first-order" else 2.0
+        p.force_lag_s, p.force_lag_order = value["lag_s"], LAG_ORDERS[form]
     elif name == "force-sensor-delay":
         p.force_delay_s = value["delay_s"]
     elif name == "accelerometer-gain":

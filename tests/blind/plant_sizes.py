@@ -119,6 +119,7 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
     "force-sensor-lag": (
         Sizes("first-order", "lag_s", 1e-4, 5e-3),
         Sizes("second-order", "lag_s", 5e-5, 2.5e-3),
+        Sizes("fourth-order", "lag_s", 2.5e-5, 1.25e-3),
     ),
     "force-sensor-delay": (Sizes("", "delay_s", 1e-4, 8e-3),),
     "accelerometer-gain": (

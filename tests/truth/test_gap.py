@@ -74,6 +74,21 @@ def test_what_a_slip_does_to_all_features_of_its_segment_counts_once(bench):
     assert max(lengths) < 3.0  # 5.6
 
 
+def test_a_power_that_is_above_its_replicates_by_chance_leaves_something_of_a_weaker_one(bench):
+    """A ring was 1.6 times what its replicates show, and of one a fifth as strong less than nothing was left."""
+    plain = bench.problem.predicted(bench.point({}))
+    powers = bench.floor.powers & bench.floor.compared
+    drawn = bench.runs(4, 2)
+    drawn[:, powers] *= 0.6
+    below = drawn.mean(axis=0) < plain
+    assert (below & powers).sum() > 5
+    floor = floor_of(bench.problem, bench.point({}), drawn)
+    own = below & powers & floor.compared
+    weak = np.where(own, 0.2 * plain, plain)
+    assert floor.expected(weak)[own] == pytest.approx(0.5 * np.log(weak[own]))
+    assert np.all(np.abs(between(floor, weak, plain)[own[floor.compared]]) < 4.0)
+
+
 def test_slips_that_the_model_lacks_count_once_each(bench):
     """Whatever they take along: 5 floors a slip, made independent."""
     plain = bench.problem.predicted(bench.point({}))

@@ -50,7 +50,7 @@ def test_every_name_is_there():
         ("piezo-resonance", ["mount", "mode"]),
         ("piezo-sag", ["load", "heat"]),
         ("force-sensor-drift", ["linear", "settling"]),
-        ("force-sensor-lag", ["first-order", "second-order"]),
+        ("force-sensor-lag", ["first-order", "second-order", "fourth-order"]),
         ("accelerometer-gain", ["both", "mass", "base"]),
     ],
 )

@@ -8,6 +8,7 @@ import pytest
 from diagnosis.features import find_slips
 from diagnosis.nuisance import Nuisances
 from diagnosis.problem import Problem, prepare, scales_of
+from plant.effects import LAG_ORDERS
 from tests.prepared import prepared
 
 
@@ -62,3 +63,41 @@ def test_without_a_force_a_slip_is_known_by_the_force_it_would_be(ladder, mass_k
     slip = np.where(phase < 1.0, swing_mps * np.pi / scales.slip_s * np.cos(np.pi * phase), 0.0)
     for times, slips in ((1.0, True), (0.2, False)):
         assert (len(find_slips({"mass_accel_mps2": times * slip}, scales).tops) > 5) is slips
+
+
+@pytest.mark.parametrize(("order", "square"), [("first-order", 1.0), ("second-order", 0.75), ("fourth-order", 0.625)])
+def test_the_bend_of_force_over_extension_tells_a_slow_sensor_from_a_late_one(ladder, order, square):
+    """A force late by T is F - T F' + T^2 F'' / 2, and n equal low-passes that take T have (n + 1) / 2 n there."""
+    evidence, runs = ladder
+    problem = Problem(evidence.rig, [run for run in runs if not run.commands.frequency_Hz.any()])
+    nuisances = Nuisances(evidence.rig)
+
+    def bends_ms2(effects):
+        predicted = problem.predicted(nuisances.point(np.zeros(len(nuisances)), effects))
+        bends = [
+            value for (_, label), value in zip(problem.labels, predicted, strict=True) if label.name == "spring bend"
+        ]
+        return np.array(bends) / problem.scales.stiffness_N_per_m * 1e6
+
+    late_s = 1.6e-3
+    still, late = bends_ms2({}), bends_ms2({"force-sensor-delay": {"form": "", "delay_s": late_s}})
+    slow = bends_ms2({"force-sensor-lag": {"form": order, "lag_s": late_s / LAG_ORDERS[order]}})
+    # a difference over a quarter of a slip is not quite F''
+    assert late - still == pytest.approx(0.5 * 1.6**2, rel=0.15)
+    assert (slow - still) / (late - still) == pytest.approx(square / 0.5, rel=0.03)
+
+
+def test_a_jump_at_the_start_of_a_segment_is_no_cycle(ladder):
+    evidence, runs = ladder
+    run = next(one for one in runs if any(segment.slips > 3 for segment in one.commands.segments))
+    number = next(i for i, segment in enumerate(run.commands.segments) if segment.slips > 3)
+    segment = run.commands.segments[number]
+    jumped = run.signals["drive_force_N"].copy()
+    jumped[segment.first : segment.first + 2] += 3.0 * segment.sign
+    levels = []
+    for force_N in (run.signals["drive_force_N"], jumped):
+        problem = Problem(evidence.rig, [run._replace(signals=run.signals | {"drive_force_N": force_N})])
+        labelled = zip(problem.labels, problem.measured, strict=True)
+        levels.append([value for (_, label), value in labelled if "level" in label.name and label.segment == number])
+    assert np.isfinite(levels[0]).any()
+    assert levels[1] == pytest.approx(levels[0], rel=1e-12, nan_ok=True)

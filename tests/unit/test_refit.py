@@ -68,7 +68,7 @@ def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
     assert tried < 0.6 * refitted
     (_, tried), (_, refitted) = tried_and_refitted("drive-damping")
     assert tried.chi2 < 0.5 * base
-    assert tried.chi2 == pytest.approx(refitted.chi2, rel=0.05)
+    assert tried.chi2 < 1.05 * refitted.chi2
 
 
 def test_single_numbers_lead_on_where_derivatives_lead_astray(tmp_path):
