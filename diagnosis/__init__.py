@@ -4,7 +4,8 @@ Evidence in
     manifest, manifest_text     what `manifest.toml` may say; the same as text
     evidence, evidence_checks   a folder read strictly; which samples and columns can be used
     bending                     the drive's stiffness as force and acceleration tell it: a wrong sign, a wrong unit
-    pick_up                     a vibration in the force signal that no spring carries
+    pick_up, distortion         a vibration in the force signal that no spring carries; a base that shakes with no sine
+    lock_in                     how strongly a signal swings at the commanded vibration
     log_evidence, importing     run logs, and files of other programs, as evidence
     findings                    one thing that is wrong, and where
 Comparison

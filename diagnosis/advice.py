@@ -13,6 +13,7 @@ _TAP = (
 _FRAME = "Put an accelerometer on what holds the drive, then on the base, and tap: what swings there is seen directly."
 _SHAKER = "Put both accelerometers on one calibrated shaker, or turn them over: gravity makes 2 g of difference."
 UNCOUPLE = "Uncouple the drive from the mass and vibrate: what the force signal still shows is not force."
+SINE = "Halve the piezo's voltage, then tighten its mount: harmonics of a drive too hard or loose fall faster than the vibration."
 _SWEEP = "Sweep the piezo from 0.5 to 5 kHz at rest and look at the base accelerometer: it shows what is delivered."
 _DRIVE = "Measure the drive position with a second sensor, unloaded: an uneven drive is uneven without the mass, too."
 _TRACK = (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.advice import UNCOUPLE
+from diagnosis.advice import SINE, UNCOUPLE
 from diagnosis.commands import SHORTEST_S
 from diagnosis.contest import Contest
 from diagnosis.evidence import Evidence
@@ -82,9 +82,11 @@ def assembled(
     alike = imitators(fitter, followed, verdict.scale) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
     if verdict.outside:
-        following = Experiment(
-            UNCOUPLE, "What is compared shows no gap: the vibration in the force signal is left.", None
+        picked_up = any(run.pick_up for run in evidence.runs)
+        what, left = (
+            (UNCOUPLE, "the vibration in the force signal") if picked_up else (SINE, "what shakes as no sine does")
         )
+        following = Experiment(what, f"No effect of the library makes {left}.", None)
     else:
         following = next_experiment(fitter.problem, nuisances, leaders)
     done = Diagnosis(
@@ -171,9 +173,13 @@ def _cells(floor: Floor, z: Floats) -> list[Cell]:
 
 
 def _vibrating(evidence: Evidence) -> list[Cell]:
-    """Cells of forces that vibrate as no spring does, in what is ordinary, as the others are in floors."""
-    found = [(run.file, run.pick_up) for run in evidence.runs]
-    return [Cell("drive_force_N", "steady", one.band_Hz, file, one.limits**2 - 1.0) for file, one in found if one]
+    """Cells of what vibrates as no model does, in what is ordinary, as the others are in floors."""
+    found = [
+        (signal, run.file, one)
+        for run in evidence.runs
+        for signal, one in (("drive_force_N", run.pick_up), ("base_accel_mps2", run.distortion))
+    ]
+    return [Cell(signal, "steady", one.band_Hz, file, one.limits**2 - 1.0) for signal, file, one in found if one]
 
 
 def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:

@@ -7,7 +7,7 @@ from diagnosis.contest import Contest, Progress
 from diagnosis.evidence import Evidence
 from diagnosis.kept_aside import borne_out
 from diagnosis.library import trials
-from diagnosis.problem import Problem, prepare
+from diagnosis.problem import PIEZO_EFFECTS, Problem, prepare
 from diagnosis.result import Diagnosis
 from diagnosis.retuning import retuned_rig
 from diagnosis.verdict import although_outside
@@ -32,7 +32,9 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     contest.decide(progress)
     unseen = [run for run in runs if run.holdout]
     outcome = borne_out(contest, Problem(evidence.rig, unseen) if unseen else None, jobs)
-    if any(run.pick_up for run in evidence.runs):
-        outcome = outcome._replace(verdict=although_outside(outcome.verdict))
+    distorted = any(run.distortion for run in evidence.runs)
+    if distorted or any(run.pick_up for run in evidence.runs):
+        verdict = although_outside(outcome.verdict, PIEZO_EFFECTS if distorted else frozenset())
+        outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
     progress(f"verdict: {outcome.verdict.kind}", 0.8)
     return assembled(evidence, runs, contest, outcome, tried, began, jobs)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from bridge.faults import Fault
 from bridge.reading import check_file
 from bridge.tables import Table, read_table
+from diagnosis.distortion import DISTORTED, Distortion, distortion
 from diagnosis.evidence_checks import Columns, checked
 from diagnosis.findings import Finding
 from diagnosis.log_evidence import columns_of_log
@@ -51,6 +52,7 @@ class Run(NamedTuple):
     drive_velocity_mps: float | None
     holdout: bool
     pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
+    distortion: Distortion | None = None  # a base that vibrates at other frequencies than the commanded one
 
 
 class Evidence(NamedTuple):
@@ -130,7 +132,10 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
     vibrates = pick_up(rig, t_s, usable)
     if vibrates:
         findings.append(Finding(PICK_UP, f"{table.file}: drive_force_N", vibrates.text))
-    return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates), findings
+    distorted = distortion(t_s, usable)
+    if distorted:
+        findings.append(Finding(DISTORTED, f"{table.file}: base_accel_mps2", distorted.text))
+    return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates, distorted), findings
 
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:

@@ -10,18 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.lock_in import BESIDE_HZ, FEWEST_WINDOWS, WINDOW_S, LockIn
 from diagnosis.manifest import RigTable
 from diagnosis.wording import quantity
 
 Floats = npt.NDArray[np.floating[Any]]
 PICK_UP = "pick-up"  # kind of the finding
-_WINDOW_S = 0.02
-_FEWEST_WINDOWS = 5
 _SHARE = 0.005  # of the static friction: what a surface's roughness counts as at most
 _OF_SPRING = 3.0  # times what the spring carries by the described numbers, which are not exact
 _OF_BESIDE = 4.0  # times what is found where nothing vibrates: noise, and slips where they are quick
-_BESIDE_HZ = 3.5 / _WINDOW_S  # to either side: the vibration itself leaks no further than two lines
-_HIGHEST = 0.45  # of the sampling rate: above it the vibration is folded down
 
 
 class PickUp(NamedTuple):
@@ -40,7 +37,7 @@ class PickUp(NamedTuple):
     @property
     def band_Hz(self) -> tuple[float, float]:
         """Where it lies, to one line of a window."""
-        return self.frequency_Hz - 1.0 / _WINDOW_S, self.frequency_Hz + 1.0 / _WINDOW_S
+        return self.frequency_Hz - 1.0 / WINDOW_S, self.frequency_Hz + 1.0 / WINDOW_S
 
     @property
     def text(self) -> str:
@@ -59,46 +56,28 @@ def _rounded(force_N: float) -> str:
 def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> PickUp | None:
     """The vibration in the force signal of a run of a spring drive; None where it is ordinary or cannot be known.
 
-    Force, mass acceleration and the vibration's frequency are needed in `columns`, [samples] as `t_s`. Every window of 20 ms is
-    multiplied with the commanded vibration (a lock-in amplifier), the median window of each frequency counts: a slip is in few
-    of them. Of several frequencies the one where it stands out most is told: a pick-up of a voltage grows with the frequency.
+    Force, mass acceleration and the vibration's frequency are needed in `columns`, [samples] as `t_s`. The median window of each
+    frequency counts: a slip is in few of them. Of several frequencies the one where it stands out most is told: a pick-up of a
+    voltage grows with the frequency.
     """
+    stiffness_N_per_m = rig.drive_stiffness_N_per_m
     needed = {"drive_force_N", "mass_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}
-    if rig.drive_stiffness_N_per_m is None or not needed <= columns.keys():
+    if stiffness_N_per_m is None or not needed <= columns.keys():
         return None
-    rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
-    rows = round(_WINDOW_S * rate_Hz)
-    frequency_Hz = np.where(columns["vibration_amplitude_m"] > 0.0, columns["vibration_frequency_Hz"], 0.0)
-    if rows == 0:
+    lock_in = LockIn(t_s, columns)
+    if len(lock_in.used) < FEWEST_WINDOWS:
         return None
-    windows = len(t_s) // rows
-    lowest_Hz, highest_Hz = (
-        at(frequency_Hz[: windows * rows].reshape(windows, rows), axis=1) for at in (np.min, np.max)
-    )
-    used = np.flatnonzero((lowest_Hz > 2.0 / _WINDOW_S) & (highest_Hz < _HIGHEST * rate_Hz))
-    if len(used) < _FEWEST_WINDOWS:
-        return None
-    turns = np.concatenate(([0.0], np.cumsum(frequency_Hz[1:] * np.diff(t_s))))
-    weights = np.hanning(rows)
-
-    def amplitude(name: str, apart_Hz: float = 0.0) -> Floats:
-        turned = columns[name] * np.exp(-2j * np.pi * (turns + apart_Hz * (t_s - t_s[0])))
-        own = turned[: windows * rows].reshape(windows, rows)
-        return np.abs(own @ weights) * 2.0 / float(weights.sum())
-
-    force_N, accel_mps2 = amplitude("drive_force_N"), amplitude("mass_accel_mps2")
-    beside_N = [amplitude("drive_force_N", apart_Hz) for apart_Hz in (-_BESIDE_HZ, _BESIDE_HZ)]
+    force_N, accel_mps2 = (lock_in.amplitude(columns[name]) for name in ("drive_force_N", "mass_accel_mps2"))
+    beside_N = [lock_in.amplitude(columns["drive_force_N"], apart_Hz=apart_Hz) for apart_Hz in (-BESIDE_HZ, BESIDE_HZ)]
 
     def of(own: npt.NDArray[np.int64]) -> PickUp:
-        angular = 2.0 * np.pi * lowest_Hz[own]
-        yields = np.abs(rig.drive_stiffness_N_per_m + 1j * angular * (rig.drive_damping_Ns_per_m or 0.0))
+        angular = 2.0 * np.pi * lock_in.lowest_Hz[own]
+        yields = np.abs(stiffness_N_per_m + 1j * angular * (rig.drive_damping_Ns_per_m or 0.0))
         spring_N = float(np.median(yields * accel_mps2[own] / angular**2))
         around_N = max(float(np.median(each[own])) for each in beside_N)
         limit_N = max(_SHARE * rig.static_force_N, _OF_SPRING * spring_N, _OF_BESIDE * around_N)
-        return PickUp(float(np.median(lowest_Hz[own])), float(np.median(force_N[own])), spring_N, limit_N)
+        return PickUp(float(np.median(lock_in.lowest_Hz[own])), float(np.median(force_N[own])), spring_N, limit_N)
 
-    steady = used[lowest_Hz[used] == highest_Hz[used]]
-    alike = [steady[lowest_Hz[steady] == each_Hz] for each_Hz in np.unique(lowest_Hz[steady])]
-    each = [of(own) for own in alike if len(own) >= _FEWEST_WINDOWS] or [of(used)]
+    each = [of(own) for own in lock_in.steady()] or [of(lock_in.used)]
     found = max(each, key=lambda one: one.limits)
     return found if found.limits > 1.0 else None

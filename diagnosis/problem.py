@@ -29,7 +29,7 @@ from plant.effects import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
 AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # how old the contact was when a run began
-_PIEZO_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
+PIEZO_EFFECTS = frozenset(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
 # of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
 _SCALE_SPREAD = 0.004
 _KEPT = 64  # simulated runs, of 0.6 MB each
@@ -253,7 +253,7 @@ def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
     shown = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
     moving = {name: table for name, table in shown.items() if table is not None and name not in SENSOR_EFFECTS}
     if not run.commands.frequency_Hz.any():
-        moving = {name: table for name, table in moving.items() if name not in _PIEZO_EFFECTS}
+        moving = {name: table for name, table in moving.items() if name not in PIEZO_EFFECTS}
     if "before_s" in moving.get("friction-drift", {}):
         moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
     return _with_paths(moving, run, draw)

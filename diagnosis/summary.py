@@ -2,6 +2,7 @@
 
 import math
 
+from diagnosis.distortion import DISTORTED
 from diagnosis.heldout import MORE_THAN_RIGHT
 from diagnosis.phases import has_own_phases
 from diagnosis.pick_up import PICK_UP
@@ -46,10 +47,11 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     still = [finding.where.partition(":")[0] for finding in diagnosis.findings if finding.kind == "still"]
     if still:
         sentences.append(f"In {', '.join(still)} the drive stands still: friction and drive are not tested there.")
-    vibrating = [finding for finding in diagnosis.findings if finding.kind == PICK_UP]
-    if vibrating:
-        others = ", ".join(finding.where.partition(":")[0] for finding in vibrating[1:])
-        sentences.append(f"{vibrating[0].where} {vibrating[0].text}." + (f" So in {others}." if others else ""))
+    vibrating = [finding for finding in diagnosis.findings if finding.kind in (PICK_UP, DISTORTED)]
+    for kind in dict.fromkeys(finding.kind for finding in vibrating):
+        first, *more = (finding for finding in vibrating if finding.kind == kind)
+        others = ", ".join(finding.where.partition(":")[0] for finding in more)
+        sentences.append(f"{first.where} {first.text}." + (f" So in {others}." if others else ""))
     if gap.runs and math.isfinite(gap.nominal):
         sentences.append(
             f"On {', '.join(gap.runs)}, kept aside, rig and model are {times(gap.nominal)} noise floors apart as described, and "

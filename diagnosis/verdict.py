@@ -99,7 +99,7 @@ class Verdict(NamedTuple):
     ranked: tuple[Model, ...]  # single effects by evidence, the best first
     scale: float  # the misfit that all evidence is divided by
     refuted: tuple[str, ...] = ()  # effects that won, and that the runs kept aside do not bear out
-    outside: bool = False  # what is compared shows no gap, and something else does
+    outside: bool = False  # something shows that is not compared, and that the library lacks
 
 
 def much_left(fit: Fit, expected_chi2: float) -> bool:
@@ -290,13 +290,23 @@ def doubted(verdict: Verdict) -> Verdict:
     return verdict._replace(probabilities=_with_mistakes(verdict.probabilities, leaders, _MISTAKEN_DOUBTFUL))
 
 
-def although_outside(verdict: Verdict) -> Verdict:
-    """The verdict where something shows that no fit looks at, and that no effect of the library makes: never "no gap"."""
-    if verdict.kind != "no-gap":
+def although_outside(verdict: Verdict, imitators: frozenset[str] = frozenset()) -> Verdict:
+    """The verdict where something shows that no fit looks at, and that no effect of the library makes.
+
+    That is never "no gap", nor what would imitate it alone.
+    """
+    named = verdict.named
+    if verdict.kind == "no-gap":
+        won = "none"
+    elif named is not None and imitators.issuperset(named.form.effects):
+        won = named.form.effects[0]
+    else:
         return verdict
-    swapped = {"none": verdict.probabilities["unexplained"], "unexplained": verdict.probabilities["none"]}
+    swapped = {won: verdict.probabilities["unexplained"], "unexplained": verdict.probabilities[won]}
     probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
-    return verdict._replace(kind="unexplained", probabilities=probabilities, outside=True)
+    return verdict._replace(
+        kind="unexplained", named=None, runner_up=named or verdict.runner_up, probabilities=probabilities, outside=True
+    )
 
 
 def _softmax(scores: dict[str, float]) -> dict[str, float]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from diagnosis import wording
+from diagnosis.distortion import DISTORTED
 from diagnosis.findings import Finding
 from diagnosis.pick_up import PICK_UP
 from diagnosis.report import rig_row, where_map, write_report
@@ -232,10 +233,12 @@ def test_runs_in_which_nothing_moves_are_in_the_summary():
     assert "In run-01.csv, run-03.csv the drive stands still: friction and drive are not tested there." in told
 
 
-def test_a_force_that_vibrates_is_in_the_summary_with_its_runs():
-    findings = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
+def test_what_vibrates_as_no_model_does_is_in_the_summary_with_its_runs():
+    picked_up = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
+    findings = (*picked_up[:2], Finding(DISTORTED, "run-02.csv: base_accel_mps2", "moves at 5000 Hz"), picked_up[2])
     told = " ".join(summary(made_up.diagnosis()._replace(findings=findings)))
     assert "run-01.csv: drive_force_N vibrates with 0.3 N. So in run-02.csv, run-04.csv." in told
+    assert "run-02.csv: base_accel_mps2 moves at 5000 Hz." in told
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,15 @@ def test_what_shows_elsewhere_turns_no_gap_into_unexplained_and_nothing_else():
     assert although_outside(effect) == effect
 
 
+def test_what_shows_elsewhere_takes_the_name_of_an_effect_that_imitates_it():
+    effect = judge(fit(400.0), [fit(50.0, "piezo-resonance")], [], EXPECTED)
+    assert although_outside(effect, frozenset({"piezo-sag"})) == effect
+    outside = although_outside(effect, frozenset({"piezo-sag", "piezo-resonance"}))
+    assert (outside.kind, outside.named, outside.runner_up) == ("unexplained", None, effect.named)
+    assert outside.probabilities["unexplained"] == effect.probabilities["piezo-resonance"]
+    assert sum(outside.probabilities.values()) == pytest.approx(1.0)
+
+
 def test_a_gap_that_nothing_takes_is_unexplained():
     assert judge(fit(4000.0), [fit(3900.0, "coulomb-level")], [], EXPECTED).kind == "unexplained"
 
