@@ -20,6 +20,7 @@ Comparison
     noise                       the noise of a run, taken from the run
     cycles                      slips, breakaways and re-sticks of a force record
     features, axis_features     a run in numbers that do not depend on when it slips; the same for a force-driven axis
+    spring_law                  how the force follows the extension of the spring
     problem                     the runs of an evidence, ready: measured features, and predicted ones at any point
     gap                         the gap, its floor and its definition
 Fit

@@ -19,6 +19,7 @@ from scipy.signal import lfilter
 from diagnosis.commands import Commands, Segment
 from diagnosis.cycles import half_fallen, turning_points
 from diagnosis.reduced import BLOCK_S
+from diagnosis.spring_law import spring_bend, spring_law
 
 Floats = npt.NDArray[np.floating[Any]]
 Signals = dict[str, Floats]
@@ -32,7 +33,6 @@ POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
 _LEVELS = 8  # bins of a segment without slips
 _BREAKAWAY_WAVES = 5
-_ROUND_ENTRY = 10  # blocks: longer than the delays of a measuring chain
 _ENOUGH_SLIPS = 0.5  # sum of their weights
 _LEVEL = 0.15  # of the static friction: sliding under a friction wave changes by less
 _TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
@@ -321,53 +321,14 @@ def _vibration(found: Features, number: int, cut: Signals) -> None:
 
 
 def _parity(found: Features, signals: Signals, commands: Commands, scales: Scales) -> None:
-    """Force against extension, its rate, its cube, time, the direction and its bend: a massless linear spring has the first only.
-
-    A force that comes T later is F - T F' + c T^2 F'' with c of 0.5, one behind n equal low-passes has c = (n + 1) / 2 n, and a
-    frame that swings bends as well: the bend tells them apart.
-    """
+    """Relations of a run that hold whatever the friction is."""
     if not {"drive_force_N", "mass_position_m", "drive_position_m"} <= signals.keys():
         return
-    extension_m = signals["drive_position_m"] - signals["mass_position_m"]
-    rate_mps = np.gradient(uniform_filter1d(extension_m, 5), BLOCK_S)
-    bend_mps2 = _bend_mps2(extension_m, scales)
-    even = np.ones(len(extension_m), np.bool_)
-    for segment in commands.segments:
-        if segment.still or segment.slips > 0:  # the model jumps to the force that was measured there
-            even[max(segment.first - _ROUND_ENTRY, 0) : segment.first + _ROUND_ENTRY] = False
-    force_N, extension_m = signals["drive_force_N"][even], extension_m[even]
-    extension_m = extension_m - extension_m.mean() + force_N.mean() / scales.stiffness_N_per_m
-    reach_m = scales.force_N / scales.stiffness_N_per_m
-    both = force_N.min() < -0.3 * scales.force_N and force_N.max() > 0.3 * scales.force_N
-    reaches = extension_m / reach_m
-    columns = {
-        "stiffness": reaches,
-        "rate": rate_mps[even] * 1e3,
-        "cube": reaches * reaches * reaches,  # a power takes as long as all the rest of this
-        "time": np.linspace(-1.0, 1.0, len(even))[even],
-    }
-    if both:
-        columns["direction"] = np.sign(force_N)
-    columns["bend"] = bend_mps2[even]
-    # one after the other, each freed of those before it: together they would pass noise on to each other
-    centred = np.array([*columns.values(), force_N])
-    centred -= centred.mean(axis=1, keepdims=True)
-    products = centred @ centred.T
-    for i, name in enumerate(columns):
-        freed = products[i] / (products[i, i] + 1e-30)
-        found.add(f"spring {name}", "drive_force_N", "stick", LOW, -1, float(freed[-1]))
-        products -= np.outer(products[i], freed)
-    if not both:
-        found.add("spring direction", "drive_force_N", "stick", LOW, -1, math.nan)
-    found.add("spring rest", "drive_force_N", "stick", MIDDLE, -1, max(float(products[-1, -1]), 0.0) / len(force_N))
-
-
-def _bend_mps2(extension_m: Floats, scales: Scales) -> Floats:
-    """Second derivative over a quarter of a slip: the noise of displacement sensors grows with the square of frequency."""
-    width = max(round(0.25 * scales.slip_s / BLOCK_S), 1)
-    level_m = uniform_filter1d(extension_m, width)
-    padded = np.pad(level_m, width, mode="edge")
-    return (padded[2 * width :] - 2.0 * level_m + padded[: -2 * width]) / (width * BLOCK_S) ** 2
+    force_N, extension_m = signals["drive_force_N"], signals["drive_position_m"] - signals["mass_position_m"]
+    law = spring_law(force_N, extension_m, commands.segments, scales.force_N, scales.stiffness_N_per_m)
+    law["bend"] = spring_bend(force_N, extension_m, commands.segments, scales.slip_s)
+    for name, value in law.items():
+        found.add(f"spring {name}", "drive_force_N", "stick", MIDDLE if name == "rest" else LOW, -1, value)
 
 
 def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
