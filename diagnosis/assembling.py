@@ -82,11 +82,10 @@ def assembled(
     alike = imitators(fitter, followed, verdict.scale) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
     if verdict.outside:
-        picked_up = any(run.pick_up for run in evidence.runs)
-        what, left = (
-            (UNCOUPLE, "the vibration in the force signal") if picked_up else (SINE, "what shakes as no sine does")
-        )
-        following = Experiment(what, f"No effect of the library makes {left}.", None)
+        if any(run.pick_up for run in evidence.runs):
+            following = Experiment(UNCOUPLE, "No effect of the library makes the force signal vibrate so.", None)
+        else:
+            following = Experiment(SINE, "Every effect of the library shakes the base with a sine.", None)
     else:
         following = next_experiment(fitter.problem, nuisances, leaders)
     done = Diagnosis(

@@ -1,16 +1,17 @@
 """The whole way from an evidence to a diagnosis: retune, alarm, name, group, judge on held-out runs, say what to do next."""
 
 import time
+from collections.abc import Sequence
 
 from diagnosis.assembling import assembled
 from diagnosis.contest import Contest, Progress
-from diagnosis.evidence import Evidence
+from diagnosis.evidence import Evidence, Run
 from diagnosis.kept_aside import borne_out
 from diagnosis.library import trials
 from diagnosis.problem import PIEZO_EFFECTS, Problem, prepare
 from diagnosis.result import Diagnosis
 from diagnosis.retuning import retuned_rig
-from diagnosis.verdict import although_outside
+from diagnosis.verdict import Verdict, although_outside
 from diagnosis.workers import one_thread
 
 
@@ -32,9 +33,14 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     contest.decide(progress)
     unseen = [run for run in runs if run.holdout]
     outcome = borne_out(contest, Problem(evidence.rig, unseen) if unseen else None, jobs)
-    distorted = any(run.distortion for run in evidence.runs)
-    if distorted or any(run.pick_up for run in evidence.runs):
-        verdict = although_outside(outcome.verdict, PIEZO_EFFECTS if distorted else frozenset())
-        outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
+    verdict = with_what_vibrates(outcome.verdict, evidence.runs)
+    outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
     progress(f"verdict: {outcome.verdict.kind}", 0.8)
     return assembled(evidence, runs, contest, outcome, tried, began, jobs)
+
+
+def with_what_vibrates(verdict: Verdict, runs: Sequence[Run]) -> Verdict:
+    """What becomes of a verdict where runs vibrate as no model does: in the force signal, or at other frequencies."""
+    if any(run.distortion for run in runs):
+        return although_outside(verdict, PIEZO_EFFECTS)
+    return although_outside(verdict) if any(run.pick_up for run in runs) else verdict

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from diagnosis.assembling import compared_fits
+from diagnosis.diagnose import with_what_vibrates
+from diagnosis.distortion import Distortion
+from diagnosis.evidence import Run
 from diagnosis.form import NOTHING, Axis, Form
+from diagnosis.pick_up import PickUp
 from diagnosis.random_friction import Scattered, is_random
 from diagnosis.refit import Fit
 from diagnosis.verdict import JITTER, although_outside, doubted, is_of_one_place, judge, of_another_place
@@ -51,6 +55,22 @@ def test_what_shows_elsewhere_takes_the_name_of_an_effect_that_imitates_it():
     assert (outside.kind, outside.named, outside.runner_up) == ("unexplained", None, effect.named)
     assert outside.probabilities["unexplained"] == effect.probabilities["piezo-resonance"]
     assert sum(outside.probabilities.values()) == pytest.approx(1.0)
+
+
+def test_harmonics_take_a_piezo_s_name_and_a_pick_up_takes_none():
+    plain = Run("run-01.csv", np.zeros(2), {}, {}, None, False)
+    picked_up = plain._replace(pick_up=PickUp(2500.0, 0.3, 1e-5, 0.1))
+    distorted = plain._replace(distortion=Distortion(2500.0, 2.0, 0.1))
+    effect = judge(fit(400.0), [fit(50.0, "piezo-resonance")], [], EXPECTED)
+    assert with_what_vibrates(effect, [plain, picked_up]).kind == "effect"
+    assert with_what_vibrates(effect, [plain, distorted]).kind == "unexplained"
+    other = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED)
+    assert with_what_vibrates(other, [distorted]).kind == "effect"
+    nothing = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED)
+    assert with_what_vibrates(nothing, [plain]).kind == "no-gap"
+    assert (
+        with_what_vibrates(nothing, [picked_up]).kind == with_what_vibrates(nothing, [distorted]).kind == "unexplained"
+    )
 
 
 def test_a_gap_that_nothing_takes_is_unexplained():

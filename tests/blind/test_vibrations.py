@@ -1,4 +1,4 @@
-"""A rig with nothing wrong but the exciter's voltage in the force sensor's cable, which means over 1 ms do not show."""
+"""Rigs with nothing wrong but a vibration that means over 1 ms do not show: in a sensor's cable, or at other frequencies."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.blind.independent_cases import Independent
 from tests.blind.small_set import RUNS
 
 
-def test_it_is_unexplained_and_told_with_where_and_what_next(tmp_path):
+def test_cross_talk_is_unexplained_and_told_with_where_and_what_next(tmp_path):
     source = Independent(RUNS)
     cross_talk = source.draw(np.random.default_rng(1), "piezo-cross-talk")
     source.make(tmp_path, Plan(effects=(cross_talk,)), seed=11)
@@ -25,3 +25,14 @@ def test_it_is_unexplained_and_told_with_where_and_what_next(tmp_path):
     assert "drive_force_N vibrates with" in " ".join(found.summary)
     assert "Uncouple" in found.next_experiment.what
     assert sum(cell.share for cell in found.where) == pytest.approx(1.0)
+
+
+def test_harmonics_are_found_where_the_base_vibrates(tmp_path):
+    source = Independent(RUNS)
+    harmonics = source.draw(np.random.default_rng(1), "piezo-harmonics")
+    source.make(tmp_path, Plan(effects=(harmonics,)), seed=11)
+    for run in load_evidence(tmp_path).runs:
+        told, vibrates = run.distortion, run.columns["vibration_amplitude_m"].any()
+        assert (told is not None) == vibrates
+        if told is not None:
+            assert told.multiple in {0.5, 2.0}
