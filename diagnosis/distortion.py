@@ -16,7 +16,7 @@ from diagnosis.wording import percent
 DISTORTED = "distorted"  # kind of the finding
 _MULTIPLES = (0.5, 1.5, 2.0, 3.0)
 # Of the velocity, which decides where slips end: v_a / v_d of 1.00 fails and 1.05 passes. A piezo's hysteresis makes some per
-# cent; of 56 made rigs those with a rigid base show 0.04 % at most, harmonics of 2.1 detection limits and more 6 %.
+# cent; of 56 made rigs those with a rigid base show 0.1 % at most, harmonics of 2.1 detection limits and more 6 %.
 _SHARE = 0.05
 _OF_BESIDE = 4.0  # times what is found beside: noise, and slips
 
