@@ -6,7 +6,7 @@ import time
 from contextlib import closing
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,12 +14,24 @@ from bridge.faults import Fault
 from cockpit.processes import guarded
 from cockpit.writing import check_writable, writing
 
+if TYPE_CHECKING:
+    from diagnosis.blind.opening import OpenedSet
+
 blind_app = typer.Typer(
     help="How good is the diagnosis? Sealed cases made, diagnosed without the answers, scored.", no_args_is_help=True
 )
 SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `blind make` made.")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")]
 Key = Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")]
+AsJson = Annotated[
+    Path | None,
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        help="Write the scores here as JSON, with what is there and what was said of every case.",
+    ),
+]
+Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one HTML file.")]
 
 
 class Source(StrEnum):
@@ -95,13 +107,8 @@ def blind_run(folder: SetArgument, jobs: Jobs = None) -> None:
 def blind_score(
     folder: SetArgument,
     key: Key,
-    as_json: Annotated[
-        Path | None,
-        typer.Option(
-            "--json", help="Write the scores here as JSON, with what is there and what was said of every case."
-        ),
-    ] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a report, one HTML file.")] = None,
+    as_json: AsJson = None,
+    report: Report = None,
     baselines: Annotated[
         bool, typer.Option("--baselines", help="Oracle and tree ensemble too: half a minute a case and core.")
     ] = False,
@@ -114,29 +121,54 @@ def blind_score(
         from joblib import cpu_count
 
         from cockpit.diagnose_output import watched
-        from diagnosis.blind.opening import open_set, scored
-        from diagnosis.blind.report import write_report
-        from diagnosis.blind.scoring import as_json as plain
-        from diagnosis.blind.table import table
-        from diagnosis.strict_json import write_json
+        from diagnosis.blind.opening import open_set, with_baselines
 
         _end_like_ctrl_c()
         _check_file("--json", as_json)
         _check_file("--report", report)
         with writing(), watched() as progress:
-            cases, sealed = open_set(folder, key, partial)
-            methods = scored(folder, cases, baselines, jobs or cpu_count(), progress)
-        print(table(methods, sealed))
-        with writing():
-            if as_json is not None:
-                rows = [case.row() for case in cases]
-                scores = {"format": "blind-scores/1", "sealed": sealed, "methods": plain(methods), "cases": rows}
-                write_json(as_json, scores)
-            if report is not None:
-                write_report(methods, sealed, folder.name, report)
-                print(f"\nreport     {report}")
+            found = open_set(folder, key, partial)
+            if baselines:
+                found = with_baselines(found, folder, jobs or cpu_count(), progress)
+        _told(found, folder.name, as_json, report)
 
     sys.exit(guarded(work))
+
+
+@blind_app.command("pool")
+def blind_pool(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="What `blind score --json` wrote of each set.")
+    ],
+    as_json: AsJson = None,
+    report: Report = None,
+) -> None:
+    """Score several opened sets of one version together, or one again, from the files of their scores."""
+
+    def work() -> None:
+        from diagnosis.blind.pooling import pooled
+
+        _check_file("--json", as_json)
+        _check_file("--report", report)
+        _told(pooled(files), ", ".join(path.stem for path in files), as_json, report)
+
+    sys.exit(guarded(work))
+
+
+def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | None) -> None:
+    from diagnosis.blind.opening import scored
+    from diagnosis.blind.pooling import write_scores
+    from diagnosis.blind.report import write_report
+    from diagnosis.blind.table import table
+
+    methods = scored(found)
+    print(table(methods, found.sealed))
+    with writing():
+        if as_json is not None:
+            write_scores(as_json, found, methods)
+        if report is not None:
+            write_report(methods, found.sealed, name, report)
+            print(f"\nreport     {report}")
 
 
 def _end_like_ctrl_c() -> None:

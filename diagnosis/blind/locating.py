@@ -6,6 +6,8 @@ the gap. Bands are taken together. The counterfactual is not retuned, the gap is
 """
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from diagnosis.blind.outcomes import Opened
 
@@ -23,10 +25,15 @@ def true_cells(case: Opened) -> set[Cell]:
 
 def said_cells(case: Opened) -> set[Cell]:
     """Where the gap was said to be."""
-    shares: Counter[Cell] = Counter()
-    for one in case.said["where"]:
-        shares[_cell(one["signal"], one["regime"], one["run"])] += one["share"]
-    return {cell for cell, share in shares.items() if share >= _LEAST_SHARE}
+    return {cell for cell, share in shares(case.said["where"]).items() if share >= _LEAST_SHARE}
+
+
+def shares(where: Sequence[Mapping[str, Any]]) -> Counter[Cell]:
+    """Of the gap, by cell: the bands of a result's `where` together."""
+    found: Counter[Cell] = Counter()
+    for one in where:
+        found[_cell(one["signal"], one["regime"], one["run"])] += one["share"]
+    return found
 
 
 def f1(case: Opened) -> float | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from bridge.faults import Fault
 from diagnosis.blind import baselines
@@ -16,8 +17,18 @@ from diagnosis.blind.trees import tree_probabilities
 Progress = Callable[[str, float], None]
 
 
-def open_set(folder: Path, key: Path, partial: bool) -> tuple[list[Opened], bool]:
-    """Check every hash, open the answers and mark the set; the cases, and whether nobody could know an answer until now.
+class OpenedSet(NamedTuple):
+    """What scores are made of."""
+
+    cases: list[Opened]
+    sealed: bool  # nobody could know an answer when the results were made
+    tool: str  # version that made them
+    oracle: Oracle | None = None  # None: not asked
+    trees: dict[str, dict[str, float]] | None = None  # probabilities of the candidates, by case; None: not asked
+
+
+def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:
+    """Check every hash, open the answers and mark the set.
 
     Raises Fault SEAL_BROKEN, and BAD_SET for missing results unless `partial`; then nothing was opened.
     """
@@ -30,21 +41,29 @@ def open_set(folder: Path, key: Path, partial: bool) -> tuple[list[Opened], bool
     said = results(folder, list(answers))
     cases = [opened(name, answers[name], result) for name, result in said.items()]
     published = any(answer.get("published", True) for answer in answers.values())
-    return cases, mark_opened(folder) and not published
+    # `blind run` makes results of one version only
+    tool = str(next(iter(said.values())).get("tool", "unknown"))
+    return OpenedSet(cases, mark_opened(folder) and not published, tool)
 
 
-def scored(folder: Path, cases: list[Opened], with_baselines: bool, jobs: int, progress: Progress) -> dict[str, Scores]:
+def with_baselines(found: OpenedSet, folder: Path, jobs: int, progress: Progress) -> OpenedSet:
+    """The set with what the two methods say that have to compute it."""
+    best = oracle(folder, found.cases, jobs, progress)
+    readable = [case.name for case in found.cases if case.verdict != "fault"]
+    return found._replace(oracle=best, trees=tree_probabilities(folder, readable, jobs, progress))
+
+
+def scored(found: OpenedSet) -> dict[str, Scores]:
     """Scores by method, the diagnosis first."""
-    best: Oracle = oracle(folder, cases, jobs, progress) if with_baselines else {}
-    found = {
-        TOOL: score(cases, best),
-        "parameters": score([baselines.parameters_only(case) for case in cases], best),
-        "BIC": score([baselines.lowest_bic(case) for case in cases], best),
-        "flexible": score([baselines.flexible_residual(case) for case in cases], best),
+    cases, best, guessed = found.cases, found.oracle, found.trees
+    methods = {
+        TOOL: cases,
+        "parameters": [baselines.parameters_only(case) for case in cases],
+        "BIC": [baselines.lowest_bic(case) for case in cases],
+        "flexible": [baselines.flexible_residual(case) for case in cases],
     }
-    if with_baselines:
-        readable = [case.name for case in cases if case.verdict != "fault"]
-        guessed = tree_probabilities(folder, readable, jobs, progress)
-        found["trees"] = score([baselines.from_probabilities(case, guessed.get(case.name, {})) for case in cases], best)
-        found["oracle"] = score([baselines.told(case, best.get(case.name)) for case in cases], best)
-    return found
+    if guessed is not None:
+        methods["trees"] = [baselines.from_probabilities(case, guessed.get(case.name, {})) for case in cases]
+    if best is not None:
+        methods["oracle"] = [baselines.told(case, best.get(case.name)) for case in cases]
+    return {name: score(answers, best or {}) for name, answers in methods.items()}

@@ -1,10 +1,11 @@
-"""A generator and a bench that take no time: an effect of strength s makes the force s larger and is worth 4 s limits."""
+"""Stand-ins without delay: a generator and a bench, where a strength s adds s to the force and is worth 4 s limits; cases."""
 
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from diagnosis.blind.outcomes import Opened, opened
 from tests import made_up
 from tests.blind.generators import Plan
 
@@ -59,3 +60,32 @@ class StandInBench:
 
 def _first_N(folder: Path) -> float:
     return float((folder / "run-01.csv").read_text().splitlines()[1].split(",")[1])
+
+
+def case(stratum, there, probabilities, named=None, groups=(), detectability=3.0, verdict=None, **more) -> Opened:
+    """A case; `named` is the leading candidate unless told."""
+    right = {"no-gap": "no-gap", "outside": "unexplained"}.get(stratum, "effect")
+    answer = {
+        "stratum": stratum,
+        "verdict": right,
+        "effects": [{"name": name, "detectability": detectability} for name in there],
+        "group": list(there),
+        "tolerances": 1.0,
+        "backbone": "lugre",
+        "leave_out": [],
+        "cells": more.pop("cells", []),
+    }
+    top = max(probabilities, key=probabilities.get)
+    if named is None:
+        named = [] if top in {"none", "unexplained"} else [top]
+    said = {
+        "verdict": verdict or {"none": "no-gap", "unexplained": "unexplained"}.get(top, "effect"),
+        "effects": list(named),
+        "candidates": [{"effect": name, "probability": p} for name, p in probabilities.items()],
+        "not_distinguishable": [list(group) for group in groups],
+        "where": more.pop("where", []),
+        "gap": {"shrinkage": 0.8, "interval_90": [0.7, 0.9]},
+        "next_experiment": {"gain": 3.0},
+        "elapsed_s": 10.0,
+    }
+    return opened(more.pop("name", "a"), answer, said | more)

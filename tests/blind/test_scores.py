@@ -10,7 +10,7 @@ from diagnosis.blind import baselines
 from diagnosis.blind.calibration import calibration_error, error_of_perfect, log_score, reliability
 from diagnosis.blind.intervals import Score, bootstrapped, mean, rate, ratio
 from diagnosis.blind.locating import f1
-from diagnosis.blind.outcomes import Opened, opened
+from diagnosis.blind.outcomes import opened
 from diagnosis.blind.scoring import as_json, score
 from diagnosis.blind.table import Row, table
 from diagnosis.making import paper_rig
@@ -20,36 +20,8 @@ from tests.blind.generators import Plan
 from tests.blind.making import size
 from tests.blind.plant_cases import Plant, drawn
 from tests.blind.plant_sizes import EFFECT_SIZES, possible
-from tests.blind.stand_ins import Bump, StandIn
+from tests.blind.stand_ins import Bump, StandIn, case
 from tests.blind.strata import counts, draw
-
-
-def case(stratum, there, probabilities, named=None, groups=(), detectability=3.0, verdict=None, **more) -> Opened:
-    """A case; `named` is the leading candidate unless told."""
-    right = {"no-gap": "no-gap", "outside": "unexplained"}.get(stratum, "effect")
-    answer = {
-        "stratum": stratum,
-        "verdict": right,
-        "effects": [{"name": name, "detectability": detectability} for name in there],
-        "group": list(there),
-        "tolerances": 1.0,
-        "backbone": "lugre",
-        "cells": more.pop("cells", []),
-    }
-    top = max(probabilities, key=probabilities.get)
-    if named is None:
-        named = [] if top in {"none", "unexplained"} else [top]
-    said = {
-        "verdict": verdict or {"none": "no-gap", "unexplained": "unexplained"}.get(top, "effect"),
-        "effects": list(named),
-        "candidates": [{"effect": name, "probability": p} for name, p in probabilities.items()],
-        "not_distinguishable": [list(group) for group in groups],
-        "where": more.pop("where", []),
-        "gap": {"shrinkage": 0.8, "interval_90": [0.7, 0.9]},
-        "next_experiment": {"gain": 3.0},
-        "elapsed_s": 10.0,
-    }
-    return opened(more.pop("name", "a"), answer, said | more)
 
 
 def test_scores_by_hand():
