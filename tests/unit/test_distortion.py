@@ -5,15 +5,12 @@ import pytest
 
 from diagnosis.distortion import DISTORTED, Distortion, distortion
 from diagnosis.evidence import load_evidence
-from tests.evidence_folder import Columns, folder, kinds
-from tests.unit.test_pick_up import columns
-
-RATE_HZ = 20000.0
+from tests.evidence_folder import Columns, folder, kinds, vibrated
 
 
 def shaken(multiple: float, share: float, frequency_Hz: float = 2500.0, noise_mps2: float = 0.05) -> Columns:
     """A base that shakes with 5 m/s2 in the second half of two seconds, and with that share of its velocity at a multiple."""
-    data = columns(0.0, frequency_Hz=frequency_Hz)
+    data = vibrated(0.0, frequency_Hz=frequency_Hz)
     on = data["vibration_amplitude_m"] > 0.0
     turns = 2.0 * np.pi * frequency_Hz * data["t_s"]
     wave = np.sin(turns + 0.3) + share * multiple * np.sin(multiple * turns + 1.1)

@@ -6,7 +6,7 @@ import pytest
 from diagnosis.evidence import load_evidence
 from diagnosis.manifest import RigTable
 from diagnosis.pick_up import PICK_UP, PickUp, pick_up
-from tests.evidence_folder import Columns, folder, kinds
+from tests.evidence_folder import FREQUENCY_HZ, RATE_HZ, Columns, folder, kinds, vibrated
 
 RIG = RigTable(
     drive="spring",
@@ -20,23 +20,6 @@ RIG = RigTable(
     static_force_N=17.38,
     stribeck_velocity_mps=0.0005,
 )
-RATE_HZ, FREQUENCY_HZ = 20000.0, 2500.0
-
-
-def columns(pick_up_N: float, seconds: float = 2.0, frequency_Hz: float = FREQUENCY_HZ) -> Columns:
-    """Stick-slip of a spring drive, vibrated in its second half, in the force of which there is that much of the vibration."""
-    t_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
-    random = np.random.default_rng(1)
-    on = t_s > 0.5 * seconds
-    wave = np.where(on, np.sin(2.0 * np.pi * frequency_Hz * t_s + 0.7), 0.0)
-    slips_N = 15.0 + 2.0 * (4.0 * t_s % 1.0)  # falls by 2 N within one sample: as much at 2.5 kHz as any slip can have
-    return {
-        "t_s": t_s,
-        "drive_force_N": slips_N + pick_up_N * wave + random.normal(0.0, 0.02, t_s.size),
-        "mass_accel_mps2": 1.0 * wave + random.normal(0.0, 0.1, t_s.size),
-        "vibration_frequency_Hz": np.where(on, frequency_Hz, 0.0),
-        "vibration_amplitude_m": np.where(on, 35e-9, 0.0),
-    }
 
 
 def found(data: Columns, rig: RigTable = RIG) -> PickUp | None:
@@ -45,7 +28,7 @@ def found(data: Columns, rig: RigTable = RIG) -> PickUp | None:
 
 @pytest.mark.parametrize("force_N", [0.15, 1.0])
 def test_it_is_found_with_its_size(force_N):
-    told = found(columns(force_N))
+    told = found(vibrated(force_N))
     assert told is not None
     assert told.force_N == pytest.approx(force_N, rel=0.02)
     assert told.frequency_Hz == FREQUENCY_HZ
@@ -55,7 +38,7 @@ def test_it_is_found_with_its_size(force_N):
 
 @pytest.mark.parametrize("frequency_Hz", [400.0, 1200.0, 8000.0])
 def test_it_is_found_above_the_slips_and_below_what_the_sampling_shows(frequency_Hz):
-    told = found(columns(1.0, frequency_Hz=frequency_Hz), RIG.model_copy(update={"drive_stiffness_N_per_m": 1000.0}))
+    told = found(vibrated(1.0, frequency_Hz=frequency_Hz), RIG.model_copy(update={"drive_stiffness_N_per_m": 1000.0}))
     assert told is not None
     assert told.force_N == pytest.approx(1.0, rel=0.05)
 
@@ -84,31 +67,31 @@ def test_of_several_frequencies_the_one_that_stands_out_is_told():
 
 @pytest.mark.parametrize("missing", ["mass_accel_mps2", "vibration_amplitude_m", "drive_force_N"])
 def test_nothing_is_said_of_what_cannot_be_known(missing):
-    data = columns(1.0)
+    data = vibrated(1.0)
     del data[missing]
     assert found(data) is None
 
 
 def test_a_small_one_is_ordinary():
-    assert found(columns(0.05)) is None
+    assert found(vibrated(0.05)) is None
 
 
 def test_what_the_spring_carries_is_no_pick_up():
     """A stiff drive: 0.5 N are what it carries at 1 m/s2."""
     stiff = RIG.model_copy(update={"drive_stiffness_N_per_m": 0.5 * (2.0 * np.pi * FREQUENCY_HZ) ** 2})
-    assert found(columns(0.5), stiff) is None
+    assert found(vibrated(0.5), stiff) is None
 
 
 def test_a_vibration_that_the_sampling_folds_down_is_left_alone():
-    assert found(columns(1.0, frequency_Hz=9500.0)) is None
+    assert found(vibrated(1.0, frequency_Hz=9500.0)) is None
 
 
 def test_too_short_a_vibration_is_left_alone():
-    assert found(columns(1.0, seconds=0.19)) is None
+    assert found(vibrated(1.0, seconds=0.19)) is None
 
 
 def test_it_is_a_finding_of_the_evidence(tmp_path):
-    path = folder(tmp_path, columns(0.3))
+    path = folder(tmp_path, vibrated(0.3))
     assert (
         "drive_force_N: vibrates with 0.3 N at 2500 Hz, where the spring carries 47 µN"
         in kinds(load_evidence(path))[PICK_UP]
@@ -116,5 +99,5 @@ def test_it_is_a_finding_of_the_evidence(tmp_path):
 
 
 def test_a_run_of_an_axis_sampled_slowly_is_left_alone():
-    data = {name: values[::1000] for name, values in columns(1.0).items()}  # 20 Hz
+    data = {name: values[::1000] for name, values in vibrated(1.0).items()}  # 20 Hz
     assert found(data) is None
