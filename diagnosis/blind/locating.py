@@ -13,19 +13,19 @@ from diagnosis.blind.outcomes import Opened
 
 Cell = tuple[str, str, str]
 _LEAST_FLOORS = 2.0
-_LEAST_SHARE = 0.05
+LEAST_SHARE = 0.05
 
 
 def true_cells(case: Opened) -> set[Cell]:
     """Where the effect shows."""
     squares = {_cell(signal, regime, run): floors**2 for signal, regime, run, floors in case.answer["cells"]}
     total = sum(squares.values())
-    return {cell for cell, square in squares.items() if square > _LEAST_FLOORS**2 and square >= _LEAST_SHARE * total}
+    return {cell for cell, square in squares.items() if square > _LEAST_FLOORS**2 and square >= LEAST_SHARE * total}
 
 
 def said_cells(case: Opened) -> set[Cell]:
     """Where the gap was said to be."""
-    return {cell for cell, share in shares(case.said["where"]).items() if share >= _LEAST_SHARE}
+    return {cell for cell, share in shares(case.said["where"]).items() if share >= LEAST_SHARE}
 
 
 def shares(where: Sequence[Mapping[str, Any]]) -> Counter[Cell]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import Fault
-from diagnosis.blind.locating import shares
+from diagnosis.blind.locating import LEAST_SHARE, shares
 from diagnosis.blind.opening import OpenedSet
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import Scores, as_json
@@ -59,7 +59,7 @@ def _row(found: OpenedSet, case: Opened) -> dict[str, Any]:
 
 
 def _scored_of(said: Mapping[str, Any]) -> dict[str, Any]:
-    """Of a result what scores depend on: a tenth of it."""
+    """Of a result what scores depend on: a third of it."""
     return {key: said[key] for key in _SCORED if key in said} | {
         "candidates": [
             {key: one.get(key) for key in ("effect", "probability", "chi2")}
@@ -71,6 +71,7 @@ def _scored_of(said: Mapping[str, Any]) -> dict[str, Any]:
         "where": [
             {"signal": signal, "regime": regime, "run": run, "share": share}
             for (signal, regime, run), share in shares(said["where"]).items()
+            if share >= LEAST_SHARE
         ],
     }
 
