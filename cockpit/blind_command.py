@@ -162,13 +162,14 @@ def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | No
     from diagnosis.blind.table import table
 
     methods = scored(found)
-    print(table(methods, found.sealed))
-    with writing():
+    with writing():  # before anything is printed, which ends where nobody reads on
         if as_json is not None:
             write_scores(as_json, found, methods)
         if report is not None:
             write_report(methods, found.sealed, name, report)
-            print(f"\nreport     {report}")
+    print(table(methods, found.sealed))
+    if report is not None:
+        print(f"\nreport     {report}")
 
 
 def _end_like_ctrl_c() -> None:
