@@ -148,8 +148,12 @@ def blind_pool(
     def work() -> None:
         from diagnosis.blind.pooling import pooled
 
-        _check_file("--json", as_json)
-        _check_file("--report", report)
+        for option, path in (("--json", as_json), ("--report", report)):
+            _check_file(option, path)
+            if path is not None and path.resolve() in {file.resolve() for file in files}:
+                raise Fault(
+                    "CONFIG", f"{option} {path}: is one of the files to read, which would be lost; choose another"
+                )
         _told(pooled(files), ", ".join(path.stem for path in files), as_json, report)
 
     sys.exit(guarded(work))

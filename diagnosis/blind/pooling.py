@@ -35,9 +35,12 @@ def pooled(paths: Sequence[Path]) -> OpenedSet:
         files = ", ".join(map(str, paths))
         line = f"{files}: results of the versions {' and '.join(sorted(tools))}: must be of one;"
         raise Fault("BAD_SET", f"{line} score each for itself")
-    names = [case.name for one in found for case in one.cases]
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise Fault("BAD_SET", f"{paths[-1]}: case {twice[0]} is in another file too: must be in one; leave one out")
+    seen: dict[int, Path] = {}  # by the seed of a case: made anew it has another name
+    for path, one in zip(paths, found, strict=True):
+        for case in one.cases:
+            if (other := seen.setdefault(case.answer["counterfactual_seed"], path)) is not path:
+                line = f"{path}: case {case.name} is in {other} too: must be in one; leave one file out"
+                raise Fault("BAD_SET", line)
     asked = all(one.oracle is not None and one.trees is not None for one in found)
     return OpenedSet(
         [case for one in found for case in one.cases],
@@ -59,7 +62,7 @@ def _row(found: OpenedSet, case: Opened) -> dict[str, Any]:
 
 
 def _scored_of(said: Mapping[str, Any]) -> dict[str, Any]:
-    """Of a result what scores depend on: a third of it."""
+    """Of a result what scores depend on."""
     return {key: said[key] for key in _SCORED if key in said} | {
         "candidates": [
             {key: one.get(key) for key in ("effect", "probability", "chi2")}

@@ -73,6 +73,7 @@ def case(stratum, there, probabilities, named=None, groups=(), detectability=3.0
         "tolerances": 1.0,
         "backbone": "lugre",
         "leave_out": [],
+        "counterfactual_seed": more.pop("seed", 1),
         "cells": more.pop("cells", []),
     }
     top = max(probabilities, key=probabilities.get)

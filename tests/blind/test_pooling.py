@@ -27,12 +27,12 @@ CHI2 = {
 
 
 def opened_set(number: int) -> OpenedSet:
+    damped, found = ["drive-damping"], {"drive-damping": 0.8}
+    seed = 10 * number
     cases = [
-        case(
-            "one-effect", ["drive-damping"], {"drive-damping": 0.8}, name=f"a{number}", cells=CELLS, where=WHERE, **CHI2
-        ),
-        case("no-gap", [], {"none": 0.9}, name=f"b{number}"),
-        case("outside", ["loose-screw"], {"unexplained": 0.6, "none": 0.4}, name=f"c{number}"),
+        case("one-effect", damped, found, name=f"a{number}", seed=seed, cells=CELLS, where=WHERE, **CHI2),
+        case("no-gap", [], {"none": 0.9}, name=f"b{number}", seed=seed + 1),
+        case("outside", ["loose-screw"], {"unexplained": 0.6, "none": 0.4}, name=f"c{number}", seed=seed + 2),
     ]
     trees = {f"a{number}": {"none": 1.0}, f"b{number}": {"none": 1.0}, f"c{number}": {"drive-damping": 1.0}}
     return OpenedSet(cases, sealed=True, tool="1", oracle={f"a{number}": 0.85}, trees=trees)
@@ -89,7 +89,9 @@ def test_what_cannot_be_pooled_is_refused(tmp_path):
         assert result.exit_code == FAULTS["BAD_SET"].exit_status
         return result.stderr
 
-    assert "case a1 is in another file too: must be in one; leave one out" in refused(one, one)
+    again = tmp_path / "again.json"
+    again.write_text(one.read_text().replace('"a1"', '"d1"'))  # the same rigs, made anew
+    assert f"{again}: case d1 is in {one} too: must be in one; leave one file out" in refused(one, again)
     assert "results of the versions 1 and 2: must be of one" in refused(one, kept(tmp_path, 2, tool="2"))
     assert "No such file" in refused(tmp_path / "nothing.json")
     bad = tmp_path / "bad.json"
@@ -101,3 +103,12 @@ def test_what_cannot_be_pooled_is_refused(tmp_path):
     del table["cases"][0]["answer"]
     bad.write_text(json.dumps(table))
     assert f"{bad}: cases: 'answer' is missing" in refused(bad)
+
+
+def test_what_is_read_is_not_written_over(tmp_path):
+    one = kept(tmp_path, 1)
+    before = one.read_bytes()
+    result = pool(one, "--json", one)
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert f"--json {one}: is one of the files to read" in result.stderr
+    assert one.read_bytes() == before
