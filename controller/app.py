@@ -41,9 +41,9 @@ def run(
         process = _Process(config, node, bus, lockstep)
         process.prepare()
         _refuse_a_second(bus, bus_config.endpoint)
-        bus.announce()
         # in lockstep plant and controller take turns: on one core the wake-up of the other costs a tenth
-        granted = realtime.claim(0 if lockstep else 1)
+        granted = realtime.claim(0 if lockstep else 1)  # the rig may begin once it knows
+        bus.announce()
         process.loop(stop, granted)
 
 

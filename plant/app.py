@@ -41,9 +41,9 @@ def run(
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
         process = _Process(node, bus)
+        granted = realtime.claim(0)  # before the others know: claimed at the first block, the link lapsed under load
         bus.announce()
         wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
-        granted = realtime.claim(0)
         if lockstep:
             process.event("START", "lockstep")  # the same text everywhere: the same run gives the same log
             process.lockstep(blocks, stop)

@@ -1,5 +1,6 @@
 """A short run in real time over the bus, and an operator's word during it."""
 
+import signal
 import subprocess
 import sys
 import time
@@ -39,7 +40,8 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     assert len(data.sensors) == 6000, result.stderr
     assert np.array_equal(data.trace["block"][data.trace["events"] & BLOCK != 0], data.sensors["sequence"])
     # how soon the answers come is for the bench to say; that they come at all is for this test
-    assert int(data.applied["commands"].sum()) >= 5990
+    assert np.array_equal(np.unique(data.command["block"]), data.sensors["sequence"])
+    assert int(data.applied["commands"].sum()) > 5700  # a pause of a busy machine at the end leaves some under way
     assert set(data.headers) == {"run", "plant", "controller"}
 
 
@@ -95,7 +97,8 @@ def test_of_two_controllers_that_wait_for_one_rig_one_stays() -> None:
 
 def test_operator_stop_and_reset(tmp_path: Path) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
-    arguments = ["--set", "duration_s=12.0", "--set", "controller.policy.enabled_from_s=0.0"]
+    # without an end: three processes start during the run, and take 12 s on a busy machine
+    arguments = ["--set", "duration_s=0", "--set", "controller.policy.enabled_from_s=0.0"]
     run = subprocess.Popen(
         [*COMMAND, "run", *arguments, "--endpoint", endpoint, "--log", str(log)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -109,11 +112,12 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
         assert f"{endpoint}: another controller is on this bus: must be one" in refused.stderr
         again = [*COMMAND, "stop", "--reset", "--endpoint", endpoint]
         assert subprocess.run(again, timeout=30, check=False).returncode == 0
+        await_size(log, log.stat().st_size + 400_000)
+        run.send_signal(signal.SIGINT)
         run.communicate(timeout=60)
     finally:
-        if run.poll() is None:
-            run.kill()
-            run.communicate()
+        run.kill()
+        run.communicate()
     data = read_run(log)
     stopped = data.trace["mode"] == wire.STOPPED
     assert stopped.any()
@@ -157,9 +161,8 @@ def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
             time.sleep(0.5)
         run.communicate(timeout=60)
     finally:
-        if run.poll() is None:
-            run.kill()
-            run.communicate()
+        run.kill()
+        run.communicate()
     data = read_run(log)
     # on a busy machine a step without a block, for a late one, may stand between
     assert int((data.trace["events"] & BLOCK).sum()) == 5000
