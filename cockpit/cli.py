@@ -233,16 +233,22 @@ def stability(
 @app.command()
 def plot(
     log: Annotated[Path, typer.Argument(help="A run log, .mcap.")],
-    out: Annotated[Path, typer.Option(help="The picture, a PNG file.")] = Path("runs/run.png"),
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The picture, a PNG file; without it, beside LOG under its name.", show_default=False),
+    ] = None,
 ) -> None:
     """Draw the run in a log: drive force, v_a against v_d, and what the controller did."""
 
     def work() -> None:
         from cockpit.run_plot import plot_run
 
-        with _written(out):
-            plot_run(log, out)
-        print(f"picture  {out}")
+        picture = out or log.with_suffix(".png")
+        if picture.resolve() == log.resolve():
+            raise Fault("CONFIG", f"--out {picture}: is the log, which the picture would replace; choose another file")
+        with _written(picture):
+            plot_run(log, picture)
+        print(f"picture  {picture}")
 
     sys.exit(guarded(work))
 

@@ -51,6 +51,20 @@ def test_a_picture_of_another_name_is_a_png_and_a_run_without_vibration_has_no_l
     assert out.read_bytes().startswith(PNG)
 
 
+def test_a_picture_without_a_name_is_beside_its_log(log: Path) -> None:
+    result = call("plot", str(log))
+    assert result.exit_code == 0, result.output
+    assert log.with_name("run.png").read_bytes().startswith(PNG)
+
+
+def test_a_picture_never_replaces_its_log(log: Path) -> None:
+    before = log.read_bytes()
+    result = call("plot", str(log), "--out", str(log))
+    assert result.exit_code == 2, result.output
+    assert f"--out {log}: is the log" in result.stderr
+    assert log.read_bytes() == before
+
+
 @pytest.mark.parametrize("time", ["inf", "nan", "-1s", "1e300s", "soon"])
 def test_what_is_no_time_is_refused(log: Path, time: str) -> None:
     for option in (f"--from={time}", f"--set=limits.v_ratio=1.1@{time}"):
