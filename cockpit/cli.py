@@ -243,7 +243,7 @@ def plot(
     def work() -> None:
         from cockpit.run_plot import plot_run
 
-        picture = out or log.with_suffix(".png")
+        picture = out or log.parent / f"{log.stem}.png"
         if picture.resolve() == log.resolve():
             raise Fault("CONFIG", f"--out {picture}: is the log, which the picture would replace; choose another file")
         with _written(picture):

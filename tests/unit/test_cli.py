@@ -57,6 +57,12 @@ def test_a_picture_without_a_name_is_beside_its_log(log: Path) -> None:
     assert log.with_name("run.png").read_bytes().startswith(PNG)
 
 
+def test_a_folder_has_no_picture() -> None:
+    result = call("plot", ".")
+    assert result.exit_code == 7, result.output
+    assert ".: is a folder, must be a file" in result.stderr
+
+
 def test_a_picture_never_replaces_its_log(log: Path) -> None:
     before = log.read_bytes()
     result = call("plot", str(log), "--out", str(log))
