@@ -23,20 +23,27 @@ R = TypeVar("R")
 Record = Any
 
 
-def _cache_folder() -> Path:
-    """A folder of its own for every version of the kernels' sources.
+PACKAGES = ("bridge", "controller", "plant", "diagnosis")  # those that hold kernels, or constants that kernels freeze
+
+
+def sources_digest(root: Path) -> str:
+    """A hash over every source file of PACKAGES below `root`, sub-packages included.
 
     Numba renews a cached kernel when its own file changes, not when a kernel that it calls does: without this, an edit of
     plant/contact.py would leave plant/core.py running the old contact.
     """
-    root = Path(__file__).parent.parent
     digest = hashlib.sha256()
-    for package in ("bridge", "controller", "plant", "diagnosis"):
-        for path in sorted((root / package).glob("*.py")):
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
             digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder() -> Path:
+    """A folder of its own for every version of the kernels' sources."""
     # `Path.home` fails for a user without one
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(home) / "stickslip" / digest.hexdigest()[:16]
+    return Path(home) / "stickslip" / sources_digest(Path(__file__).parent.parent)
 
 
 def _usable(folder: Path) -> Path:

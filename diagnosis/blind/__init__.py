@@ -1,6 +1,7 @@
 """How good the diagnosis is, measured so that it cannot cheat: sealed answers, one run, one score.
 
 sealing         a set of cases, the hashes of its answers, the key apart, and whether the set was opened
+version         the version that a result belongs to: a hash over what makes a diagnosis
 running         every case diagnosed, without the key
 opening         hashes checked, answers opened, all methods scored
 outcomes        one case opened: its answer beside what the tool said

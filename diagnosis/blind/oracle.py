@@ -15,7 +15,7 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import Oracle
-from diagnosis.blind.sealing import tool_version
+from diagnosis.blind.version import tool_version
 from diagnosis.evidence import load_evidence
 from diagnosis.gap import KNEE
 from diagnosis.heldout import HeldOut

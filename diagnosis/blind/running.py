@@ -8,7 +8,8 @@ from typing import Any
 
 from bridge.faults import Fault
 from diagnosis import many
-from diagnosis.blind.sealing import RESULTS, read_set, tool_version
+from diagnosis.blind.sealing import RESULTS, read_set
+from diagnosis.blind.version import tool_version
 from diagnosis.many import Outcome, Source
 from diagnosis.result import to_json
 from diagnosis.strict_json import write_json

@@ -13,11 +13,11 @@ import hashlib
 import json
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
+from diagnosis.blind.version import tool_version
 from diagnosis.strict_json import write_json
 
 Answer = dict[str, Any]
@@ -121,21 +121,6 @@ def opened_answers(folder: Path, key: Path) -> dict[str, Answer]:
             line = f"{folder / name}: the evidence is not the one that was sealed: its SHA-256 must be that of"
             raise Fault("SEAL_BROKEN", f"{line} {folder / SET}; the set cannot be scored")
     return {name: secrets[name].answer for name in sealed}
-
-
-def tool_version(*further: str) -> str:
-    """Version of the package, with a hash over the sources of what diagnoses, and of further packages."""
-    try:
-        number = version("stickslip")
-    except PackageNotFoundError:
-        number = "unknown"
-    root = Path(__file__).parents[2]
-    total = hashlib.sha256()
-    for path in sorted(
-        path for package in ("bridge", "plant", "diagnosis", *further) for path in (root / package).rglob("*.py")
-    ):
-        total.update(path.read_bytes())
-    return f"{number}+{total.hexdigest()[:12]}"
 
 
 def mark_opened(folder: Path) -> bool:

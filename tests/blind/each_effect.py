@@ -15,8 +15,8 @@ import numpy as np
 from diagnosis.blind.oracle import shrinkage_with
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import score
-from diagnosis.blind.sealing import tool_version
 from diagnosis.blind.table import TOOL, table
+from diagnosis.blind.version import tool_version
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence import load_evidence
 from diagnosis.result import to_json

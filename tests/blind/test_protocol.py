@@ -15,6 +15,7 @@ from bridge.faults import FAULTS
 from cockpit.cli import app
 from diagnosis import many
 from diagnosis.blind import sealing
+from diagnosis.blind.version import tool_version
 from tests import made_up
 from tests.blind import making, strata
 from tests.blind.sizes import read_sizes
@@ -216,7 +217,7 @@ def test_a_run_is_taken_up_again(made):
     names = sorted(answers(made))
     results = made / "set" / "results"
     results.mkdir()
-    mine = {"format": "mine", "tool": sealing.tool_version()}
+    mine = {"format": "mine", "tool": tool_version()}
     (results / f"{names[0]}.json").write_text(json.dumps(mine))
     assert blind("run", made / "set", "--jobs", 1).exit_code == 0
     assert sorted(path.stem for path in results.iterdir()) == names

@@ -1,0 +1,75 @@
+"""The version that a kept result or score belongs to: a hash over the definitions that make a diagnosis.
+
+Scores of different versions are never mixed, and a sealed set costs hours. So the hash covers what an answer hangs on and
+nothing else: it changes with a number, a formula or a rule, and stays as it is when a comment, a docstring or an import
+changes, a definition moves to another file, or the words and pictures of the report are improved.
+"""
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+# not bridge: how a file is read is held by tests of its own, and the bits of compiled kernels by the golden logs
+JUDGED = ("plant", "diagnosis")
+# the scores, the words and pictures of an answer that is there already, and the plant as a process
+NOT_JUDGED = ("diagnosis/blind", "diagnosis/report", "diagnosis/pictures", "plant/app.py", "plant/node.py")
+
+
+def tool_version(*further: str) -> str:
+    """Version of the package with a hash over what diagnoses, and over `further` folders below the project's root."""
+    try:
+        number = version("stickslip")
+    except PackageNotFoundError:
+        number = "unknown"
+    root = Path(__file__).parents[2]
+    return f"{number}+{definitions_digest(root, (*JUDGED, *further), NOT_JUDGED)}"
+
+
+def definitions_digest(root: Path, judged: tuple[str, ...], not_judged: tuple[str, ...] = ()) -> str:
+    """Hash over the top-level statements of all files below `judged`, in sorted order. Raises OSError and SyntaxError.
+
+    A place is a file or a folder, relative to `root`; one that is not there counts as empty.
+    """
+    left_out = {root / place for place in not_judged}
+    files = [path for place in judged for path in _files(root / place)]
+    judged_files = [path for path in files if not left_out & {path, *path.parents}]
+    statements = [text for path in judged_files for text in _statements(path)]
+    return hashlib.sha256("\n".join(sorted(statements)).encode()).hexdigest()[:12]
+
+
+def _files(place: Path) -> Iterator[Path]:
+    return iter([place]) if place.is_file() else place.rglob("*.py")
+
+
+def _statements(path: Path) -> Iterator[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for statement in _without_docstring(tree.body):
+        if not isinstance(statement, ast.Import | ast.ImportFrom):
+            yield _canonical(statement)
+
+
+def _without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
+    first = body[0] if body else None
+    text = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
+    return body[1:] if text else body
+
+
+def _canonical(node: ast.AST) -> str:
+    """A syntax tree as text; empty fields are left out, as every version of Python adds some."""
+    parts: list[str] = []
+    definition = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+    for name, field in ast.iter_fields(node):
+        value = _without_docstring(field) if definition and name == "body" else field
+        if value not in (None, []):
+            parts.append(f"{name}={_text(value)}")
+    return f"{type(node).__name__}({', '.join(parts)})"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, ast.AST):
+        return _canonical(value)
+    if isinstance(value, list):
+        return "[" + ", ".join(_text(item) for item in value) + "]"  # pyright: ignore[reportUnknownVariableType]
+    return repr(value)
