@@ -51,8 +51,8 @@ lock: ## needs uv
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes --no-annotate --no-header -o requirements.lock
 	uv pip compile pyproject.toml --extra bench --universal --python-version 3.11 --generate-hashes --no-annotate --no-header -c requirements.lock -o requirements-bench.lock
 
-proto: $(READY) ## after a change of bridge/stickslip.proto
-	$(BIN)/python -m grpc_tools.protoc -I bridge --python_out=bridge --pyi_out=bridge bridge/stickslip.proto
+proto: $(READY) ## after a change of bridge/wire/stickslip.proto
+	$(BIN)/python -m grpc_tools.protoc -I bridge/wire --python_out=bridge/wire --pyi_out=bridge/wire bridge/wire/stickslip.proto
 
 clean:
 	rm -rf $(VENV) runs

@@ -1,8 +1,10 @@
 """What crosses a process border, and the only input and output of the project.
 
-on the wire   stickslip.proto, messages, topics, zenoh_link; PROTOCOL.md describes it for other languages
-in the log    mcap_chunks and runlog write, recorder is the process, log_reader and logfile read, whole or cut
-as tables     export, table_writers, matfile write; tables reads CSV, Parquet, MATLAB and TDMS; units names units
-for everyone  config (strict TOML), reading (what cannot be read), faults (codes and help), kernel (compiled code), realtime
-              (scheduling)
+wire/     messages on the bus, for every language: stickslip.proto, PROTOCOL.md, topics, the Zenoh link, scheduling
+log/      run logs (MCAP): written, recorded, read whole or cut, checked
+tables/   CSV, Parquet, MATLAB and TDMS, in and out
+
+config    strict TOML                            faults   codes, exit statuses and what to do
+files     what cannot be read; written whole     units    units in names, numbers in words
+kernel    compiled code and where it is kept
 """

@@ -57,7 +57,7 @@ FAULTS = {
         FaultKind(
             "BAD_MESSAGE",
             8,
-            "A message on the bus does not follow bridge/PROTOCOL.md: wrong length, undecodable bytes, another number of "
+            "A message on the bus does not follow bridge/wire/PROTOCOL.md: wrong length, undecodable bytes, another number of "
             "samples than configured, or blocks whose numbers go back. The line names the topic. Compare the client with "
             "PROTOCOL.md.",
         ),

@@ -1,4 +1,7 @@
-"""The unit of a column, read from its name."""
+"""Units and numbers: the unit of a column, read from its name; quantities in words."""
+
+import math
+import re
 
 # longest suffix first: `_mps2` before `_mps` before `_s`
 _UNITS = (
@@ -18,3 +21,94 @@ _UNITS = (
 def unit_of(name: str) -> str:
     """Unit of `name`, as `N` for `drive_force_N`; `1` for a number without a unit, as a count or a code."""
     return next((unit for suffix, unit in _UNITS if name.endswith(suffix)), "1")
+
+
+_UNIT = re.compile(r"^(?:(.*?)_)?((?:Ns2|Ns|N|mps2|mps|m2|m|s|kg|Hz|rad)(?:_per_(?:N|m2|m|s))?|per_s)$")
+_SYMBOLS = {"mps2": "m/s²", "mps": "m/s", "Ns2": "N s²", "Ns": "N s", "m2": "m²", "per": "1"}
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+_WITHOUT_PREFIX = {"", "%", "kg", "rad", "1/s"}
+
+
+def signal_name(column: str) -> str:
+    """`mass_accel_mps2` as `mass acceleration`."""
+    return name_and_unit(column)[0].replace("accel", "acceleration")
+
+
+def name_and_unit(name: str) -> tuple[str, str]:
+    """`gap_m` as ("gap", "m"); a bare `ratio` is given in percent, other numbers without a unit have the unit "".
+
+    `phase_rad of run-02.csv` is ("phase in run-02.csv", "rad").
+    """
+    name, _, file = name.partition(" of ")
+    if file:
+        word, unit = name_and_unit(name)
+        return f"{word} in {file}", unit
+    if name == "ratio":
+        return "relative change", "%"
+    found = _UNIT.match(name)
+    if found is None:
+        return name.replace("_", " "), ""
+    top, _, bottom = found[2].partition("_per_")
+    if top.startswith("per_"):
+        top, bottom = "per", top.removeprefix("per_")
+    unit = _SYMBOLS.get(top, top) + (f"/{_SYMBOLS.get(bottom, bottom)}" if bottom else "")
+    return (found[1] or name).replace("_", " "), unit
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number with its unit, four significant digits."""
+    factor, shown = prefixed(abs(value), unit)
+    return f"{fixed_digits(value * factor, None)} {shown}".rstrip()
+
+
+def percent(share: float | None) -> str:
+    """A share or a probability; what is only nearly sure is never shown as 100 %."""
+    if share is None or not math.isfinite(share):
+        return "unknown"
+    if 0.0 < share < 0.001:
+        return "< 0.1 %"
+    if 0.999 < share < 1.0:
+        return "> 99.9 %"
+    if 0.0 < share < 0.01 or 0.99 < share < 1.0:
+        return f"{100.0 * share:.1f} %"
+    return f"{round(100.0 * share)} %"
+
+
+def times(value: float | None) -> str:
+    """A gap in noise floors."""
+    return "unknown" if value is None or not math.isfinite(value) else f"{value:.3g}"
+
+
+def interval(pair: tuple[float, float] | None) -> str:
+    """Two shares as `95 % to 98 %`; empty where there is no interval."""
+    if pair is None or not (math.isfinite(pair[0]) and math.isfinite(pair[1])):
+        return ""
+    return f"{percent(pair[0])} to {percent(pair[1])}"
+
+
+def band(edges_Hz: tuple[float, float]) -> str:
+    """`0 to 20 Hz`; an upper end that is not finite is open."""
+    low_Hz, high_Hz = edges_Hz
+    return f"{low_Hz:g} to {high_Hz:g} Hz" if math.isfinite(high_Hz) else f"above {low_Hz:g} Hz"
+
+
+def prefixed(size: float, unit: str) -> tuple[float, str]:
+    """A factor, and the unit with the prefix that brings a number of this size between 1 and 1000."""
+    if unit == "%":
+        return 100.0, unit
+    if unit in _WITHOUT_PREFIX or not math.isfinite(size) or size == 0.0 or 0.1 <= size < 1000.0:
+        return 1.0, unit
+    exponent = min(max(3 * math.floor(math.log10(size) / 3.0), -9), 6)
+    return 10.0**-exponent, _PREFIXES[exponent] + unit
+
+
+def decimals_of(width: float) -> int:
+    """Decimals of a number whose interval is `width` wide: two digits of the width, more would be invented."""
+    return min(max(1 - math.floor(math.log10(width)), 0), 6)
+
+
+def fixed_digits(value: float, digits: int | None) -> str:
+    """A number with so many decimals, or with four significant digits."""
+    if not math.isfinite(value):
+        return "unknown"
+    return f"{value:.4g}" if digits is None else f"{value:.{digits}f}"

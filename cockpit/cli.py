@@ -10,10 +10,10 @@ from typing import Annotated
 import typer
 
 from bridge.faults import FAULTS, Fault
-from cockpit.blind_command import blind_app
-from cockpit.diagnose_command import diagnose
-from cockpit.log_commands import log_app
-from cockpit.options import (
+from cockpit.commands.blind import blind_app
+from cockpit.commands.diagnose import diagnose
+from cockpit.commands.log import log_app
+from cockpit.commands.options import (
     DEFAULT_SCENARIO,
     ChildOf,
     Endpoint,
@@ -26,9 +26,9 @@ from cockpit.options import (
     Settings,
     as_settings,
 )
-from cockpit.processes import guarded, stop_event
-from cockpit.replay_command import replay_command
-from cockpit.writing import check_writable, writing
+from cockpit.commands.replay import replay_command
+from cockpit.run.child_process import guarded, stop_event
+from cockpit.run.writable import check_writable, writing
 
 app = typer.Typer(
     help="Real-time control against stick-slip: run a rig or its stand-in, replay, recover and judge its logs.",
@@ -59,8 +59,8 @@ def run(
     """Run plant, controller and recorder to the end of a scenario and say what came of it."""
 
     def work() -> int:
-        from cockpit.running import run_scenario
-        from cockpit.scenario import rig_setting
+        from cockpit.run.run import run_scenario
+        from cockpit.run.scenario import rig_setting
 
         other = [rig_setting(rig)] if rig is not None else []
         changed = [*other, *as_settings(settings, seed, endpoint, prefix)]
@@ -83,7 +83,7 @@ def plant(
     """Serve the stand-in rig of a scenario on the bus."""
 
     def work() -> None:
-        from cockpit.scenario import header, load_scenario
+        from cockpit.run.scenario import header, load_scenario
         from plant.app import run as serve
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
@@ -111,7 +111,7 @@ def controller(
     """Control the rig that is on the bus, with the controller of a scenario."""
 
     def work() -> None:
-        from cockpit.scenario import header, load_scenario
+        from cockpit.run.scenario import header, load_scenario
         from controller.app import run as control
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
@@ -134,9 +134,9 @@ def recorder(
     """Record everything on the bus until the plant ends its run. A log that is there already is renamed, not overwritten."""
 
     def work() -> None:
-        from bridge.recorder import run as record
-        from cockpit.running import about_run, keep_aside, log_path
-        from cockpit.scenario import load_scenario
+        from bridge.log.recorder import run as record
+        from cockpit.run.run import about_run, keep_aside, log_path
+        from cockpit.run.scenario import load_scenario
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         path = log_path(log, made.name)
@@ -165,9 +165,9 @@ def operator_stop(
     """Tell a running controller to ramp the vibration down and keep it down, until --reset; exit status 4: nobody obeyed."""
 
     def work() -> None:
-        from bridge import stickslip_pb2 as wire
-        from cockpit.operator_word import tell
-        from cockpit.scenario import load_scenario
+        from bridge.wire import stickslip_pb2 as wire
+        from cockpit.run.operator import tell
+        from cockpit.run.scenario import load_scenario
 
         made = load_scenario(scenario, as_settings([], None, endpoint, prefix))
         tell(made.bus, wire.Operator.RESET if reset else wire.Operator.STOP)
@@ -194,7 +194,7 @@ def reproduce(
     """Redo the paper: its figures, tables and claims, each with its number and whether it holds."""
 
     def work() -> int:
-        from cockpit.reproduce import reproduce as redo
+        from cockpit.paper.page import reproduce as redo
 
         with _written(out):
             result = redo(out, progress=True)
@@ -219,8 +219,8 @@ def stability(
     """Draw where a rig sticks and slips, over drive velocity, stiffness and vibration."""
 
     def work() -> None:
-        from cockpit.scenario import load_rig
-        from cockpit.stability_map import stability_map
+        from cockpit.judge.stability_map import stability_map
+        from cockpit.run.scenario import load_rig
 
         made = load_rig(rig, settings)
         with _written(out):
@@ -241,7 +241,7 @@ def plot(
     """Draw the run in a log: drive force, v_a against v_d, and what the controller did."""
 
     def work() -> None:
-        from cockpit.run_plot import plot_run
+        from cockpit.judge.run_plot import plot_run
 
         picture = out or log.parent / f"{log.stem}.png"
         if picture.resolve() == log.resolve():
@@ -296,7 +296,7 @@ def scenarios(as_json: Json = False) -> None:
 
     def work() -> None:
         from bridge.config import read_toml
-        from cockpit.scenario import deploy_folder
+        from cockpit.run.scenario import deploy_folder
 
         found = {
             path.stem: str(read_toml(path).get("description", ""))

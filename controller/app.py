@@ -4,12 +4,12 @@ import threading
 import time
 from collections.abc import Callable
 
-from bridge import realtime
-from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
-from bridge.messages import parsed
-from bridge.topics import COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, SNAPSHOT, STATE, TRACE
-from bridge.zenoh_link import Bus, BusConfig, Inbox, Received
+from bridge.wire import realtime
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import parsed
+from bridge.wire.topics import COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, SNAPSHOT, STATE, TRACE
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 

@@ -1,6 +1,6 @@
 """The codes of modes, states, reasons and limits, and the event bits of a frame, as plain numbers for kernels."""
 
-from bridge import stickslip_pb2 as wire
+from bridge.wire import stickslip_pb2 as wire
 
 DISABLED, WATCH, EXCITE, WAIT, PROBE, STOPPED = (
     int(mode) for mode in (wire.DISABLED, wire.WATCH, wire.EXCITE, wire.WAIT, wire.PROBE, wire.STOPPED)

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
-from bridge.messages import COMMAND as COMMAND_LAYOUT
-from bridge.messages import STATE as STATE_LAYOUT
-from bridge.messages import TRACE as TRACE_LAYOUT
-from bridge.messages import sensor_block, sequence_and_time
-from bridge.topics import COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
+from bridge.wire.messages import STATE as STATE_LAYOUT
+from bridge.wire.messages import TRACE as TRACE_LAYOUT
+from bridge.wire.messages import sensor_block, sequence_and_time
+from bridge.wire.topics import COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
 from controller.codes import BLOCK, GAP, RESET, STALE, STOP
 from controller.config import ControllerConfig
 from controller.core import step

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from bridge.faults import Fault
 from bridge.kernel import kernel
-from bridge.logfile import RunData
-from bridge.messages import COMMAND, TRACE, Layout, Records
+from bridge.log.logfile import RunData
+from bridge.wire.messages import COMMAND, TRACE, Layout, Records
 from controller.codes import BLOCK
 from controller.config import ControllerConfig
 from controller.core import step

@@ -3,16 +3,17 @@
 import time
 from collections.abc import Sequence
 
-from diagnosis.assembling import assembled
-from diagnosis.contest import Contest, Progress
-from diagnosis.evidence import Evidence, Run
-from diagnosis.kept_aside import borne_out
-from diagnosis.library import trials
-from diagnosis.problem import PIEZO_EFFECTS, Problem, prepare
+from diagnosis.evidence.folder import Evidence, Run
+from diagnosis.fits.retuning import retuned_rig
+from diagnosis.gap.prepare import prepare
+from diagnosis.gap.problem import PIEZO_EFFECTS, Problem
+from diagnosis.hypotheses.trials import trials
+from diagnosis.processes import one_thread
+from diagnosis.report.assemble import assembled
 from diagnosis.result import Diagnosis
-from diagnosis.retuning import retuned_rig
-from diagnosis.verdict import Verdict, although_outside
-from diagnosis.workers import one_thread
+from diagnosis.verdict.confirmation import borne_out
+from diagnosis.verdict.judge import Verdict, although_outside
+from diagnosis.verdict.selection import Contest, Progress
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:

@@ -6,7 +6,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.findings import Finding
+from bridge.log.finding import Finding
 
 Floats = npt.NDArray[np.floating[Any]]
 FORMAT = "diagnosis/1"

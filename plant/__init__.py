@@ -17,9 +17,9 @@ and, for what a real rig adds to that:
     q      displacement of the frame that holds the drive [m]    age    how long the contact has been at rest [s]
     s_e    where the drive would be without ripple, `even_m` [m]
 
-`config` is what a rig file says, `pairs` the friction pairs, `effects` the library of what a real rig does and the nominal
-one does not, `records` the derived numbers and the state. `contact` is one step of friction and slide, `disturb` the formulas
-of the effects, `core` one block of all that with the piezo and the sensors' filters (`advance`, the nominal rig, and
-`advance_disturbed`), `sensors` what the channels make of that, `step` the whole block with its messages, `simulate` a run
-without a bus, `stability` the linearised slider, `node` the rig as a participant of the bus, `app` the process.
+`config` is what a rig file says and `config_limits` what no rig does, `pairs` the friction pairs, `effects` what a real rig does
+and the nominal one does not, `records` the derived numbers and the state. `contact` is one step of friction and slide, `core` one
+block of all that with the piezo and the sensors' filters (`advance`, the nominal rig, and `advance_disturbed`), `sensors` what
+the channels make of that, `step` the whole block with its messages, `simulate` a run without a bus, `stability` the linearised
+slider, `node` the rig as a participant of the bus, `app` the process.
 """

@@ -5,12 +5,12 @@ import threading
 import time
 from typing import Any
 
-from bridge import realtime
-from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
-from bridge.messages import COMMAND as COMMAND_LAYOUT
-from bridge.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS
-from bridge.zenoh_link import Bus, BusConfig, Inbox, Received
+from bridge.wire import realtime
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
+from bridge.wire.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from plant.config import RigConfig
 from plant.node import PlantNode
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, Two, read_toml, validate
-from plant.effects import LONGEST_DELAY, checked
+from plant.effects.library import LONGEST_DELAY, checked
 from plant.pairs import PAIRS
 
 Positive = Annotated[float, Field(gt=0)]
@@ -129,7 +129,9 @@ class RigConfig(Strict):
     piezo: PiezoConfig = PiezoConfig()
     sensors: SensorsConfig = SensorsConfig()
     solver: SolverConfig = SolverConfig()
-    effects: dict[str, dict[str, float | str]] = {}  # [effects.NAME] as in plant/effects.py; none: the nominal rig
+    effects: dict[
+        str, dict[str, float | str]
+    ] = {}  # [effects.NAME] as in plant/effects/library.py; none: the nominal rig
 
     # before pydantic: for a value that is neither a number nor a word it has two lines
     @model_validator(mode="before")

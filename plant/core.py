@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from plant.contact import step as contact_step
-from plant.disturb import ageing_N, elasto_plastic_share, late_mps, level, spring_N, wave
+from plant.effects.formulas import ageing_N, elasto_plastic_share, late_mps, level, spring_N, wave
 from plant.piezo import accepted, delivered_share
 from plant.records import DELAY_LINE
 

@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from bridge.faults import Fault
-from bridge.messages import APPLIED as APPLIED_LAYOUT
-from bridge.messages import CHANNELS, sensor_block
-from bridge.messages import COMMAND as COMMAND_LAYOUT
-from bridge.topics import APPLIED, COMMAND, SENSORS, Outgoing
+from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
+from bridge.wire.messages import CHANNELS, sensor_block
+from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
+from bridge.wire.topics import APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
 from plant.records import NO_COMMAND, TRUTH, build
 from plant.simulate import drive_velocity_mps

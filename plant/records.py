@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from bridge.kernel import record
 from plant.config import RigConfig
-from plant.disturb import LAG_CELL_S, ageing_N
-from plant.effects import LAG_ORDERS, LONGEST_DELAY, LONGEST_LAG_S
+from plant.effects.formulas import LAG_CELL_S, ageing_N
+from plant.effects.library import LAG_ORDERS, LONGEST_DELAY, LONGEST_LAG_S
 
 # Rows of the array that a block fills beside the sensors, one column a sample: what no sensor sees.
 TRUTH = (

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import kernel
-from bridge.messages import CHANNELS
+from bridge.wire.messages import CHANNELS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
 from plant.records import TRUTH, build

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from diagnosis.evidence import Evidence
+from diagnosis.evidence.folder import Evidence
 from tests.made_up import RIG
 
 MANIFEST = (

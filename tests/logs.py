@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from bridge.logfile import STREAMING, RunData, read_run
-from bridge.messages import APPLIED, COMMAND, STATE, TRACE, sensor_block
-from bridge.runlog import RunLog
-from bridge.topics import BY_NAME
-from cockpit.onboard import run_onboard
-from cockpit.scenario import load_scenario
+from bridge.log.logfile import STREAMING, RunData, read_run
+from bridge.log.runlog import RunLog
+from bridge.wire.messages import APPLIED, COMMAND, STATE, TRACE, sensor_block
+from bridge.wire.topics import BY_NAME
+from cockpit.run.in_process import run_onboard
+from cockpit.run.scenario import load_scenario
 
 Tables = dict[str, Any]
 

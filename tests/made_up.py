@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from bridge.faults import Fault
-from diagnosis.evidence import Evidence
-from diagnosis.findings import Finding
+from bridge.log.finding import Finding
+from diagnosis.evidence.folder import Evidence
 from diagnosis.result import (
     Candidate,
     Cell,

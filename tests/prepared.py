@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.evidence import Evidence, load_evidence
-from diagnosis.gap import floor_of, replicates
-from diagnosis.making import Case, make_evidence
-from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Prepared, Problem, prepare
-from diagnosis.refit import Fitter
-from diagnosis.twin import Roughness
+from diagnosis.evidence.folder import Evidence, load_evidence
+from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.gap.floor import floor_of, replicates
+from diagnosis.gap.prepare import Prepared, prepare
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.model.rig import Roughness
+from diagnosis.synthetic.folder import Case, make_evidence
 
 
 def prepared(folder: Path, protocol: str, effects=None, seed: int = 1) -> tuple[Evidence, list[Prepared]]:

@@ -13,18 +13,21 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
 
+from bridge.files import write_json
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import Oracle
 from diagnosis.blind.version import tool_version
-from diagnosis.evidence import load_evidence
-from diagnosis.gap import KNEE
-from diagnosis.heldout import HeldOut
-from diagnosis.library import trials
-from diagnosis.problem import Problem, prepare
-from diagnosis.refit import FAR_KNEE, Fit
-from diagnosis.retuning import retuned_rig
-from diagnosis.search import Origin, refitted, screened
-from diagnosis.strict_json import write_json
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.fits.fit import Fit
+from diagnosis.fits.gauss_newton import FAR_KNEE
+from diagnosis.fits.retuning import retuned_rig
+from diagnosis.fits.screening import Origin, screened
+from diagnosis.fits.search import refitted
+from diagnosis.gap.floor import KNEE
+from diagnosis.gap.prepare import prepare
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.trials import trials
+from diagnosis.verdict.held_out import HeldOut
 
 Progress = Callable[[str, float], None]
 KEPT = "oracle"

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import Fault
+from bridge.files import write_json
 from diagnosis.blind.locating import LEAST_SHARE, shares
 from diagnosis.blind.opening import OpenedSet
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import Scores, as_json
-from diagnosis.strict_json import write_json
 
 FORMAT = "blind-scores/2"
 _MADE_BY = "take a file that `stickslip blind score --json` wrote"

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bridge.files import write_whole
 from diagnosis.blind.scoring import Scores
 from diagnosis.blind.table import TOOL, headline, rows, table, with_interval
-from diagnosis.report import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import Fault
-from diagnosis import many
+from bridge.files import write_json
+from diagnosis import diagnose_many as many
 from diagnosis.blind.sealing import RESULTS, read_set
 from diagnosis.blind.version import tool_version
-from diagnosis.many import Outcome, Source
+from diagnosis.diagnose_many import Outcome, Source
 from diagnosis.result import to_json
-from diagnosis.strict_json import write_json
 
 FAULT_FORMAT = "fault/1"
 

@@ -10,7 +10,7 @@ from diagnosis.blind.calibration import Bin, calibration_error, error_of_perfect
 from diagnosis.blind.intervals import Score, mean, rate, ratio
 from diagnosis.blind.locating import f1
 from diagnosis.blind.outcomes import OTHER_NAMES, Opened
-from diagnosis.sensing import SENSOR_EFFECTS
+from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 
 _SURE = 0.8
 _VISIBLE = 2.0  # detection limits

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
+from bridge.files import write_json
 from diagnosis.blind.version import tool_version
-from diagnosis.strict_json import write_json
 
 Answer = dict[str, Any]
 SET_FORMAT, KEY_FORMAT, OPENED_FORMAT = "blind-set/1", "blind-key/1", "blind-opened/1"

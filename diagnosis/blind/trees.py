@@ -14,13 +14,14 @@ import numpy.typing as npt
 from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
 
 from bridge.faults import Fault
-from diagnosis.evidence import load_evidence
-from diagnosis.gap import Floor, compress, floor_of, replicates
-from diagnosis.library import Trial, trials
-from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Draw, Problem, prepare
-from diagnosis.retuning import FIRST_REPLICATES, ROUGHNESS
-from diagnosis.twin import Effects
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.fits.retuning import FIRST_REPLICATES, ROUGHNESS
+from diagnosis.gap.floor import Floor, compress, floor_of, replicates
+from diagnosis.gap.prepare import prepare
+from diagnosis.gap.problem import Draw, Problem
+from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.hypotheses.trials import Trial, trials
+from diagnosis.model.rig import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]

@@ -10,13 +10,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from bridge.messages import CHANNELS
-from diagnosis.commands import Commands
+from bridge.wire.messages import CHANNELS
 from diagnosis.diagnose import diagnose
-from diagnosis.evidence import load_evidence
-from diagnosis.lanes import LANES
-from diagnosis.making import Case, make_evidence
-from diagnosis.twin import Start, built, predict_many
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.features.segments import Commands
+from diagnosis.model.four_rigs_step import LANES
+from diagnosis.model.predict import predict_many
+from diagnosis.model.rig import Start, built
+from diagnosis.synthetic.folder import Case, make_evidence
 from plant.config import RigConfig
 from plant.records import TRUTH
 from plant.simulate import run_blocks

@@ -5,8 +5,8 @@ import sys
 
 import zenoh
 
-from bridge import realtime
-from bridge.zenoh_link import BusConfig, session_config
+from bridge.wire import realtime
+from bridge.wire.zenoh_link import BusConfig, session_config
 
 ANSWER = bytes(60)  # a Command
 

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.messages import CHANNELS
+from bridge.wire.messages import CHANNELS
 from plant.config import RigConfig
-from plant.effects import EFFECTS
+from plant.effects.library import EFFECTS
 from plant.records import TRUTH, build
 from plant.simulate import run_blocks
 from tests.bench import case as paper

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import zenoh
 
-from bridge import realtime
-from bridge.zenoh_link import BusConfig, session_config
+from bridge.wire import realtime
+from bridge.wire.zenoh_link import BusConfig, session_config
 from tests.system.ports import free_endpoint
 
 SECONDS = 60.0

@@ -5,10 +5,10 @@ import time
 from pathlib import Path
 from statistics import median
 
-from bridge.logfile import read_run
-from cockpit.onboard import run_onboard
-from cockpit.replaying import changes_of
-from cockpit.scenario import load_scenario
+from bridge.log.logfile import read_run
+from cockpit.run.in_process import run_onboard
+from cockpit.run.replay import changes_of
+from cockpit.run.scenario import load_scenario
 from controller.replay import replay
 
 SECONDS = 60.0

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import odeint, solve_ivp
 
 from bridge.kernel import kernel
-from bridge.messages import CHANNELS
+from bridge.wire.messages import CHANNELS
 from plant.config import RigConfig
 from plant.records import TRUTH, build
 from plant.simulate import run_blocks

@@ -12,15 +12,15 @@ from typing import Any
 import joblib
 import numpy as np
 
+from bridge.files import write_json
 from diagnosis.blind.oracle import shrinkage_with
 from diagnosis.blind.outcomes import Opened
 from diagnosis.blind.scoring import score
 from diagnosis.blind.table import TOOL, table
 from diagnosis.blind.version import tool_version
 from diagnosis.diagnose import diagnose
-from diagnosis.evidence import load_evidence
+from diagnosis.evidence.folder import load_evidence
 from diagnosis.result import to_json
-from diagnosis.strict_json import write_json
 from tests.blind.generators import Plan
 from tests.blind.plant_cases import Plant, PlantEffect, drawn
 from tests.blind.plant_sizes import EFFECT_SIZES

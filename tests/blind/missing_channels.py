@@ -12,7 +12,7 @@ import joblib
 import numpy as np
 
 from diagnosis.diagnose import diagnose
-from diagnosis.evidence import load_evidence
+from diagnosis.evidence.folder import load_evidence
 from diagnosis.result import Diagnosis
 from tests.blind.generators import Plan
 from tests.blind.independent_cases import Independent

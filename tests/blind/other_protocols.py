@@ -11,7 +11,7 @@ import joblib
 import numpy as np
 
 from diagnosis.diagnose import diagnose
-from diagnosis.evidence import load_evidence
+from diagnosis.evidence.folder import load_evidence
 from diagnosis.result import Diagnosis
 from tests.blind.generator.runs import Plan as RunPlan
 from tests.blind.generators import Plan

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from diagnosis.making import Case, make_evidence
+from diagnosis.synthetic.folder import Case, make_evidence
 from tests.blind.generators import Plan
 from tests.blind.plant_sizes import EFFECT_SIZES, Sizes, possible
 

@@ -11,7 +11,7 @@ No resonance inside the band of the piezo is ever drawn.
 import math
 from typing import Final, NamedTuple
 
-from plant.effects import EFFECTS
+from plant.effects.library import EFFECTS
 
 TURN: Final = (0.0, 2.0 * math.pi)
 

@@ -17,15 +17,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.evidence import load_evidence
-from diagnosis.features import POWERS
-from diagnosis.form import NOTHING
-from diagnosis.gap import Floor, cell_names, cell_squares, floor_of, replicates
-from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Point, Prepared, Problem, prepare
-from diagnosis.refit import Fit, Fitter
-from diagnosis.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
-from diagnosis.verdict import JITTER
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.features.feature import POWERS
+from diagnosis.fits.fit import Fit
+from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.fits.retuning import FIRST_REPLICATES, REPLICATES, ROUGHNESS, roughness_of
+from diagnosis.gap.floor import Floor, floor_of, replicates
+from diagnosis.gap.measure import cell_names, cell_squares
+from diagnosis.gap.prepare import Prepared, prepare
+from diagnosis.gap.problem import Point, Problem
+from diagnosis.hypotheses.hypothesis import NOTHING
+from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.verdict.judge import JITTER
 
 Floats = npt.NDArray[np.floating[Any]]
 # The ruler stays where the diagnosis' own threshold moves, or scores of two versions could not be compared.

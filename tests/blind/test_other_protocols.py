@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.evidence import load_evidence
-from diagnosis.problem import Problem, prepare
-from diagnosis.retuning import retuned_rig
-from diagnosis.verdict import NEVER_WITHOUT_GAP
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.fits.expected import NEVER_WITHOUT_GAP
+from diagnosis.fits.retuning import retuned_rig
+from diagnosis.gap.prepare import prepare
+from diagnosis.gap.problem import Problem
 from tests.blind.generator import Case, make, runs
 from tests.blind.generator.runs import PROTOCOL, Plan
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnose import diagnose
-from diagnosis.evidence import load_evidence
+from diagnosis.evidence.folder import load_evidence
 from tests.blind.generators import Plan
 from tests.blind.independent_cases import Independent
 from tests.blind.small_set import RUNS

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bridge.config import validate
-from bridge.messages import TRACE as TRACE_LAYOUT
-from bridge.topics import TRACE
+from bridge.wire.messages import TRACE as TRACE_LAYOUT
+from bridge.wire.topics import TRACE
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 from plant.config import RigConfig

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from bridge import stickslip_pb2 as wire
-from bridge.messages import sensor_block
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import sensor_block
 from tests.closed_loop.loop import close_the_loop
 
 PAIRS = {

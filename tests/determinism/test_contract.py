@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from bridge.logfile import RunData, read_run
-from cockpit.onboard import run_onboard
-from cockpit.scenario import load_scenario
+from bridge.log.logfile import RunData, read_run
+from cockpit.run.in_process import run_onboard
+from cockpit.run.scenario import load_scenario
 from tests.system.ports import free_endpoint
 
 pytestmark = pytest.mark.realtime

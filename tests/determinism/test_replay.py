@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from bridge import stickslip_pb2 as wire
 from bridge.faults import Fault
-from bridge.logfile import RunData, read_run
-from bridge.runlog import RunLog
-from bridge.topics import SENSORS
+from bridge.log.logfile import RunData, read_run
+from bridge.log.runlog import RunLog
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.topics import SENSORS
 from cockpit.cli import app
-from cockpit.onboard import Word, run_onboard
-from cockpit.replaying import changes_of
-from cockpit.scenario import Scenario, header, load_scenario
-from cockpit.verdict import in_words, judge_run
+from cockpit.judge.verdict import in_words, judge_run
+from cockpit.run.in_process import Word, run_onboard
+from cockpit.run.replay import changes_of
+from cockpit.run.scenario import Scenario, header, load_scenario
 from controller.node import ControllerNode
 from controller.replay import replay
 from plant.node import PlantNode

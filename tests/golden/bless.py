@@ -7,10 +7,10 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from bridge.logfile import read_run
-from cockpit.onboard import run_onboard
-from cockpit.replaying import outcome
-from cockpit.scenario import load_scenario
+from bridge.log.logfile import read_run
+from cockpit.run.in_process import run_onboard
+from cockpit.run.replay import outcome
+from cockpit.run.scenario import load_scenario
 
 FOLDER = Path(__file__).parent
 SLACK = 0.05  # of a figure, on both sides

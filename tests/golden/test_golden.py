@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridge.logfile import read_run
-from cockpit.replaying import changes_of, outcome
-from cockpit.scenario import processor
+from bridge.log.logfile import read_run
+from cockpit.run.replay import changes_of, outcome
+from cockpit.run.scenario import processor
 from controller.replay import replay
 from tests.golden.bless import FOLDER, make, situations
 

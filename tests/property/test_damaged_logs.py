@@ -12,15 +12,15 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from bridge import recorder
-from bridge.export import export
 from bridge.faults import Fault
-from bridge.logfile import LogReader, read_run, recover
-from bridge.messages import sensor_block
-from bridge.runlog import RunLog
-from bridge.topics import CONTROLLER_EVENT, PLANT_EVENT, SENSORS, SNAPSHOT, Topic
-from bridge.zenoh_link import Received
-from diagnosis.logcheck import check_log
+from bridge.log import recorder
+from bridge.log.log_check import check_log
+from bridge.log.logfile import LogReader, read_run, recover
+from bridge.log.runlog import RunLog
+from bridge.tables.export import export
+from bridge.wire.messages import sensor_block
+from bridge.wire.topics import CONTROLLER_EVENT, PLANT_EVENT, SENSORS, SNAPSHOT, Topic
+from bridge.wire.zenoh_link import Received
 from tests.logs import doctored, short_log
 
 TABLES = ("sensors", "applied", "command", "trace", "state")
@@ -144,8 +144,8 @@ def test_a_clock_that_goes_back_is_read_as_it_is(tmp_path: Path) -> None:
 
 def test_messages_without_their_zeros_are_all_read(tmp_path: Path) -> None:
     """A client that leaves zeros out sends messages of one length too: they are many, not one."""
-    from bridge import stickslip_pb2 as wire
-    from bridge.topics import COMMAND
+    from bridge.wire import stickslip_pb2 as wire
+    from bridge.wire.topics import COMMAND
 
     path = tmp_path / "sparse.mcap"
     log = RunLog(path, lockstep=True)

@@ -7,8 +7,8 @@ import tempfile
 from pathlib import Path
 
 from diagnosis.diagnose import diagnose
-from diagnosis.evidence import load_evidence
-from diagnosis.report import write_report
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.report.page import write_report
 from diagnosis.result import to_json
 from tests.real.evidences import AXIS, EVIDENCES, MISSING, SLIDER
 from tests.real.known import known

@@ -1,7 +1,8 @@
 """The figures of one diagnosis, a few lines of text: what docs/real-evidence.md quotes."""
 
+from bridge.units import percent, times
+from diagnosis.report.words import estimate_in_words, headline
 from diagnosis.result import Diagnosis, Shrinkage
-from diagnosis.wording import estimate_in_words, headline, percent, times
 
 _SHOWN = 4  # candidates
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.diagnose import diagnose
-from diagnosis.evidence import load_evidence
+from diagnosis.evidence.folder import load_evidence
 from diagnosis.result import Diagnosis
 from tests.real.evidences import AXIS, EVIDENCES, MISSING, SLIDER, Cut, Levels, slider
 from tests.real.known import known

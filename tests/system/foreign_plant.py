@@ -1,4 +1,4 @@
-"""A rig written from bridge/PROTOCOL.md alone: nothing of the project but its message schema is imported.
+"""A rig written from bridge/wire/PROTOCOL.md alone: nothing of the project but its message schema is imported.
 
 A light slider on a spring with LuGre friction, integrated by plain small steps, in lockstep over Zenoh. It writes its
 messages with the protobuf library's own serialisation, which leaves zeros out. At the end it prints what it saw as JSON.
@@ -15,7 +15,7 @@ from importlib.metadata import version
 import numpy as np
 import zenoh
 
-from bridge import stickslip_pb2 as wire
+from bridge.wire import stickslip_pb2 as wire
 
 BLOCK_S = 1e-3
 SAMPLES = 20

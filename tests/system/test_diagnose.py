@@ -9,13 +9,13 @@ from typer.testing import CliRunner
 
 import diagnosis.diagnose
 from cockpit.cli import app
-from diagnosis.evidence import load_evidence
-from diagnosis.library import trials
-from diagnosis.making import Case, make_evidence
-from diagnosis.problem import Problem
-from diagnosis.protocols import PROTOCOLS, RunPlan
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.trials import trials
+from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
 from plant.config import load_rig
-from plant.effects import EFFECTS
+from plant.effects.library import EFFECTS
 
 # a tenth of the work of the whole protocol
 SHORT = (

@@ -16,8 +16,8 @@ import pytest
 from mcap.reader import make_reader
 
 from bridge.faults import FAULTS
-from bridge.logfile import RunData, read_run, recover
-from cockpit import orchestra
+from bridge.log.logfile import RunData, read_run, recover
+from cockpit.run import processes as orchestra
 from tests.logs import short_log
 from tests.system.ports import free_endpoint
 

@@ -1,4 +1,4 @@
-"""A rig that knows only bridge/PROTOCOL.md is controlled and recorded; and that page says what the code does."""
+"""A rig that knows only bridge/wire/PROTOCOL.md is controlled and recorded; and that page says what the code does."""
 
 import ast
 import json
@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridge import messages
-from bridge import stickslip_pb2 as wire
-from bridge.logfile import read_run
-from bridge.topics import TOPICS
+from bridge.log.logfile import read_run
+from bridge.wire import messages
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.topics import TOPICS
 from tests.system.ports import free_endpoint
 
 pytestmark = pytest.mark.realtime
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "bridge" / "PROTOCOL.md").read_text()
+PAGE = (ROOT / "bridge" / "wire" / "PROTOCOL.md").read_text()
 FOREIGN_PLANT = ROOT / "tests" / "system" / "foreign_plant.py"
 BLOCKS = 7000
 # the rig slips every 0.3 s, at 2.78 s for the eighth time: now it sticks, and is far from its next slip
@@ -121,7 +121,7 @@ def test_the_page_has_the_table_of_topics() -> None:
 
 def test_the_page_has_the_schema() -> None:
     block = PAGE.split("```proto\n")[1].split("```")[0]
-    assert block == (ROOT / "bridge" / "stickslip.proto").read_text()
+    assert block == (ROOT / "bridge" / "wire" / "stickslip.proto").read_text()
 
 
 def test_the_page_has_the_lengths_of_canonical_messages() -> None:

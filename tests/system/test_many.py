@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from bridge.faults import Fault
-from diagnosis.many import Outcome, Source, diagnose_many, find_sources
+from diagnosis.diagnose_many import Outcome, Source, diagnose_many, find_sources
 from tests import made_up
 
 NAMES = ["a", "b", "deadly", "refused", "broken"]
@@ -110,7 +110,7 @@ def test_a_cluster_that_is_not_there(tmp_path):
 def test_ctrl_c_leaves_no_worker_and_no_file(tmp_path):
     for name in ("a", "b"):
         made_up.evidence_folder(tmp_path / "all" / name)
-    program = "from diagnosis import many; from tests import made_up; from cockpit import cli;"
+    program = "from diagnosis import diagnose_many as many; from tests import made_up; from cockpit import cli;"
     program += "many.real_diagnose = made_up.endless; cli.main()"
     options = ["diagnose", str(tmp_path / "all"), "--jobs", "2", "--json", str(tmp_path / "out.json")]
     command = subprocess.Popen(

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from bridge.faults import FAULTS, Fault
-from bridge.zenoh_link import Bus, BusConfig
+from bridge.wire.zenoh_link import Bus, BusConfig
 from tests.system.ports import free_endpoint
 
 

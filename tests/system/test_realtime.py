@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridge import stickslip_pb2 as wire
 from bridge.faults import FAULTS
-from bridge.logfile import read_run
-from bridge.topics import CONTROLLER_EVENT, OPERATOR, STATE
-from bridge.zenoh_link import Bus, BusConfig, Inbox
+from bridge.log.logfile import read_run
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.topics import CONTROLLER_EVENT, OPERATOR, STATE
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 from controller.codes import BLOCK
 from tests.system.ports import free_endpoint
 

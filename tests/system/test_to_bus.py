@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from bridge import stickslip_pb2 as wire
-from bridge.topics import PLANT_EVENT, SENSORS
-from bridge.zenoh_link import Bus, BusConfig, Inbox, Received
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.topics import PLANT_EVENT, SENSORS
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from tests.golden.bless import FOLDER
 from tests.system.ports import free_endpoint
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bridge.config import validate
 from bridge.faults import Fault
 from plant.config import RigConfig
-from plant.effects import EFFECTS, checked
+from plant.effects.library import EFFECTS, checked
 from plant.records import build
 from tests.effects_rig import run
 

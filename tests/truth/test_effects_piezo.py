@@ -84,7 +84,7 @@ def test_sag_by_heat_begins_when_the_piezo_is_switched_on():
 
 
 def test_a_pause_cools_it():
-    from bridge.messages import CHANNELS
+    from bridge.wire.messages import CHANNELS
     from plant.core import advance_disturbed
     from plant.records import TRUTH, build
 

@@ -5,9 +5,9 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import gammainc
 
-from bridge.messages import CHANNELS, sensor_block
+from bridge.wire.messages import CHANNELS, sensor_block
 from plant.core import advance_disturbed
-from plant.effects import LONGEST_DELAY
+from plant.effects.library import LONGEST_DELAY
 from plant.node import PlantNode
 from plant.records import TRUTH, build
 from tests.effects_rig import HEAVY_KG, TAU, rig, run

@@ -6,14 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import diagnosis.twin
-from diagnosis.evidence import load_evidence
-from diagnosis.gap import Floor, between, compress, differences, floor_of, gap, replicates, whitened
-from diagnosis.making import Case, make_evidence
-from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Problem, prepare
-from diagnosis.twin import Effects, Roughness
-from plant.effects import EFFECTS
+import diagnosis.model.rig
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.gap.floor import Floor, compress, floor_of, replicates
+from diagnosis.gap.measure import between, differences, gap, whitened
+from diagnosis.gap.prepare import prepare
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.model.rig import Effects, Roughness
+from diagnosis.synthetic.folder import Case, make_evidence
+from plant.effects.library import EFFECTS
 from tests.blind.plant_sizes import EFFECT_SIZES, Sizes
 
 SURFACE = Roughness(0.003, 1.5e-4, 0)
@@ -114,7 +116,7 @@ def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
     files = {run.file for run in quiet.runs}
     scatter = bench.floor.scatter[[file in files for file, _ in bench.problem.labels]]
     coarse = quiet.predicted(bench.point({}))
-    monkeypatch.setattr(diagnosis.twin, "_COARSEST_STEP_S", 1e-5)
+    monkeypatch.setattr(diagnosis.model.rig, "_COARSEST_STEP_S", 1e-5)
     fine = Problem(quiet.rig, quiet.runs).predicted(bench.point({}))
     assert np.nanmax(np.abs(coarse - fine) / scatter) < 0.33
 

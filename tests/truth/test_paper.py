@@ -2,8 +2,8 @@
 
 import pytest
 
-from cockpit.reproduce_claims import REFERENCE
-from cockpit.reproduce_runs import run
+from cockpit.paper.claims import REFERENCE
+from cockpit.paper.runs import run
 
 # F_d max [N], F_d min [N], period [s] by classic Runge-Kutta in steps of 1 us; a single number: no slips.
 TABLE = {

@@ -5,20 +5,21 @@ import math
 import numpy as np
 import pytest
 
-from bridge.messages import CHANNELS
-from diagnosis import twin
-from diagnosis.by_run import as_in_rig_file
-from diagnosis.commands import Commands
-from diagnosis.lanes import LANES, gone
-from diagnosis.library import trials
-from diagnosis.nuisance import Nuisances
-from diagnosis.problem import Problem
-from diagnosis.reduced import SIGNALS
-from diagnosis.sensing import SENSOR_EFFECTS
-from diagnosis.side_by_side import advance_lanes
-from diagnosis.twin import Entry, Roughness, Start, built, predict, predict_many, rig_config
+from bridge.wire.messages import CHANNELS
+from diagnosis.features.grid import SIGNALS
+from diagnosis.features.segments import Commands
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.hypotheses.trials import trials
+from diagnosis.model import predict as twin
+from diagnosis.model.four_rigs import advance_lanes
+from diagnosis.model.four_rigs_step import LANES, gone
+from diagnosis.model.per_run import as_in_rig_file
+from diagnosis.model.predict import predict, predict_many
+from diagnosis.model.rig import Entry, Roughness, Start, built, rig_config
+from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 from plant.core import advance, advance_disturbed
-from plant.effects import EFFECTS
+from plant.effects.library import EFFECTS
 from plant.records import TRUTH
 from tests.prepared import prepared
 

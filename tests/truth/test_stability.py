@@ -8,8 +8,8 @@ import pytest
 from scipy.special import lambertw
 
 from bridge.config import validate
-from bridge.messages import CHANNELS
-from cockpit.stability_map import stability_map as draw_map
+from bridge.wire.messages import CHANNELS
+from cockpit.judge.stability_map import stability_map as draw_map
 from plant.config import RigConfig
 from plant.core import advance
 from plant.records import TRUTH, build

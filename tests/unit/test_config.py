@@ -8,7 +8,7 @@ import pytest
 
 from bridge.config import read_toml, validate, with_overrides
 from bridge.faults import Fault
-from cockpit.scenario import load_rig, load_scenario, rig_setting
+from cockpit.run.scenario import load_rig, load_scenario, rig_setting
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 
@@ -182,7 +182,7 @@ def test_a_controller_within_the_frequencies_of_its_rig_is_taken() -> None:
 
 
 def test_every_rig_and_scenario_that_comes_along_is_valid() -> None:
-    from cockpit.scenario import deploy_folder
+    from cockpit.run.scenario import deploy_folder
 
     for path in deploy_folder().glob("rigs/*.toml"):
         assert load_rig(path.stem, []).name == path.stem

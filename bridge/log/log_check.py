@@ -1,0 +1,190 @@
+"""What is wrong with a run log, found in one pass whose memory does not grow with the log."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bridge.files import check_file
+from bridge.log.finding import Finding
+from bridge.log.log_reader import Damage
+from bridge.log.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
+from bridge.log.signal_range import Signal, SignalLook
+from bridge.log.topic_watch import TopicWatch
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import CHANNELS, SCHEMA_VERSION, parsed
+from bridge.wire.topics import BY_NAME
+
+LATE_NS = 1_000_000  # 1 ms, the usual block: answered later than its successor is due
+# a desktop is late now and then; one block in a hundred is a rig that does not keep up
+LATE_SHARE = 0.01
+_DEAD_S = 1.0  # a sensor with noise does not give one value for so long
+_RANGES = {
+    "drive_force_N": "force_range_N",
+    "mass_accel_mps2": "accel_range_mps2",
+    "base_accel_mps2": "accel_range_mps2",
+    "mass_position_m": "position_range_m",
+    "drive_position_m": "position_range_m",
+}
+
+
+class LogCheck(NamedTuple):
+    """What a check saw."""
+
+    log: str
+    findings: list[Finding]
+    messages: dict[str, int]  # by streaming topic
+    seconds: float  # of sensor blocks
+    late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For `--json`."""
+        return self._asdict() | {"findings": [finding.as_dict() for finding in self.findings]}
+
+
+class _Pass:
+    """The memory of one pass."""
+
+    def __init__(self) -> None:
+        self.topics = {name: TopicWatch(name) for name in STREAMING}
+        self.signals = {name: Signal(dwells=name.endswith("_m")) for name in CHANNELS}
+        self.late = {"applied": 0, "trace": 0}
+        self.period_ns = 0.0
+        self.samples_per_block = 1
+        self.events: list[wire.Event] = []
+        self.unknown: dict[str, int] = {}
+
+    def add(self, piece: Piece) -> None:
+        if piece.topic in STREAMING:
+            records = piece.records
+            if piece.topic == "sensors":
+                self.period_ns = self.period_ns or block_period_ns(records)
+                self.samples_per_block = records["drive_force_N"].shape[1]
+                for name, signal in self.signals.items():
+                    signal.add(records[name].ravel())
+            counted = piece.topic in {"sensors", "applied"}
+            self.topics[piece.topic].add(records, piece.log_time_ns, self.period_ns if counted else 0.0)
+            if piece.topic in self.late:
+                field = "late_ns" if piece.topic == "applied" else "lateness_ns"
+                self.late[piece.topic] += int((records[field] > LATE_NS).sum())
+        elif piece.topic.startswith("event/"):
+            self.events += [parsed(wire.Event, payload, "/" + piece.topic) for payload in piece.payloads]
+        elif piece.topic not in BY_NAME:
+            self.unknown[piece.topic] = self.unknown.get(piece.topic, 0) + len(piece.payloads)
+
+
+def check_log(path: Path, progress: Callable[[float], None] | None = None) -> LogCheck:
+    """Look for everything that is wrong with a log. Raises Fault BAD_LOG when it is no run log.
+
+    `progress` is called with the share of the log that was read, 0 to 1.
+    """
+    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    reader = LogReader(path)
+    seen = _Pass()
+    for piece in iter_pieces(reader):
+        seen.add(piece)
+        if progress is not None:
+            progress(reader.position_bytes / max(reader.size_bytes, 1))
+    findings = _of_file(path, reader, seen)
+    for watch in seen.topics.values():
+        findings += watch.findings()
+    plant = _table(reader, "plant", "configuration")
+    absent = _table(reader, "import", "missing")
+    for name, signal in seen.signals.items():
+        if seen.topics["sensors"].messages and name not in absent:
+            limit = plant.get("rig", {}).get("sensors", {}).get(_RANGES[name]) if isinstance(plant, dict) else None
+            findings += _of_signal("/sensors " + name, signal.result(), _sample_s(seen), limit)
+    shares = {f"/{name}": late / max(seen.topics[name].messages, 1) for name, late in seen.late.items()}
+    for where, share in shares.items():
+        if share > LATE_SHARE:
+            text = f"{100 * share:.1f} % of the messages were later than 1 ms: must be below {100 * LATE_SHARE:g} %"
+            findings.append(Finding("late", where, text, seen.late[where[1:]]))
+    messages = {name: watch.messages for name, watch in seen.topics.items()}
+    seconds = messages["sensors"] * seen.period_ns / 1e9
+    return LogCheck(str(path), findings, messages, seconds, shares)
+
+
+def _sample_s(seen: _Pass) -> float:
+    return seen.period_ns / 1e9 / max(seen.samples_per_block, 1)
+
+
+def _table(reader: LogReader, name: str, key: str) -> Any:
+    """A table that the log keeps as JSON; empty where there is none or it is damaged."""
+    try:
+        return json.loads(reader.metadata[name][key])
+    except (KeyError, json.JSONDecodeError):
+        return {}
+
+
+def damage_findings(damage: Damage, path: Path) -> list[Finding]:
+    """What of a log was lost."""
+    found: list[Finding] = []
+    remedy = f"`stickslip log recover {path}` saves the rest"
+    if not damage.closed:
+        text = f"has no end, {damage.cut_bytes} bytes of an open chunk were lost; {remedy}"
+        found.append(Finding("cut", path.name, text, max(damage.cut_bytes, 1)))
+    if damage.bad_chunks:
+        found.append(
+            Finding("damaged", path.name, f"{damage.bad_chunks} chunks are damaged; {remedy}", damage.bad_chunks)
+        )
+    if damage.bad_records:
+        text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense; {remedy}"
+        found.append(Finding("damaged", path.name, text, damage.bad_records))
+    return found
+
+
+def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
+    found = damage_findings(reader.damage, path)
+    for role, table in reader.metadata.items():
+        version = table.get("schema_version")
+        if version is not None and version != str(SCHEMA_VERSION):
+            text = f"the {role} speaks schema version {version}: must be {SCHEMA_VERSION}"
+            found.append(Finding("schema-version", path.name, text))
+    found += [
+        Finding("unknown-topic", "/" + topic, f"{times} messages of a topic that this version does not know", times)
+        for topic, times in seen.unknown.items()
+    ]
+    if seen.topics["sensors"].messages == 0:
+        found.append(Finding("empty", path.name, "holds no sensor block"))
+    for event in seen.events:
+        dropped = re.search(r"dropped=(\d+)", event.text)
+        if event.code in {"DROPPED", "PLANT_LOST", "STALE"}:
+            found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", event.text))
+        elif dropped and int(dropped[1]):
+            text = f"the {event.source} dropped {dropped[1]} messages because it was too slow"
+            found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
+    plant_codes = [event.code for event in seen.events if event.source == "plant"]
+    if reader.damage.closed and "START" in plant_codes and "END" not in plant_codes:
+        found.append(Finding("no-end", "/event/plant", "the plant began its run and never ended it"))
+    return found
+
+
+def _of_signal(where: str, seen: SignalLook, sample_s: float, limit: float | None) -> list[Finding]:
+    found: list[Finding] = []
+    if seen.not_finite:
+        at_s = seen.first_not_finite * sample_s
+        text = f"{seen.not_finite} samples are no finite number, first after {at_s:.3f} s of samples"
+        found.append(Finding("not-finite", where, text, seen.not_finite))
+    if seen.constant:
+        found.append(Finding("dead", where, f"constant at {seen.lowest:g} over the whole log", seen.samples))
+        return found
+    if seen.longest_run * sample_s > _DEAD_S:
+        from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
+        text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s of samples on"
+        found.append(Finding("dead", where, text, seen.longest_run))
+    # a float32 just misses a limit that it cannot hold
+    at_limit = limit is not None and max(seen.highest, -seen.lowest) >= limit * (1.0 - 1e-6)
+    if seen.clipped_high or seen.clipped_low or at_limit:
+        ends = [f"{seen.clipped_high} samples at {seen.highest:g}"] if seen.clipped_high else []
+        ends += [f"{seen.clipped_low} samples at {seen.lowest:g}"] if seen.clipped_low else []
+        text = " and ".join(ends) or f"reaches the end of its range, {limit:g}"
+        found.append(
+            Finding(
+                "clipped",
+                where,
+                f"{text}: more was there than the sensor tells",
+                max(seen.clipped_high + seen.clipped_low, 1),
+            )
+        )
+    return found

@@ -1,0 +1,260 @@
+"""One pass over the records of a run log, from the front and without its index.
+
+A cut or damaged file so costs only what is cut or damaged: a damaged chunk is known by its checksum, and after a record
+that makes no sense the next whole chunk is looked for.
+"""
+
+import contextlib
+import struct
+import zlib
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import IO, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Header, Metadata, Schema
+from mcap.writer import MCAP0_MAGIC
+
+from bridge.faults import Fault
+from bridge.kernel import kernel
+from bridge.log.runlog import LIBRARY
+from bridge.wire.topics import TOPICS
+
+_HEAD = struct.Struct("<BQ")
+_LARGEST_RECORD_BYTES = 1 << 30
+_FOOTER_BYTES = 20
+# A chunk of ours says "zstd" 28 bytes into its content, after two times, a size and a checksum: 37 into its record.
+_CHUNK_MARK = struct.pack("<I4s", 4, b"zstd")
+_MARK_AT = 28
+_SEARCH_BYTES = 1 << 20
+_UNREADABLE = (McapError, struct.error, UnicodeDecodeError, zstandard.ZstdError, MemoryError, OverflowError)
+_CHANNEL_TOPICS = {i + 1: topic.name for i, topic in enumerate(topic for topic in TOPICS if topic.logged)}
+
+Bytes = npt.NDArray[np.uint8]
+MessageRows = npt.NDArray[np.int64]  # [messages, 6]
+CHANNEL, SEQUENCE, LOG_TIME, PUBLISH_TIME, START, END = range(6)  # columns of MessageRows; START and END of the payload
+
+
+class Damage(NamedTuple):
+    """What could not be read."""
+
+    cut_bytes: int  # from the first record that is not whole to the end of the file
+    bad_chunks: int  # whole, but their checksum is wrong
+    closed: bool  # the file has its footer
+    bad_records: int = 0  # definitions, tables, messages or stretches of bytes that make no sense
+
+
+class LogReader:
+    """One pass over a log. `damage` is complete after the pass; `metadata` and `channels` grow during it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.damage = Damage(0, 0, closed=False)
+        self.header: Header | None = None
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.size_bytes = 0
+        self.position_bytes = 0  # how far the pass has come
+
+    def count_bad_messages(self, count: int) -> None:
+        """Messages that are whole but are none of their topic."""
+        if count:
+            self._count(bad_records=count)
+
+    def topic(self, channel_id: int) -> str:
+        """Topic of a channel; where its definition was damaged, the one that every log of this version gives it."""
+        if channel_id in self.channels:
+            return self.channels[channel_id].topic.removeprefix("/")
+        return _CHANNEL_TOPICS.get(channel_id, f"channel {channel_id}")
+
+    def messages(self) -> Iterator[tuple[Bytes, MessageRows]]:
+        """The bytes of one chunk after the other, with where its messages are. Raises Fault BAD_LOG."""
+        rows = np.empty((1 << 16, 6), np.int64)
+        for data in self.chunks():
+            if data.shape[0] // 31 > rows.shape[0]:  # no message is shorter than its head of 31 bytes
+                rows = np.empty((data.shape[0] // 31, 6), np.int64)
+            yield data, rows[: _walk(data, rows)]
+
+    def chunks(self) -> Iterator[Bytes]:
+        """The records of one chunk after the other, uncompressed. Raises Fault BAD_LOG when this is no run log."""
+        try:
+            with self.path.open("rb") as file:
+                self.size_bytes = self.path.stat().st_size
+                yield from self._chunks(file)
+        except OSError as error:
+            raise Fault(
+                "BAD_LOG", f"{self.path}: cannot be read: {error.strerror}; give the path of a .mcap file"
+            ) from None
+
+    def _chunks(self, file: IO[bytes]) -> Iterator[Bytes]:
+        if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            line = f"{self.path}: {self.size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
+            raise Fault("BAD_LOG", line)
+        whole_bytes = len(MCAP0_MAGIC)
+        while not self.damage.closed:
+            record = _next(file, self.size_bytes)
+            if record is None:
+                start = self._after_damage(file, whole_bytes)
+                if start is None:
+                    break
+                file.seek(start)
+                continue
+            opcode, content = record
+            if opcode == Opcode.CHUNK or content[_MARK_AT : _MARK_AT + len(_CHUNK_MARK)] == _CHUNK_MARK:
+                data = _uncompressed(content)
+                if data is None:
+                    self._count(bad_chunks=1)
+                else:
+                    self._must_have_header()
+                    self._learn_channels(data)
+                    self.position_bytes = file.tell()
+                    yield np.frombuffer(data, np.uint8)
+            elif opcode == Opcode.FOOTER and len(content) == _FOOTER_BYTES:
+                self.damage = self.damage._replace(closed=True)
+            else:
+                self._learn(opcode, content)
+            whole_bytes = file.tell()
+        if not self.damage.closed:
+            self._count(cut_bytes=self.size_bytes - whole_bytes)
+        self.position_bytes = self.size_bytes
+        self._must_have_header()
+
+    def _count(self, cut_bytes: int = 0, bad_chunks: int = 0, bad_records: int = 0) -> None:
+        now = self.damage
+        self.damage = Damage(
+            now.cut_bytes + cut_bytes, now.bad_chunks + bad_chunks, now.closed, now.bad_records + bad_records
+        )
+
+    def _must_have_header(self) -> None:
+        if self.header is None:
+            line = (
+                f"{self.path}: holds no header; it was cut before anything was written, or its first bytes are damaged"
+            )
+            raise Fault("BAD_LOG", line)
+
+    def _after_damage(self, file: IO[bytes], from_bytes: int) -> int | None:
+        """Where the next whole chunk begins after bytes that make no sense; None when there is none."""
+        start = _next_chunk(file, from_bytes + 1, self.size_bytes)
+        if start is not None:
+            self._count(bad_records=1)
+            return start
+        if self.size_bytes - from_bytes > len(MCAP0_MAGIC):
+            file.seek(self.size_bytes - len(MCAP0_MAGIC))
+            if file.read() == MCAP0_MAGIC:  # the index is damaged, all before it was read
+                self._count(bad_records=1)
+                self.damage = self.damage._replace(closed=True)
+        return None
+
+    def _learn(self, opcode: int, content: bytes) -> None:
+        stream = ReadDataStream(BytesIO(content))
+        try:
+            if opcode == Opcode.HEADER:
+                self.header = Header.read(stream)
+            elif opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream)
+                self.schemas[schema.id] = schema
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(stream)
+                self.channels[channel.id] = channel
+            elif opcode == Opcode.METADATA:
+                metadata = Metadata.read(stream)
+                self.metadata[metadata.name] = dict(metadata.metadata)
+        except _UNREADABLE:
+            self._count(bad_records=1)
+        if opcode == Opcode.HEADER and self.header is not None and self.header.library != LIBRARY:
+            by = self.header.library
+            line = f"{self.path}: written by {by!r}: must be {LIBRARY!r}; another program's or version's log"
+            raise Fault("BAD_LOG", line)
+
+    def _learn_channels(self, data: bytes) -> None:
+        at = 0
+        while at + _HEAD.size <= len(data) and data[at] in {Opcode.SCHEMA, Opcode.CHANNEL}:
+            opcode, length = _HEAD.unpack_from(data, at)
+            at += _HEAD.size
+            self._learn(opcode, data[at : at + length])
+            at += length
+
+
+def _next(file: IO[bytes], size: int) -> tuple[int, bytes] | None:
+    """Opcode and content of the next whole record; None where the file is cut or no record makes sense."""
+    head = file.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        return None
+    opcode, length = _HEAD.unpack(head)
+    if opcode == 0 or opcode > Opcode.DATA_END or length > min(size - file.tell(), _LARGEST_RECORD_BYTES):
+        return None
+    return opcode, file.read(length)
+
+
+def _next_chunk(file: IO[bytes], from_bytes: int, size: int) -> int | None:
+    """Where the first whole and sound chunk at or after `from_bytes` begins."""
+    mark_offset = _HEAD.size + _MARK_AT
+    at = from_bytes
+    while at < size:
+        file.seek(at)
+        window = file.read(_SEARCH_BYTES)
+        found = window.find(_CHUNK_MARK)
+        while found >= 0:
+            start = at + found - mark_offset
+            if start >= from_bytes:
+                file.seek(start)
+                record = _next(file, size)
+                if record is not None and record[0] == Opcode.CHUNK and _uncompressed(record[1]) is not None:
+                    return start
+            found = window.find(_CHUNK_MARK, found + 1)
+        at += max(len(window) - len(_CHUNK_MARK) + 1, 1)
+    return None
+
+
+def _uncompressed(content: bytes) -> bytes | None:
+    """The records of a chunk; None when its checksum or its size is wrong."""
+    with contextlib.suppress(*_UNREADABLE):
+        chunk = Chunk.read(ReadDataStream(BytesIO(content)))
+        data = chunk.data
+        if chunk.compression == "zstd":
+            # looked at first: a damaged size would have the library reserve whatever it says
+            if zstandard.frame_content_size(data) != chunk.uncompressed_size:
+                return None
+            if chunk.uncompressed_size > _LARGEST_RECORD_BYTES:
+                return None
+            data = zstandard.ZstdDecompressor().decompress(data)
+        if zlib.crc32(data) == chunk.uncompressed_crc:
+            return data
+    return None
+
+
+@kernel
+def _number(data: Bytes, at: int, width: int) -> np.int64:
+    value = np.int64(0)
+    for i in range(width):
+        value |= np.int64(data[at + i]) << np.int64(8 * i)
+    return value
+
+
+@kernel
+def _walk(data: Bytes, rows: MessageRows) -> int:
+    """Fill `rows` with the messages of a chunk; how many there are."""
+    at = 0
+    count = 0
+    while at + 9 <= data.shape[0]:
+        length = int(_number(data, at + 1, 8))
+        start = at + 9
+        if length < 0 or length > data.shape[0] - start:
+            break
+        if data[at] == 5 and length >= 22:
+            rows[count, 0] = _number(data, start, 2)
+            rows[count, 1] = _number(data, start + 2, 4)
+            rows[count, 2] = _number(data, start + 6, 8)
+            rows[count, 3] = _number(data, start + 14, 8)
+            rows[count, 4] = start + 22
+            rows[count, 5] = start + length
+            count += 1
+        at = start + length
+    return count

@@ -1,0 +1,98 @@
+"""The recorder process: everything on the bus into one log."""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from bridge.faults import Fault
+from bridge.log.runlog import RunLog
+from bridge.wire import realtime
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import parsed
+from bridge.wire.topics import TOPICS
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
+
+_INBOX_LIMIT = 1 << 16  # 15 s of a run at 4100 messages/s
+_HEADERS_WAIT_S = 30.0  # a first start compiles kernels
+_QUIET_S = 0.3  # after the last END: nothing more is under way
+_PLANT_LOST_S = 1.0
+_STOP_S = 3.0  # after a stop the plant fades out within 1 s; a rig that goes on must not hold up the end
+
+
+def run(
+    path: Path,
+    bus_config: BusConfig,
+    roles: list[str],
+    about: dict[str, object],
+    lockstep: bool,
+    stop: threading.Event,
+    ready: Callable[[], None] = lambda: None,
+) -> None:
+    """Record until the plant and the controller have ended, or `stop` is set.
+
+    Args:
+        roles: whose configurations are waited for and kept.
+        about: what else the log should say of its run.
+        ready: called once a rig has answered, before the log is begun.
+
+    Raises Fault NO_PEER, PEER_DIED, LOG_WRITE.
+
+    """
+    with Bus(bus_config, "recorder", lockstep, stop) as bus:
+        inbox = Inbox(_INBOX_LIMIT, patient=lockstep)
+        for topic in TOPICS:
+            if topic.logged and topic.sender != "recorder":
+                bus.listen(topic, inbox.push)
+        headers = bus.headers(roles, _HEADERS_WAIT_S, stop)
+        ready()
+        log = RunLog(path, lockstep)
+        log.add_metadata("run", about)
+        for role in sorted(headers):
+            log.add_header(headers[role])
+        realtime.claim(1 if lockstep else None, realtime.RECORDER_PRIORITY)
+        bus.announce()
+        lost_plant = _record(log, bus, inbox, stop)
+        if inbox.dropped:
+            log.add_event("DROPPED", f"{inbox.dropped} messages: the recorder was too slow")
+        log.close()
+    if lost_plant:
+        raise Fault("PEER_DIED", f"the plant left the bus before its end; {path} was closed with all that came")
+
+
+def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
+    """Write until everybody has ended. Returns whether the plant vanished instead."""
+    ended: set[str] = set()
+    heard_s = time.monotonic()
+    seen = False
+    until_s = math.inf
+    while True:
+        if stop.is_set():
+            until_s = min(until_s, time.monotonic() + _STOP_S)
+        if time.monotonic() > until_s:
+            return False
+        received = inbox.get(0.05)
+        if received is not None:
+            heard_s = time.monotonic()
+            try:
+                log.write(received.topic, received.payload)
+                if received.topic.name.startswith("event/"):
+                    event = parsed(wire.Event, received.payload, received.topic.name)
+                    if event.code == "END":
+                        ended.add(event.source)
+            except Fault as fault:
+                if fault.kind.code != "BAD_MESSAGE":
+                    raise
+                log.add_event("BAD_MESSAGE", fault.line)  # one client's rubbish must not end the record of the others
+            continue
+        log.flush_when_due()
+        quiet_s = time.monotonic() - heard_s
+        if stop.is_set() and quiet_s > _QUIET_S:
+            return False
+        if "plant" in ended and ("controller" in ended or quiet_s > _QUIET_S):
+            return False
+        seen = seen or bus.alive("plant")
+        if seen and quiet_s > _PLANT_LOST_S and not bus.alive("plant"):
+            log.add_event("PLANT_LOST", "the plant left the bus before its end")
+            return True

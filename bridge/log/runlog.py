@@ -1,0 +1,155 @@
+"""Writing a run: MCAP with real schemas, cut into chunks by time so that a kill loses little."""
+
+import contextlib
+import fcntl
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+from bridge.faults import Fault
+from bridge.log.mcap_chunks import ChunkWriter, ending_without_index
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import SCHEMA_VERSION, file_descriptor_set, sequence_and_time
+from bridge.wire.topics import RECORDER_EVENT, TOPICS, Topic
+
+FLUSH_PERIOD_S = 0.1  # a kill loses at most the open chunk: this, and never more than 0.25 s
+LARGEST_CHUNK_BYTES = 1 << 20  # a run in one process fills more than this in 0.1 s
+_LATEST_MESSAGES = 256  # what is further behind was not delayed: its sender began anew
+LIBRARY = f"stickslip schema {SCHEMA_VERSION}"
+
+
+def _locked(file: IO[bytes]) -> bool:
+    """Keep everybody else from writing or replacing the file; False where somebody does already."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        pass
+    return True
+
+
+class RunLog:
+    """One log file being written. Not thread safe: one thread owns it.
+
+    Args:
+        path: the file; its folder is made.
+        lockstep: log times are simulated times, so that the same run gives the same bytes.
+
+    """
+
+    def __init__(self, path: Path, lockstep: bool) -> None:
+        self.path = path
+        self._lockstep = lockstep
+        self._next: dict[str, int] = {}
+        self._last_t_ns = 0
+        self._events = 0
+        self._whole_bytes = 0
+        self._due_s = time.monotonic() + FLUSH_PERIOD_S
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            # not emptied: what is there may be the log of a run that goes on
+            self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666), "wb")
+            if not _locked(self._file):
+                self._file.close()
+                line = f"{path}: is being recorded: must be another file than that of a run that goes on"
+                raise Fault("LOG_WRITE", f"{line}; wait for the end of that one, or choose another --log")
+            if path.is_file():
+                self._file.truncate(0)
+        except OSError as error:
+            raise Fault("LOG_WRITE", f"{path}: cannot be written: {error.strerror}; choose another --log") from None
+        self._channels: dict[str, int] = {}
+        self._guarded(self._begin)
+
+    def _begin(self) -> None:
+        """Write header, schemas and channels."""
+        self._writer = ChunkWriter(self._file, LIBRARY)
+        schema_data = file_descriptor_set()
+        schemas: dict[str, int] = {}
+        for topic in TOPICS:
+            if topic.logged:
+                name = topic.message.DESCRIPTOR.full_name
+                if name not in schemas:
+                    schemas[name] = self._writer.add_schema(name, "protobuf", schema_data)
+                self._channels[topic.name] = self._writer.add_channel(
+                    "/" + topic.name, "protobuf", schemas[name], {"rate_Hz": f"{topic.rate_Hz:g}"}
+                )
+
+    def add_header(self, header: wire.Header) -> None:
+        """Keep the configuration and versions of one process: a log alone can re-create its run."""
+        fields = {
+            "schema_version": str(header.schema_version),
+            "configuration": header.configuration,
+            "versions": header.versions,
+        }
+        self._guarded(lambda: self._writer.add_metadata(header.role, fields))
+
+    def add_metadata(self, name: str, fields: dict[str, Any]) -> None:
+        """Keep a table of values, each as JSON."""
+        text = {key: json.dumps(value) for key, value in fields.items()}
+        self._guarded(lambda: self._writer.add_metadata(name, text))
+
+    def write(self, topic: Topic, payload: bytes) -> None:
+        """Keep one message, and note a gap in its sequence. Raises Fault BAD_MESSAGE, LOG_WRITE."""
+        sequence, t_ns = sequence_and_time(payload, topic.message)
+        if t_ns < 0:
+            line = f"{topic.name}: t_ns = {t_ns}: must be 0 or more; count it from the start of the run"
+            raise Fault("BAD_MESSAGE", line)
+        expected = self._next.get(topic.name, sequence if topic.rate_Hz else 0)
+        if sequence > expected:
+            self.add_event("GAP", f"/{topic.name}: {sequence - expected} lost before {sequence}", t_ns)
+        if sequence + _LATEST_MESSAGES < expected:
+            self.add_event("RESTART", f"/{topic.name}: {sequence} after {expected - 1}: its sender began anew", t_ns)
+            expected = 0
+        self._next[topic.name] = max(expected, sequence + 1)
+        self._last_t_ns = max(self._last_t_ns, t_ns)
+        self._add(topic, payload, sequence, t_ns)
+        self.flush_when_due()
+
+    def flush_when_due(self) -> None:
+        """End the open chunk when it is old enough. Raises Fault LOG_WRITE."""
+        if time.monotonic() > self._due_s or self._writer.open_bytes > LARGEST_CHUNK_BYTES:
+            self._due_s = time.monotonic() + FLUSH_PERIOD_S
+            self._guarded(self._writer.flush)
+
+    def add_event(self, code: str, text: str, t_ns: int | None = None) -> None:
+        """Keep an event of the recorder itself."""
+        at_ns = self._last_t_ns if t_ns is None else t_ns
+        event = wire.Event(sequence=self._events, t_ns=at_ns, source="recorder", code=code, text=text)
+        self._add(RECORDER_EVENT, event.SerializeToString(), self._events, at_ns)
+        self._events += 1
+
+    def _add(self, topic: Topic, payload: bytes, sequence: int, t_ns: int) -> None:
+        log_time_ns = t_ns if self._lockstep else time.time_ns()
+        self._writer.add_message(self._channels[topic.name], log_time_ns, payload, t_ns, sequence & 0xFFFFFFFF)
+
+    def _guarded(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+            self._file.flush()
+            self._whole_bytes = self._file.tell()
+        except OSError as error:
+            self._end_without_index()
+            line = (
+                f"{self.path}: {error.strerror}; the log was closed at {self._last_t_ns * 1e-9:.2f} s, what came before "
+                f"is kept; free space, then `stickslip log recover {self.path}` gives it its index back"
+            )
+            raise Fault("LOG_WRITE", line) from None
+
+    def _end_without_index(self) -> None:
+        """Close with 50 bytes where the last whole chunk ended: room that the chunk which did not fit has given back."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+        with contextlib.suppress(OSError), self.path.open("r+b", buffering=0) as file:
+            file.truncate(self._whole_bytes)
+            file.seek(self._whole_bytes)
+            file.write(ending_without_index())
+
+    def close(self) -> None:
+        """Write the index and close. The file is whole after this, or was closed by a fault. Raises Fault LOG_WRITE."""
+        if not self._file.closed:
+            self._guarded(self._writer.finish)
+            self._file.close()

@@ -1,0 +1,133 @@
+"""Numbers and times of one topic of a log: what is missing, what came twice, where a clock jumped."""
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.log.finding import Finding
+from bridge.wire.messages import Records
+
+Integers = npt.NDArray[np.int64]
+# t_ns is counted in samples; a rate that is no whole number of nanoseconds rounds by one
+_CLOCK_TOLERANCE_NS = 1000
+_REMEMBERED_NUMBERS = 1 << 20  # missing ones, of which a late one is told from one that came twice
+
+
+class TopicWatch:
+    """Follows one topic, message by message, in file order.
+
+    `period_ns` is the time between two numbers where the sender counts it, 0 where times only must not go back.
+    """
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.messages = 0
+        self.last_t_ns = 0
+        self.first_number = 0
+        self.restarts = 0
+        self._missing_numbers: set[int] = set()
+        self._gaps_for_good: list[range] = []  # before a restart, or too large to remember every number of
+        self._highest = -1
+        self._duplicates: list[int] = []
+        self._late: list[int] = []
+        self._restarted_at: list[int] = []
+        self._jumps: list[tuple[int, int]] = []  # number, by how much [ns]
+        self._arrived_before: list[tuple[int, int]] = []
+        self._last_number = -1
+        self._last_log_time_ns = 0
+
+    def add(self, records: Records, log_time_ns: Integers, period_ns: float) -> None:
+        """Follow the next messages."""
+        if not len(records):
+            return
+        number = records["sequence"].astype(np.int64)
+        t_ns = records["t_ns"]
+        if self.messages == 0:
+            self.first_number = int(number[0])
+            self._last_number = self._highest = int(number[0]) - 1
+            self._last_log_time_ns = int(log_time_ns[0])
+            self.last_t_ns = int(t_ns[0]) - round(period_ns)
+        step = np.diff(number, prepend=self._last_number)
+        step_ns = np.diff(t_ns, prepend=self.last_t_ns)
+        arrival_ns = np.diff(log_time_ns, prepend=self._last_log_time_ns)
+        for i in np.flatnonzero(step != 1):
+            self._odd_number(int(number[i]), int(number[i]) - int(step[i]))
+        # running maximum without the restarts, which set it back
+        self._highest = max(self._highest, int(number[-1]))
+        forward = step > 0
+        jumped = np.abs(step_ns - period_ns * step) > _CLOCK_TOLERANCE_NS if period_ns else step_ns < 0
+        self._jumps += [(int(number[i]), int(step_ns[i])) for i in np.flatnonzero(forward & jumped)]
+        self._arrived_before += [(int(number[i]), int(arrival_ns[i])) for i in np.flatnonzero(arrival_ns < 0)]
+        self.messages += len(number)
+        self._last_number, self.last_t_ns = int(number[-1]), int(t_ns[-1])
+        self._last_log_time_ns = int(log_time_ns[-1])
+
+    def _odd_number(self, number: int, before: int) -> None:
+        self._highest = max(self._highest, before)
+        if number > self._highest + 1:
+            gap = range(self._highest + 1, number)
+            if len(self._missing_numbers) + len(gap) < _REMEMBERED_NUMBERS:
+                self._missing_numbers.update(gap)
+            else:
+                self._gaps_for_good.append(gap)
+            self._highest = number
+        elif number == 0 and before > 0:
+            self.restarts += 1
+            self._restarted_at.append(before)
+            self._gaps_for_good += _ranges(self._missing_numbers)
+            self._missing_numbers.clear()
+            self._highest = 0
+        elif number in self._missing_numbers:
+            self._missing_numbers.remove(number)
+            self._late.append(number)
+        elif number <= self._highest:
+            self._duplicates.append(number)
+
+    def findings(self) -> list[Finding]:
+        """What is wrong with the topic."""
+        where = "/" + self.topic
+        found: list[Finding] = []
+
+        def add(kind: str, text: str, times: int) -> None:
+            if times:
+                found.append(Finding(kind, where, text, times))
+
+        if self.restarts:
+            ends = ", ".join(str(number) for number in self._restarted_at[:3])
+            add(
+                "two-runs",
+                f"numbers start again at 0 after {ends}: {self.restarts + 1} runs in one file",
+                self.restarts,
+            )
+        gaps = [*self._gaps_for_good, *_ranges(self._missing_numbers)]
+        if gaps:
+            missing = sum(len(gap) for gap in gaps)
+            add("gap", f"{missing} messages missing in {len(gaps)} gaps, first {gaps[0][0]} to {gaps[0][-1]}", missing)
+        if self.topic == "sensors" and self.first_number > 0:
+            add("gap", f"begins with block {self.first_number}: those before were not recorded", self.first_number)
+        if self._duplicates:
+            text = f"numbers come a second time at {len(self._duplicates)} places, first {self._duplicates[0]}"
+            add("duplicate", text, len(self._duplicates))
+        if self._late:
+            add("order", f"{len(self._late)} messages came after a later one, first {self._late[0]}", len(self._late))
+        if self._jumps:
+            number, step_ns = self._jumps[0]
+            places = len(self._jumps)
+            text = (
+                f"t_ns does not follow the numbers at {places} places, first {number}: a step of {step_ns / 1e6:g} ms"
+            )
+            add("clock-jump", text, len(self._jumps))
+        if self._arrived_before:
+            number, step_ns = self._arrived_before[0]
+            text = f"log_time goes back at {len(self._arrived_before)} places, first {number}: by {-step_ns / 1e6:g} ms"
+            add("log-time-back", text, len(self._arrived_before))
+        return found
+
+
+def _ranges(numbers: set[int]) -> list[range]:
+    """Numbers as stretches without a hole, in order."""
+    ordered = np.array(sorted(numbers), np.int64)
+    return [
+        range(int(own[0]), int(own[-1]) + 1)
+        for own in np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
+        if len(own)
+    ]

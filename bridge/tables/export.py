@@ -1,0 +1,127 @@
+"""A run log as tables for other programs, streamed: the memory needed does not grow with the log."""
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from bridge.faults import Fault
+from bridge.files import check_file
+from bridge.log.logfile import STREAMING, Damage, LogReader, block_period_ns, iter_pieces, sample_times_s
+from bridge.tables.writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
+from bridge.wire.messages import CHANNELS, Records
+
+SUFFIXES = (".parquet", ".csv", ".mat")
+
+
+class Exported(NamedTuple):
+    """What `export` wrote."""
+
+    files: list[Path]
+    rows: dict[str, int]  # by topic
+    damage: Damage  # of the log; what could not be read is not in the tables
+
+
+def check_request(to: Path, topics: list[str], from_s: float, until_s: float) -> None:
+    """Raise Fault CONFIG when a log cannot be exported like this."""
+    if to.suffix not in SUFFIXES:
+        raise Fault("CONFIG", f"--to {to}: must end in {', '.join(SUFFIXES)}; choose one of these formats")
+    unknown = [topic for topic in topics if topic not in STREAMING]
+    if unknown or not topics:
+        raise Fault("CONFIG", f"--topic {','.join(unknown)}: no streaming topic; known: {', '.join(STREAMING)}")
+    if from_s >= until_s:
+        raise Fault("CONFIG", f"--from {from_s:g} --until {until_s:g}: from must be before until; exchange them")
+
+
+def export(
+    path: Path,
+    to: Path,
+    topics: list[str],
+    from_s: float = -np.inf,
+    until_s: float = np.inf,
+    progress: Callable[[float], None] | None = None,
+) -> Exported:
+    """Write streaming topics of a log as tables; sensors have one row a sample, the others one row a message.
+
+    `to` ends in .parquet, .csv or .mat; a flat format gets one file a topic, FILE.TOPIC.parquet, when `topics` are
+    several. Only rows with from_s <= t_s < until_s are written. `progress` is called with the share of the log that
+    was read, 0 to 1.
+
+    Raises Fault BAD_LOG, BAD_MESSAGE, BAD_TABLE, CONFIG, LOG_WRITE; nothing unfinished is left behind.
+    """
+    check_request(to, topics, from_s, until_s)
+    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    reader = LogReader(path)
+    owners: list[TableWriter | MatFile] = []
+    finished = False
+    try:
+        to.parent.mkdir(parents=True, exist_ok=True)
+        writers = _writers(to, topics)
+        mat_files = {writer.file for writer in writers.values() if isinstance(writer, MatTable)}
+        owners = [*writers.values(), *mat_files]
+        rows = _stream(reader, writers, from_s, until_s, progress)
+        files = [file for owner in owners for file in owner.finish()]
+        finished = True
+    except OSError as error:
+        line = f"{to}: {error.strerror or error}; free space or choose another --to"
+        raise Fault("LOG_WRITE", line) from None
+    finally:
+        if not finished:
+            for owner in owners:
+                with contextlib.suppress(OSError, pa.ArrowException):
+                    owner.discard()
+    return Exported(files, rows, reader.damage)
+
+
+def _writers(to: Path, topics: list[str]) -> dict[str, TableWriter]:
+    if to.suffix == ".mat":
+        file = MatFile(to)
+        return {topic: MatTable(file, topic) for topic in topics}
+    if len(topics) == 1:
+        return {topics[0]: ArrowTable(to)}
+    return {topic: ArrowTable(to.with_name(f"{to.stem}.{topic}{to.suffix}")) for topic in topics}
+
+
+def _stream(
+    reader: LogReader,
+    writers: dict[str, TableWriter],
+    from_s: float,
+    until_s: float,
+    progress: Callable[[float], None] | None,
+) -> dict[str, int]:
+    rows = dict.fromkeys(writers, 0)
+    period_ns = 0.0
+    for piece in iter_pieces(reader):
+        if piece.topic not in writers or not len(piece.records):  # of a chunk nothing may be readable
+            continue
+        if piece.topic == "sensors":
+            period_ns = period_ns or block_period_ns(piece.records)
+            columns = sensor_columns(piece.records, period_ns)
+        else:
+            columns = message_columns(piece.records)
+        t_s = columns["t_s"]
+        if not (from_s <= t_s[0] and t_s[-1] < until_s) or (np.diff(t_s) < 0).any():
+            inside = (t_s >= from_s) & (t_s < until_s)
+            columns = {name: values[inside] for name, values in columns.items()}
+        if len(columns["t_s"]):
+            writers[piece.topic].append(columns)
+            rows[piece.topic] += len(columns["t_s"])
+        if progress is not None:
+            progress(reader.position_bytes / max(reader.size_bytes, 1))
+    return rows
+
+
+def sensor_columns(sensors: Records, period_ns: float) -> Columns:
+    """Sensor blocks as one row a sample: `t_s` float64, the channels float32 as they were sent."""
+    columns: Columns = {"t_s": sample_times_s(sensors, period_ns).ravel()}
+    return columns | {name: sensors[name].ravel() for name in CHANNELS}
+
+
+def message_columns(records: Records) -> Columns:
+    """Messages as one row each: `t_s`, then every field as it was sent."""
+    names = records.dtype.names or ()
+    columns: Columns = {"t_s": records["t_ns"] / 1e9}
+    return columns | {name: np.ascontiguousarray(records[name]) for name in names}

@@ -1,0 +1,161 @@
+"""The messages of `stickslip.proto` as records that kernels read and write in place.
+
+A streaming message has only fields of fixed width, so its protobuf bytes have fixed places. `Layout` lays a numpy record
+over those places: filling in the record is the encoding, and a topic of a log is one array. Bytes from a client that
+leaves zeros out or changes the order are first brought into this form by the protobuf library.
+"""
+
+from typing import Any, TypeVar, cast
+
+import numpy as np
+import numpy.typing as npt
+from google.protobuf import descriptor_pb2
+from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.internal.encoder import TagBytes  # pyright: ignore[reportPrivateImportUsage]
+from google.protobuf.message import DecodeError, Message
+
+from bridge.faults import Fault
+from bridge.wire import stickslip_pb2 as wire
+
+SCHEMA_VERSION = 1
+NO_BLOCK = 2**64 - 1
+# the sensors of a rig, in the order of the wire
+CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+
+Records = npt.NDArray[Any]
+M = TypeVar("M", bound=Message)
+
+_SCALARS = {
+    FieldDescriptor.TYPE_DOUBLE: ("<f8", 1),
+    FieldDescriptor.TYPE_FIXED64: ("<u8", 1),
+    FieldDescriptor.TYPE_SFIXED64: ("<i8", 1),
+    FieldDescriptor.TYPE_FIXED32: ("<u4", 5),
+    FieldDescriptor.TYPE_FLOAT: ("<f4", 5),
+}
+_PACKED_WIRE_TYPE = 2
+
+
+def _varint(value: int) -> bytes:
+    head = b""
+    while value > 0x7F:
+        head += bytes([value & 0x7F | 0x80])
+        value >>= 7
+    return head + bytes([value])
+
+
+class Layout:
+    """Where the fields of one streaming message lie.
+
+    Args:
+        message: class of the message.
+        samples: length of its repeated fields.
+
+    """
+
+    def __init__(self, message: type[Message], samples: int = 0) -> None:
+        self.message = message
+        self.samples = samples
+        names: list[str] = []
+        formats: list[Any] = []
+        offsets: list[int] = []
+        template = bytearray()
+        fixed = bytearray()
+        for field in sorted(message.DESCRIPTOR.fields, key=lambda field: field.number):
+            code, wire_type = _SCALARS[field.type]
+            if field.is_repeated:
+                head = TagBytes(field.number, _PACKED_WIRE_TYPE) + _varint(4 * samples)
+                value: Any = (code, (samples,))
+            else:
+                head = TagBytes(field.number, wire_type)
+                value = code
+            template += head
+            fixed += b"\xff" * len(head)
+            names.append(field.name)
+            formats.append(value)
+            offsets.append(len(template))
+            width = np.dtype(value).itemsize
+            template += bytes(width)
+            fixed += bytes(width)
+        self.size = len(template)
+        fields = np.dtype(cast(Any, {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}))
+        self.dtype: np.dtype[Any] = np.dtype((np.record, fields))
+        self._template = bytes(template)
+        self._tags = int.from_bytes(template, "little")
+        self._mask = int.from_bytes(fixed, "little")
+
+    def blank(self, count: int = 1) -> Records:
+        """`count` messages of zeros, whose `tobytes()` are their protobuf encodings."""
+        # over a bytearray, since numpy's own copy of a record leaves the gaps between its fields, the tags, behind
+        return np.frombuffer(bytearray(self._template * count), self.dtype)
+
+    def is_canonical(self, payload: bytes) -> bool:
+        """Whether every field is written, in order."""
+        return len(payload) == self.size and int.from_bytes(payload, "little") & self._mask == self._tags
+
+    def canonical(self, payload: bytes, topic: str) -> bytes:
+        """The same message with every field written, in order. Raises Fault BAD_MESSAGE naming `topic`."""
+        if self.is_canonical(payload):
+            return payload
+        message = self.message()
+        try:
+            message.ParseFromString(payload)
+        except DecodeError:
+            name = self.message.DESCRIPTOR.name
+            line = f"{topic}: {len(payload)} bytes are no {name}; see bridge/wire/PROTOCOL.md for its fields"
+            raise Fault("BAD_MESSAGE", line) from None
+        record = self.blank()
+        for field in self.message.DESCRIPTOR.fields:
+            value = getattr(message, field.name)
+            if field.is_repeated and len(value) != self.samples:
+                line = (
+                    f"{topic}: {field.name} has {len(value)} samples: must have {self.samples}; "
+                    "set rig.solver.samples_per_block and controller.samples_per_block to the same number"
+                )
+                raise Fault("BAD_MESSAGE", line)
+            record[field.name] = value
+        return record.tobytes()
+
+    def read(self, payload: bytes, topic: str) -> Records:
+        """One record from the bytes of one message. Raises Fault BAD_MESSAGE naming `topic`."""
+        return np.frombuffer(bytearray(self.canonical(payload, topic)), self.dtype)
+
+
+COMMAND = Layout(wire.Command)
+APPLIED = Layout(wire.Applied)
+TRACE = Layout(wire.Trace)
+STATE = Layout(wire.State)
+
+_sensor_layouts: dict[int, Layout] = {}
+
+
+def sensor_block(samples: int) -> Layout:
+    """The layout of sensor blocks with `samples` samples a channel."""
+    if samples not in _sensor_layouts:
+        _sensor_layouts[samples] = Layout(wire.SensorBlock, samples)
+    return _sensor_layouts[samples]
+
+
+def parsed(message: type[M], payload: bytes, topic: str) -> M:
+    """A message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
+    result = message()
+    try:
+        result.ParseFromString(payload)
+    except DecodeError:
+        line = f"{topic}: {len(payload)} bytes are no {message.DESCRIPTOR.name}; see bridge/wire/PROTOCOL.md for its fields"
+        raise Fault("BAD_MESSAGE", line) from None
+    return result
+
+
+def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]:
+    """Sequence and t_ns of any message that has them, at no more than a look where the bytes are canonical."""
+    if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:
+        return int.from_bytes(payload[1:9], "little"), int.from_bytes(payload[10:18], "little", signed=True)
+    whole: Any = parsed(message, payload, message.DESCRIPTOR.name)
+    return whole.sequence, whole.t_ns
+
+
+def file_descriptor_set() -> bytes:
+    """The schema as MCAP wants it: a serialised FileDescriptorSet."""
+    files = descriptor_pb2.FileDescriptorSet()
+    wire.DESCRIPTOR.CopyToProto(files.file.add())
+    return files.SerializeToString()

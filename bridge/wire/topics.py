@@ -1,0 +1,51 @@
+"""The one table of topics: who sends what, how often, how old it may be, whether the log keeps it."""
+
+from typing import NamedTuple
+
+from google.protobuf.message import Message
+
+from bridge.wire import stickslip_pb2 as wire
+
+
+class Topic(NamedTuple):
+    """One row. The Zenoh key is PREFIX/NAME, the MCAP topic /NAME."""
+
+    name: str
+    message: type[Message]
+    sender: str
+    rate_Hz: float  # expected; 0: now and then
+    stale_after_s: float  # older than this is a fault, not a value; 0: never
+    logged: bool
+
+
+SENSORS = Topic("sensors", wire.SensorBlock, "plant", 1000.0, 0.02, logged=True)
+APPLIED = Topic("applied", wire.Applied, "plant", 1000.0, 0.0, logged=True)
+COMMAND = Topic("command", wire.Command, "controller", 1000.0, 0.05, logged=True)
+TRACE = Topic("trace", wire.Trace, "controller", 1000.0, 0.0, logged=True)
+STATE = Topic("state", wire.State, "controller", 100.0, 0.0, logged=True)
+SNAPSHOT = Topic("snapshot", wire.Snapshot, "controller", 1.0, 0.0, logged=True)
+PLANT_EVENT = Topic("event/plant", wire.Event, "plant", 0.0, 0.0, logged=True)
+CONTROLLER_EVENT = Topic("event/controller", wire.Event, "controller", 0.0, 0.0, logged=True)
+RECORDER_EVENT = Topic("event/recorder", wire.Event, "recorder", 0.0, 0.0, logged=True)
+OPERATOR = Topic("operator", wire.Operator, "cockpit", 0.0, 0.0, logged=False)
+
+TOPICS = (
+    SENSORS,
+    APPLIED,
+    COMMAND,
+    TRACE,
+    STATE,
+    SNAPSHOT,
+    PLANT_EVENT,
+    CONTROLLER_EVENT,
+    RECORDER_EVENT,
+    OPERATOR,
+)
+BY_NAME = {topic.name: topic for topic in TOPICS}
+
+
+class Outgoing(NamedTuple):
+    """A message on its way: what a node hands to its link."""
+
+    topic: Topic
+    payload: bytes

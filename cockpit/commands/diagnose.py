@@ -1,0 +1,226 @@
+"""`stickslip diagnose`: what makes a rig differ from its description; for one evidence folder or for many."""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from bridge.faults import FAULTS, Fault
+from cockpit.run.child_process import guarded, report
+from cockpit.run.writable import check_writable, writing
+
+if TYPE_CHECKING:
+    from diagnosis.diagnose_many import Outcome, Source
+    from diagnosis.evidence.folder import Evidence
+    from diagnosis.result import Diagnosis
+
+_STDOUT = Path("-")
+_LONGEST_NAME_BYTES = 200  # of 255 that a disk takes; a number and `.html.part` follow
+
+
+class _Wishes(NamedTuple):
+    """What the command line asks for."""
+
+    json: Path | None
+    report: Path | None
+    apply: Path | None
+    jobs: int
+    cluster: str
+
+
+def diagnose(
+    evidence: Annotated[
+        list[Path], typer.Argument(help="Evidence folders with a manifest.toml, or a folder that holds such folders.")
+    ],
+    as_json: Annotated[Path | None, typer.Option("--json", help="Write the result here as JSON; - for stdout.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write a report, one HTML file; for many folders a folder of them.")
+    ] = None,
+    apply: Annotated[
+        Path | None, typer.Option(help="Write a rig file, .toml, that has the effect that was found.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
+    cluster: Annotated[
+        str, typer.Option(help="Dask scheduler, e.g. tcp://127.0.0.1:8786; its workers read the folders themselves.")
+    ] = "",
+) -> None:
+    """Say what makes a rig differ from its description: the effect, how sure, how much of the gap it closes."""
+
+    def work() -> int:
+        from joblib import cpu_count
+
+        from diagnosis.diagnose_many import find_sources
+
+        # killed politely is like Ctrl-C: the workers end too
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster)
+        sources = find_sources(evidence)
+        one = all(path.resolve() == sources[0].folder for path in evidence)
+        _check_destinations(wishes, one, sources)
+        return _diagnose_one(sources[0], wishes) if one else _diagnose_many(sources, wishes)
+
+    sys.exit(guarded(work, as_json == _STDOUT))
+
+
+def _check_destinations(wishes: _Wishes, one: bool, sources: list["Source"]) -> None:
+    """Refuse now what could not be written after minutes of work. Raises Fault CONFIG or LOG_WRITE."""
+    if wishes.apply is not None and not one:
+        raise Fault(
+            "CONFIG", f"--apply {wishes.apply}: takes one evidence folder; a rig file has the effects of one rig"
+        )
+    from diagnosis.evidence.manifest import MANIFEST, RUN_SUFFIXES
+
+    seen: dict[Path, str] = {}
+    for option, path in (("--json", wishes.json), ("--report", wishes.report), ("--apply", wishes.apply)):
+        if path is None or (path == _STDOUT and option == "--json"):
+            continue
+        if path == _STDOUT:
+            raise Fault("CONFIG", f"{option} -: must be a file; only --json can go to stdout")
+        check_writable(option, path)
+        whole = path.resolve()
+        if whole in seen:
+            raise Fault("CONFIG", f"{option} {path}: is where {seen[whole]} goes; choose another")
+        seen[whole] = option
+        measured = whole.name == MANIFEST or whole.suffix in RUN_SUFFIXES
+        if measured and whole.exists() and whole.parent in {source.folder.resolve() for source in sources}:
+            raise Fault(
+                "CONFIG", f"{option} {path}: belongs to the evidence, which is never overwritten; choose another"
+            )
+        folder_wanted = option == "--report" and not one
+        if path.exists() and path.is_dir() != folder_wanted:
+            rule = "must be a folder, one report for each evidence" if folder_wanted else "must be a file, not a folder"
+            raise Fault("CONFIG", f"{option} {path}: {rule}; choose another")
+
+
+def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
+    from cockpit.commands.diagnose_output import in_words, watched
+    from diagnosis.evidence.folder import load_evidence
+    from diagnosis.report.page import write_report
+    from diagnosis.report.rig_file import refuse_force_drive, write_rig
+    from diagnosis.result import to_json
+
+    evidence = load_evidence(source.folder)
+    if wishes.apply is not None:
+        refuse_force_drive(evidence)
+    with watched() as progress:
+        diagnosis = _result(source, evidence, wishes, progress)
+    if wishes.json != _STDOUT:
+        print("\n".join(in_words(diagnosis)))
+    wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
+        ("", wishes.json, lambda path: _write_json(path, to_json(diagnosis))),
+        ("report     ", wishes.report, lambda path: write_report(diagnosis, source.name, path)),
+    ]
+    if wishes.apply is not None and diagnosis.verdict == "unexplained":
+        _tell(wishes, "rig file   not written: nothing explains the gap, there is no effect to apply")
+    else:
+        wanted.append(("rig file   ", wishes.apply, lambda path: write_rig(diagnosis, evidence, path)))
+    refused: list[Fault] = []
+    for word, path, write in wanted:
+        if path is not None and _written(path, write, refused) and word:
+            _tell(wishes, f"{word}{path}")
+    return _told(refused)
+
+
+def _written(path: Path, write: Callable[[Path], None], refused: list[Fault]) -> bool:
+    """Whether it was; else one more of `refused`: what one disk refuses the others may still get."""
+    try:
+        with writing():
+            write(path)
+    except Fault as fault:
+        refused.append(fault)
+        return False
+    return True
+
+
+def _told(refused: list[Fault]) -> int:
+    """Exit status of all that could not be written. On stderr: stdout may have the JSON, which was."""
+    if not refused:
+        return 0
+    return report(Fault("LOG_WRITE", "\n".join(fault.line for fault in refused)), as_json=False)
+
+
+def _tell(wishes: _Wishes, line: str) -> None:
+    """On stdout, but where the JSON goes there."""
+    print(line, file=sys.stderr if wishes.json == _STDOUT else sys.stdout)
+
+
+def _result(
+    source: "Source", evidence: "Evidence", wishes: _Wishes, progress: Callable[[str, float], None]
+) -> "Diagnosis":
+    from diagnosis import diagnose_many as many
+
+    if not wishes.cluster:
+        return many.real_diagnose(evidence, progress, wishes.jobs)
+    with closing(many.diagnose_many([source], 1, wishes.cluster, many.real_diagnose)) as outcomes:
+        outcome = next(outcomes)
+    if outcome.diagnosis is None:
+        raise Fault(*(outcome.fault or ("PEER_DIED", "")))
+    return outcome.diagnosis
+
+
+def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
+    from cockpit.commands.diagnose_output import in_a_line, many_as_json, watched
+    from diagnosis import diagnose_many as many
+    from diagnosis.report.page import write_report
+
+    found: dict[str, Outcome] = {}
+    refused: list[Fault] = []
+    reports = _report_names([source.name for source in sources])
+    with (
+        watched() as progress,
+        closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, many.real_diagnose)) as outcomes,
+    ):
+        for outcome in outcomes:
+            name = outcome.source.name
+            if outcome.diagnosis is not None and wishes.report is not None:
+                page = partial(write_report, outcome.diagnosis, name)
+                _written(wishes.report / reports[name], page, refused)
+            found[name] = _without_pictures(outcome)
+            progress(f"{len(found)} of {len(sources)}: {in_a_line(outcome)}", len(found) / len(sources))
+    results = [found[source.name] for source in sources]
+    if wishes.json is not None:
+        _written(wishes.json, lambda path: _write_json(path, many_as_json(results)), refused)
+    if wishes.json != _STDOUT:
+        print("\n".join(in_a_line(outcome) for outcome in results))
+        if wishes.report is not None and any(outcome.diagnosis is not None for outcome in results):
+            print(f"reports    {wishes.report}")
+    statuses = [FAULTS[outcome.fault[0]].exit_status for outcome in results if outcome.fault is not None]
+    # bad evidence first: that is what the person who called can mend
+    return min((status for status in (*statuses, _told(refused)) if status), default=0)
+
+
+def _without_pictures(outcome: "Outcome") -> "Outcome":
+    """Pictures are by far the largest part, and hundreds of folders are meant to fit into memory."""
+    return outcome._replace(diagnosis=outcome.diagnosis and outcome.diagnosis._replace(pictures=()))
+
+
+def _report_names(names: list[str]) -> dict[str, str]:
+    """A file name for the report of each; a name may be a path, because several folders have the same."""
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in names:
+        whole = name.strip("/").replace("/", "_")
+        while len(os.fsencode(whole)) > _LONGEST_NAME_BYTES:  # of a path the end tells most
+            whole = whole[1:]
+        tries = (whole if number == 1 else f"{whole}-{number}" for number in count(1))
+        one = next(one for one in tries if one.casefold() not in taken)  # some disks take a and A for the same
+        taken.add(one.casefold())
+        found[name] = f"{one}.html"
+    return found
+
+
+def _write_json(path: Path, value: dict[str, Any]) -> None:
+    from bridge.files import strict_json, write_json
+
+    if path == _STDOUT:
+        print(json.dumps(strict_json(value), allow_nan=False, indent=1))
+    else:
+        write_json(path, value)

@@ -1,0 +1,93 @@
+"""What `stickslip diagnose` shows and writes: progress, the answer in words, one line a folder, strict JSON."""
+
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from bridge import units
+from diagnosis.report import words
+from diagnosis.result import to_json
+
+if TYPE_CHECKING:
+    from diagnosis.diagnose_many import Outcome
+    from diagnosis.result import Diagnosis
+
+MANY_FORMAT = "diagnoses/1"
+_SHOWN_CANDIDATES = 3
+
+
+def in_words(diagnosis: "Diagnosis") -> list[str]:
+    """The verdict first, then the leading candidates, the gap, what to measure next, and what is wrong with the data."""
+    gap, after = diagnosis.gap, diagnosis.next_experiment
+    lines = [words.headline(diagnosis), *diagnosis.summary]
+    for label, one in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
+        sizes = "; ".join(words.estimate_in_words(*item) for item in one.parameters.items())
+        lines.append(f"{label:<10} {one.effect:<28} {units.percent(one.probability):>8}   {sizes}".rstrip())
+    if gap.runs:
+        numbers = [f"{units.times(gap.nominal)} as described", f"{units.times(gap.retuned)} retuned"]
+        if diagnosis.effects:
+            numbers.append(f"{units.times(gap.with_effect)} with {' and '.join(diagnosis.effects)}")
+        shrinkage = "" if gap.shrinkage is None else f"; {units.percent(gap.shrinkage)} of the gap closed"
+        lines.append(f"gap        {', '.join(numbers)}; perfect is {units.times(gap.floor)}{shrinkage}")
+    lines.append(f"next       {after.what} {after.why}")
+    files: dict[tuple[str, str], list[str]] = {}
+    for finding in diagnosis.findings:
+        file, _, column = finding.where.partition(": ")
+        files.setdefault((column, finding.text), []).append(file)
+    data = [f"{', '.join(where)}: {f'{column}: ' if column else ''}{text}" for (column, text), where in files.items()]
+    return [*lines, *(f"{'' if i else 'data':<10} {line}" for i, line in enumerate(data))]
+
+
+def in_a_line(outcome: "Outcome") -> str:
+    """What became of one folder among many."""
+    if outcome.diagnosis is not None:
+        # the run that was kept aside unasked is no fault of the data
+        doubts = sum(finding.kind != "holdout" for finding in outcome.diagnosis.findings)
+        told = f"; {doubts} findings about its data, see --json" if doubts else ""
+        return f"{outcome.source.name}: {words.headline(outcome.diagnosis)}{told}"
+    code, line = outcome.fault or ("", "")
+    return f"{outcome.source.name}: {code}: {line}"
+
+
+def many_as_json(outcomes: "list[Outcome]") -> dict[str, Any]:
+    """The JSON object for many folders, in the order given."""
+    return {"format": MANY_FORMAT, "results": [_as_json(outcome) for outcome in outcomes]}
+
+
+def _as_json(outcome: "Outcome") -> dict[str, Any]:
+    if outcome.diagnosis is not None:
+        return {"evidence": outcome.source.name, "diagnosis": to_json(outcome.diagnosis)}
+    code, line = outcome.fault or ("", "")
+    return {"evidence": outcome.source.name, "fault": {"fault": code, "line": line}}
+
+
+@contextmanager
+def watched() -> Generator[Callable[[str, float], None]]:
+    """What is known so far, line by line on stderr, with a bar below for a person who watches."""
+    last = ""
+    if not sys.stderr.isatty():
+
+        def to_file(text: str, _share: float) -> None:
+            nonlocal last
+            if text != last:
+                print(text, file=sys.stderr, flush=True)
+            last = text
+
+        yield to_file
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def to_terminal(text: str, share: float) -> None:
+            nonlocal last
+            if text != last:
+                bar.console.print(text, markup=False, highlight=False)
+            last = text
+            bar.update(task, completed=share)
+
+        yield to_terminal

@@ -1,0 +1,89 @@
+"""`stickslip replay`: a log through today's controller, simulated again, or back on the bus."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.faults import Fault
+from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Json, Prefix, as_settings
+from cockpit.run.child_process import guarded, stop_event
+
+
+def _only_with(mode: str, given: dict[str, bool]) -> None:
+    """Refuse options that only another kind of replay follows. Raises Fault CONFIG."""
+    for option, is_given in given.items():
+        if is_given:
+            raise Fault("CONFIG", f"{option}: only with {mode}; add that, or leave it out")
+
+
+def replay_command(
+    logs: Annotated[list[Path], typer.Argument(help="Run logs, .mcap.")],
+    settings: Annotated[
+        list[str], typer.Option("--set", help="What if: key=value, or key=value@20s from a time on. Repeatable.")
+    ] = [],  # noqa: B006
+    start: Annotated[
+        str, typer.Option("--from", help="Start here, e.g. 12.5s, at the nearest snapshot before.")
+    ] = "0s",
+    closed_loop: Annotated[
+        bool, typer.Option("--closed-loop", help="Simulate the run again from the log's own plant and seed.")
+    ] = False,
+    to_bus: Annotated[bool, typer.Option("--to-bus", help="Publish the log on the bus again, paced.")] = False,
+    speed: Annotated[
+        float | None, typer.Option(min=0.01, max=1000.0, help="With --to-bus: times real time; 1 if not given.")
+    ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="With --to-bus: the controller's topics too, for viewers.")
+    ] = False,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="With --to-bus: begin when a controller and a recorder are on the bus.")
+    ] = False,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="With --closed-loop: the new log; runs/closed-loop.mcap if not given.")
+    ] = None,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    as_json: Json = False,
+) -> None:
+    """Feed a log to today's controller: the same bits (exit 0), or the first difference (exit 1)."""
+
+    def work() -> int:
+        from cockpit.run import replay as replaying
+
+        from_s = replaying.time_s(f"--from {start}", start, "12.5s")
+        if not to_bus:
+            paced = {"--speed": speed is not None, "--all": everything, "--wait": wait}
+            meeting = {"--endpoint": endpoint is not None, "--prefix": prefix is not None}
+            _only_with("--to-bus, which plays the log on the bus", paced | meeting)
+        if not closed_loop:
+            _only_with("--closed-loop, whose new run goes there", {"--log": log is not None})
+        if to_bus:
+            for option, given in (("--closed-loop", closed_loop), ("--json", as_json), ("--set", bool(settings))):
+                if given:
+                    line = f"{option}: not with --to-bus, which plays the log as it is; leave one of them out"
+                    raise Fault("CONFIG", line)
+            from cockpit.run.log_to_bus import publish_log
+            from cockpit.run.scenario import load_scenario
+
+            bus = load_scenario(DEFAULT_SCENARIO, as_settings([], None, endpoint, prefix)).bus
+            roles = ["controller", "recorder"] if wait else []
+            stop = stop_event()
+            for path in logs:
+                if not stop.is_set():
+                    publish_log(path, bus, speed or 1.0, from_s, everything, roles, stop)
+            return 0
+        if closed_loop:
+            out = log or Path("runs/closed-loop.mcap")
+            if len(logs) != 1:
+                raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")
+            if from_s > 0.0:
+                line = f"--from {start}: not with --closed-loop, which simulates the run from its start; leave it out"
+                raise Fault("CONFIG", line)
+            if out.resolve() == logs[0].resolve():
+                line = f"--log {out}: is the recorded run, which the new one would replace; choose another file"
+                raise Fault("CONFIG", line)
+            return replaying.closed_loop(logs[0], settings, out, as_json)
+        return replaying.replay_logs(logs, from_s, settings, as_json)
+
+    sys.exit(guarded(work, as_json))

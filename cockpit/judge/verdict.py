@@ -1,0 +1,251 @@
+"""What came of a run, read from its log alone: in numbers for scripts and in words for a mechanic."""
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bridge.faults import Fault
+from bridge.log.log_check import damage_findings
+from bridge.log.logfile import RunData, read_run
+from bridge.wire import stickslip_pb2 as wire
+from diagnosis.features.cycles import Cycles, find_cycles
+
+_SETTLING_S = 1.0  # after the controller is enabled it has this long
+_ALARM_RATIO = 1.05
+_RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
+_CONTROLLED = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m")
+_STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
+_RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
+
+
+class Phase(NamedTuple):
+    """One stretch of a run."""
+
+    seconds: float
+    slips: int
+    slips_per_min: float
+    swing_N: float  # of the drive force, largest to smallest block mean
+    mean_force_N: float
+
+
+class Latency(NamedTuple):
+    """Block out to its command in."""
+
+    p50_us: float
+    p99_us: float
+    p999_us: float
+    within_1_ms: float  # share
+
+
+class Verdict(NamedTuple):
+    """A run's figures."""
+
+    log: str
+    seconds: float
+    blocks: int
+    lost_blocks: int
+    lost_messages: int
+    enabled_from_s: float
+    stopped_s: float  # by an operator, and no part of `after`
+    before: Phase | None
+    after: Phase | None
+    drive_velocity_max_mps: float  # as measured
+    velocity_ratio_min: float
+    velocity_ratio_max: float
+    latency: Latency | None
+    faults: list[str]
+
+    @property
+    def good(self) -> bool:
+        """Whether stick-slip is gone while the controller is in charge, and nothing was lost.
+
+        A machine that pauses for some 20 ms loses nothing: the controller ramps down and up again, which is told and no more.
+        """
+        gone = self.after is None or self.after.slips == 0
+        return gone and self.lost_blocks == 0 and all(fault.startswith("STALE: ") for fault in self.faults)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For `--json`."""
+        table: dict[str, Any] = self._asdict() | {"good": self.good}
+        for name in ("before", "after", "latency"):
+            table[name] = table[name] and table[name]._asdict()
+        return table
+
+
+def judge(path: Path) -> Verdict:
+    """Read a log and judge its run. Raises Fault BAD_LOG."""
+    return judge_run(read_run(path))
+
+
+def judge_run(run: RunData) -> Verdict:
+    """Judge a run that was read."""
+    controller = run.configuration("controller")
+    try:
+        block_s, enabled_from_s = float(controller["block_s"]), float(controller["policy"]["enabled_from_s"])
+    except (KeyError, TypeError, ValueError) as error:
+        line = f"{run.path}: configuration of the controller: must hold block_s and policy.enabled_from_s as numbers"
+        raise Fault(
+            "BAD_LOG", f"{line} ({type(error).__name__}: {error}); see bridge/wire/PROTOCOL.md, Header"
+        ) from None
+    blocks = len(run.sensors)
+    t_s = run.sensors["t_ns"] * 1e-9
+    force_N = run.sensors["drive_force_N"].astype(np.float64)
+    seconds = float(t_s[-1]) if blocks else 0.0
+    began_s = max(float(t_s.min()) - block_s, 0.0) if blocks else 0.0  # a log may begin late
+    in_charge_s = enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
+    samples = force_N.shape[1] if blocks else 1
+    finite = np.isfinite(force_N).all(axis=1)
+    unreadable = [name for name in _CONTROLLED if not np.isfinite(run.sensors[name]).all()]
+    t_s, force_N = t_s[finite], force_N[finite]
+    sample_s = (t_s[:, None] + (np.arange(samples) + 1 - samples) * (block_s / samples)).ravel()
+    cycles = find_cycles(sample_s, force_N.ravel(), slowest_fall_s=_slowest_fall_s(run)) if len(t_s) else None
+    mean_N = force_N.mean(axis=1)
+    trace = run.trace
+    stops = _stops(trace, block_s)
+    excited = _vibrating(trace, block_s) & (trace["t_ns"] * 1e-9 > in_charge_s)
+    ratio = trace["vibration_velocity_mps"][excited] / np.maximum(trace["drive_velocity_mps"][excited], 1e-9)
+    faults = [
+        f"{event.code}: {event.text}" for event in run.events if event.code in {"GAP", "DROPPED", "PLANT_LOST", "STALE"}
+    ]
+    for name in unreadable:
+        bad = ~np.isfinite(run.sensors[name]).all(axis=1)
+        where, first = f"/sensors {name}: {np.count_nonzero(bad)} blocks", run.sensors["sequence"][bad][0]
+        faults.append(f"NOT_FINITE: {where} hold a sample that is no number, first {first}; they were left out")
+    slips = trace["slips"].astype(np.int64)
+    rose = np.diff(slips, prepend=slips[:1]) > 0
+    unmoved = rose & (trace["drive_velocity_mps"] <= _STANDSTILL_MPS)
+    if unmoved.any():
+        first_s = float(trace["t_ns"][unmoved][0]) * 1e-9
+        faults.append(
+            f"DRIVE_UNSEEN: {np.count_nonzero(unmoved)} slips while the drive position stood, first at {first_s:.3f} s: is its "
+            "transducer at the end of its range, or loose?"
+        )
+    return Verdict(
+        log=str(run.path),
+        seconds=seconds,
+        blocks=blocks,
+        lost_blocks=_lost(run.sensors),
+        lost_messages=sum(map(_lost, (run.sensors, run.applied, run.command, run.trace, run.state))),
+        enabled_from_s=enabled_from_s,
+        stopped_s=sum(min(until_s - _SETTLING_S, seconds) - from_s for from_s, until_s in stops),
+        before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds), []),
+        after=_phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, stops),
+        drive_velocity_max_mps=float(trace["drive_velocity_mps"].max(initial=0.0)),
+        velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
+        velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
+        latency=_latency(run),
+        faults=faults + [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, run.path)],
+    )
+
+
+def _slowest_fall_s(run: RunData) -> float:
+    """How long a slip may last: 1.6 times that of the plant's slide on its spring, and never less than 0.1 s."""
+    if "plant" not in run.headers:
+        return 0.1
+    try:
+        rig = run.configuration("plant")["rig"]
+        return max(0.1, 3.0 * math.sqrt(rig["slide"]["mass_kg"] / rig["drive"]["stiffness_N_per_m"]))
+    except (KeyError, TypeError, ValueError, ZeroDivisionError):  # another rig need not tell
+        return 0.1
+
+
+def _stops(trace: Any, block_s: float) -> list[tuple[float, float]]:
+    """When an operator had stopped the controller, and until it was in charge again; in s."""
+    stopped = np.concatenate([[False], trace["mode"] == wire.STOPPED, [False]])
+    starts, ends = np.flatnonzero(np.diff(stopped.astype(int))).reshape(-1, 2).T
+    t_s = trace["t_ns"] * 1e-9
+    return [(t_s[start] - block_s, t_s[end - 1] + _SETTLING_S) for start, end in zip(starts, ends, strict=True)]
+
+
+def _vibrating(trace: Any, block_s: float) -> Any:
+    """Rows in EXCITE with a measurement of their own, but for the ramp before them, when v_a is on its way up."""
+    excited = (trace["mode"] == wire.EXCITE) & ~np.isin(trace["limit"], _RAMPED_DOWN)
+    starts = np.where(excited & ~np.concatenate([[False], excited[:-1]]), np.arange(len(excited)), 0)
+    since = np.arange(len(excited)) - np.maximum.accumulate(starts)
+    return excited & (since * block_s > _RAMP_S)
+
+
+def _lost(table: Any) -> int:
+    """Messages that are missing between the first and the last number, whatever the order they came in."""
+    if not len(table):
+        return 0
+    sequence = table["sequence"].astype(np.int64)
+    return int(sequence.max() - sequence.min() + 1 - len(np.unique(sequence)))
+
+
+def _phase(
+    cycles: Cycles | None, t_s: Any, mean_N: Any, from_s: float, to_s: float, without: list[tuple[float, float]]
+) -> Phase | None:
+    def counts(at_s: Any) -> Any:
+        return ~sum(((at_s > first_s) & (at_s <= last_s) for first_s, last_s in without), np.zeros(len(at_s), bool))
+
+    inside = (t_s > from_s) & (t_s <= to_s) & counts(t_s)
+    if cycles is None or not inside.any():
+        return None
+    slips = int(np.count_nonzero(counts(cycles.between(from_s, to_s).breakaway_t_s)))
+    seconds = to_s - from_s - sum(max(min(last_s, to_s) - max(first_s, from_s), 0.0) for first_s, last_s in without)
+    # the first ramp of a run starts from an unloaded spring: no part of the swing of what follows
+    later = inside & (t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
+    steady = later if later.any() else inside
+    swing_N = float(np.ptp(mean_N[steady]))
+    return Phase(seconds, slips, 60.0 * slips / seconds, swing_N, float(mean_N[steady].mean()))
+
+
+def _latency(run: RunData) -> Latency | None:
+    round_trip_ns = run.applied["round_trip_ns"][run.applied["commands"] > 0]
+    round_trip_ns = round_trip_ns[round_trip_ns > 0]
+    if not len(round_trip_ns):
+        return None
+    p50, p99, p999 = (float(value) * 1e-3 for value in np.percentile(round_trip_ns, [50, 99, 99.9]))
+    in_time = int(run.applied["commands"].sum()) - int(run.applied["commands_late"].sum())
+    # a command that never came is a late one; the last block's comes after the end
+    return Latency(p50, p99, p999, min(in_time / max(len(run.applied) - 1, 1), 1.0))
+
+
+def in_words(verdict: Verdict) -> list[str]:
+    """The verdict as lines for a person."""
+    v = verdict
+    lines: list[str] = []
+    if v.before is not None:
+        lines.append(
+            f"before   {v.before.slips} slips in {v.before.seconds:.1f} s ({v.before.slips_per_min:.0f} per minute), "
+            f"drive force swings by {v.before.swing_N:.2f} N"
+        )
+    if v.after is not None:
+        lines.append(
+            f"after    {v.after.slips} slips in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
+        )
+    if v.stopped_s > 0:
+        lines.append(f"stopped  by an operator for {v.stopped_s:.1f} s, which is no part of what came after")
+    if v.velocity_ratio_max > 0:
+        low = "ok" if v.velocity_ratio_min >= _ALARM_RATIO else f"below {_ALARM_RATIO}: stick-slip may return"
+        lines.append(f"v_a/v_d  {v.velocity_ratio_min:.2f} to {v.velocity_ratio_max:.2f} while vibrating ({low})")
+    if v.latency is not None:
+        latency = v.latency
+        lines.append(
+            f"latency  block to command p50 {latency.p50_us:.0f} us, p99 {latency.p99_us:.0f} us, p99.9 "
+            f"{latency.p999_us:.0f} us; {100 * latency.within_1_ms:.2f} % within 1 ms"
+        )
+    lost = "none lost" if v.lost_blocks == 0 else f"{v.lost_blocks} LOST"
+    lines.append(f"blocks   {v.blocks}, {lost}" + (f"; {v.lost_messages} log messages lost" if v.lost_messages else ""))
+    lines.extend(f"warning  {fault}" for fault in v.faults)
+    lines.append(f"log      {v.log}")
+    return lines
+
+
+def headline(verdict: Verdict) -> str:
+    """The answer in one line."""
+    v = verdict
+    if v.blocks == 0:
+        return "no block was recorded"
+    if v.drive_velocity_max_mps <= _STANDSTILL_MPS:
+        return "the drive never moved: nothing was tested"
+    if v.after is None:
+        return "the controller was not in charge in this run"
+    if v.after.slips:
+        return f"stick-slip is still there: {v.after.slips} slips while the controller was in charge"
+    if v.before is not None and v.before.slips:
+        return f"stick-slip is gone: {v.before.slips} slips before, none with the controller in charge"
+    return "no stick-slip with the controller in charge"

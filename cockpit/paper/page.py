@@ -1,0 +1,100 @@
+"""`stickslip reproduce`: redo the paper's calculation and say, line by line, whether it holds."""
+
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cockpit.paper.claims import PAPER_CLAIMS, Row, paper_claims, parameter_rows, reference_rows, slip_rows
+from cockpit.paper.runs import (
+    CYCLES_FROM_S,
+    PTFE_PAIRS,
+    STEEL_PAIRS,
+    Key,
+    Run,
+    one_slip,
+    paper_rig,
+    plan,
+    run,
+    starts_s,
+)
+
+
+class ReproduceResult(NamedTuple):
+    """Every check of the report in its order, and how long the whole took."""
+
+    rows: list[Row]
+    elapsed_s: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check holds."""
+        return all(row.passed for row in self.rows)
+
+    @property
+    def verdict(self) -> str:
+        """The one line to print."""
+        held = sum(row.passed for row in self.rows)
+        claims = [row for row in self.rows if row.group == PAPER_CLAIMS]
+        claims_held = sum(row.passed for row in claims)
+        of_the_paper = f"{claims_held} of {len(claims)} claims of the paper hold"
+        return f"{of_the_paper}; {held} of {len(self.rows)} checks in all"
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain dictionaries, for `json.dump`."""
+        rows = [row._asdict() for row in self.rows]
+        return {"passed": self.passed, "verdict": self.verdict, "rows": rows, "elapsed_s": self.elapsed_s}
+
+
+def reproduce(out: Path, progress: bool) -> ReproduceResult:
+    """Redo the paper and write the report to `out`, one HTML file that needs nothing else.
+
+    The file is written whole, after everything has been computed; its folder must exist. `progress` shows a
+    bar on stderr, which stays away by itself when stderr is not a terminal.
+
+    Raises OSError when `out` cannot be written.
+    """
+    started_s = time.perf_counter()
+    runs = _simulate(progress)
+    slip = one_slip("C45-C45 @ 0.063")
+    rows = paper_claims(runs) + reference_rows(runs) + slip_rows(slip) + parameter_rows()
+    result = ReproduceResult(rows, time.perf_counter() - started_s)
+    out.write_text(_page(result, runs), encoding="utf-8")
+    return result._replace(elapsed_s=time.perf_counter() - started_s)
+
+
+def _simulate(progress: bool) -> dict[Key, Run]:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not (progress and console.is_terminal)) as bar:
+        keys = plan()
+        task = bar.add_task("", total=sum(len(starts_s(f)) for _, f in keys))
+        runs: dict[Key, Run] = {}
+        for pair, frequency_Hz in keys:
+            bar.update(task, description=f"{pair} N/mm², {frequency_Hz} Hz")
+            runs[pair, frequency_Hz] = run(pair, frequency_Hz, lambda: bar.advance(task))
+    return runs
+
+
+def _page(result: ReproduceResult, runs: dict[Key, Run]) -> str:
+    from jinja2 import Environment, StrictUndefined
+
+    from cockpit.paper.plots import figures
+
+    groups: dict[str, list[Row]] = {}
+    for row in result.rows:
+        groups.setdefault(row.group, []).append(row)
+    template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    one_kHz = runs["C45-C45 @ 0.063", 1000]
+    drifting = runs["C45-C45 @ 0.063", 5000].course
+    return environment.from_string(template).render(
+        result=result,
+        groups=groups,
+        rigs={pair: paper_rig(pair) for pair in (*STEEL_PAIRS, *PTFE_PAIRS)},
+        figures=figures(runs),
+        starts_s=starts_s(1000),
+        scatter_percent=100.0 * one_kHz.scatter.period_s / one_kHz.mean.period_s,
+        drifting_N=drifting.drive_force_N[drifting.t_s > CYCLES_FROM_S].mean(),
+    )

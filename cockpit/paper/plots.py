@@ -1,0 +1,144 @@
+"""The paper's Figures 2-4 and 6-9 from our runs, as PNG pictures inside the page."""
+
+import base64
+import io
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cockpit.paper.runs import DRIVE_VELOCITY_MPS, FREQUENCIES_HZ, Key, Run, vibration_velocity_mps
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_FORCE, _SLIDE, _DRIVE = "#1b4f72", "#b03a2e", "#808b96"
+
+
+class Picture(NamedTuple):
+    """One figure of the page: `png` is base64."""
+
+    title: str
+    caption: str
+    png: str
+
+
+def figures(runs: Mapping[Key, Run]) -> list[Picture]:
+    """Every figure of the page, in the paper's order."""
+    pictures = [_without_vibration(runs)]
+    for number, pair in (("3", "C45-C45 @ 0.063"), ("4", "C45-C45 @ 0.104")):
+        pictures.append(_sweep(runs, number, pair))
+    for number, pair in (("6", "C45-C45 @ 0.063"), ("7", "C45-GGG40 @ 0.063")):
+        pictures.append(_one_and_three_kHz(runs, number, pair))
+    for number, material in (("8", "C45-C45"), ("9", "C45-GGG40")):
+        pictures.append(_against_frequency(runs, number, material))
+    return pictures
+
+
+def _without_vibration(runs: Mapping[Key, Run]) -> Picture:
+    pairs = ("C45-C45 @ 0.063", "C45-GGG40 @ 0.063", "C45-PTFE @ 0.063")
+    figure, axes = _grid(2, len(pairs), 4.6)
+    for column, pair in enumerate(pairs):
+        _courses(axes[:, column], runs[pair, 0], 0.0, 16.0, pair.split(" @ ")[0])
+    _labels(axes)
+    return Picture(
+        "Figure 2: without vibration",
+        "Drive force F_d, position of the slide x and of the drive s_d at 0.063 N/mm². "
+        "Steel and cast iron stick and slip; PTFE slides evenly.",
+        _png(figure),
+    )
+
+
+def _sweep(runs: Mapping[Key, Run], number: str, pair: str) -> Picture:
+    figure, axes = _grid(2, len(FREQUENCIES_HZ), 5.0)
+    for column, frequency_Hz in enumerate(FREQUENCIES_HZ):
+        _courses(axes[:, column], runs[pair, frequency_Hz], 8.0, 12.0, _at(frequency_Hz, "\n"))
+    _labels(axes)
+    return Picture(
+        f"Figure {number}: {pair} N/mm², 0 to 5 kHz",
+        "The four seconds after the vibration comes on at t = 8 s, with the same seconds without it on the "
+        "left. The swing of F_d and the steps of x shrink from left to right; from 4 kHz on there are none.",
+        _png(figure),
+    )
+
+
+def _one_and_three_kHz(runs: Mapping[Key, Run], number: str, pair: str) -> Picture:
+    figure, axes = _grid(2, 2, 4.8)
+    for column, frequency_Hz in enumerate((1000, 3000)):
+        _courses(axes[:, column], runs[pair, frequency_Hz], 0.0, 16.0, _at(frequency_Hz, ", "))
+        for axis in axes[:, column]:
+            axis.axvline(8.0, color="black", linewidth=0.8, linestyle=":")
+    _labels(axes)
+    return Picture(
+        f"Figure {number}: {pair} N/mm² at 1 and 3 kHz",
+        "The whole course. The vibration comes on at the dotted line.",
+        _png(figure),
+    )
+
+
+def _against_frequency(runs: Mapping[Key, Run], number: str, material: str) -> Picture:
+    figure, axes = _grid(1, 2, 3.2, share_y=False)
+    f_kHz = np.array(FREQUENCIES_HZ) / 1000.0
+    for axis, pressure in zip(axes[0], ("0.063", "0.104"), strict=True):
+        at = [runs[f"{material} @ {pressure}", f].mean for f in FREQUENCIES_HZ]
+        # without slips the largest and the smallest force are the one at which the slide runs evenly
+        high_N = [m.settled_force_N if np.isnan(m.force_max_N) else m.force_max_N for m in at]
+        low_N = [m.settled_force_N if np.isnan(m.force_min_N) else m.force_min_N for m in at]
+        axis.plot(f_kHz, high_N, "o-", color=_SLIDE, label="F_d max")
+        axis.plot(f_kHz, low_N, "s-", color=_FORCE, label="F_d min")
+        axis.fill_between(f_kHz, low_N, high_N, color=_FORCE, alpha=0.08)
+        edge_kHz = DRIVE_VELOCITY_MPS / vibration_velocity_mps(1000.0)
+        axis.axvline(edge_kHz, color="black", linewidth=0.8, linestyle=":")
+        axis.set_title(f"p_n = {pressure} N/mm²", fontsize=9)
+        axis.set_xlabel("vibration frequency f [kHz]")
+        axis.set_ylabel("drive force F_d [N]")
+        axis.legend(frameon=False)
+    return Picture(
+        f"Figure {number}: {material}, largest and smallest drive force against frequency",
+        "Means over the cycles of t = 10.5-20 s. To the right of the dotted line v_a exceeds v_d: the two "
+        "curves meet, and the force falls on.",
+        _png(figure),
+    )
+
+
+def _at(frequency_Hz: int, separator: str) -> str:
+    if frequency_Hz == 0:
+        return f"no vibration{separator}v_a = 0"
+    return f"{frequency_Hz // 1000} kHz{separator}v_a = {vibration_velocity_mps(frequency_Hz) * 1e3:.3f} mm/s"
+
+
+def _grid(rows: int, columns: int, height_in: float, share_y: bool = True) -> tuple["Figure", Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, height_in), layout="constrained")
+    axes = figure.subplots(rows, columns, sharex=share_y, sharey="row" if share_y else False, squeeze=False)
+    return figure, axes
+
+
+def _courses(axes: Any, run: Run, from_s: float, to_s: float, title: str) -> None:
+    course = run.course
+    part = slice(*np.searchsorted(course.t_s, (from_s, to_s)))
+    t_s = course.t_s[part]
+    force, position = axes
+    force.plot(t_s, course.drive_force_N[part], color=_FORCE, linewidth=0.9)
+    position.plot(t_s, course.drive_position_m[part] * 1e3, color=_DRIVE, linewidth=0.9, label="drive s_d")
+    position.plot(t_s, course.position_m[part] * 1e3, color=_SLIDE, linewidth=0.9, label="slide x")
+    force.set_title(title, fontsize=9)
+    force.set_xlim(from_s, to_s)
+
+
+def _labels(axes: Any) -> None:
+    axes[0, 0].set_ylabel("drive force F_d [N]")
+    axes[1, 0].set_ylabel("position [mm]")
+    axes[1, 0].legend(frameon=False, fontsize=8)
+    for axis in axes[1]:
+        axis.set_xlabel("time t [s]")
+
+
+def _png(figure: "Figure") -> str:
+    for axis in figure.axes:
+        axis.grid(alpha=0.25)
+        axis.tick_params(labelsize=8)
+    memory = io.BytesIO()
+    figure.savefig(memory, format="png", dpi=120)
+    return base64.b64encode(memory.getvalue()).decode()

@@ -1,0 +1,160 @@
+"""A log back on the bus, paced: for viewers, and for a controller on the bench that shall hear a rig's record."""
+
+import contextlib
+import select
+import signal
+import sys
+import termios
+import threading
+import time
+import tty
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from bridge.log.logfile import RunData, read_run
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS, STATE, TRACE, Topic
+from bridge.wire.zenoh_link import Bus, BusConfig
+from plant.app import wait_for_peers
+
+_GOODBYE_S = 1.0
+_KEY_LOOK_S = 0.05
+
+
+def publish_log(
+    path: Path,
+    bus_config: BusConfig,
+    speed: float,
+    from_s: float,
+    everything: bool,
+    wait_for: list[str],
+    stop: threading.Event,
+) -> None:
+    """Publish a log as if the rig were there, in the place of the plant, until its end or `stop`.
+
+    The space bar, or SIGUSR1, pauses and goes on.
+
+    Args:
+        speed: times real time.
+        from_s: start here.
+        everything: the controller's topics as well; otherwise a live controller may answer.
+        wait_for: roles that must be on the bus first.
+
+    Raises Fault BAD_LOG, ENDPOINT_BUSY, NO_PEER.
+
+    """
+    run = read_run(path)
+    tables = [(SENSORS, run.sensors), (APPLIED, run.applied)]
+    if everything:
+        tables += [(COMMAND, run.command), (TRACE, run.trace), (STATE, run.state)]
+    schedule = _schedule(tables, round(from_s * 1e9))
+    pause = threading.Event()
+
+    def toggle(*_: Any) -> None:
+        pause.clear() if pause.is_set() else pause.set()
+
+    signal.signal(signal.SIGUSR1, toggle)
+    # as in lockstep nothing is dropped: a record can wait, a rig cannot
+    with Bus(bus_config, "plant", lockstep=True) as bus, _keys(toggle, stop):
+        for role in ("plant", "controller") if everything else ("plant",):
+            if role in run.headers:
+                bus.serve_header(_header(run, role))
+        send = {topic.name: bus.publisher(topic) for topic, _ in tables}
+        send_event = bus.publisher(PLANT_EVENT)
+        bus.announce()
+        wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
+        send_event(_event("START", f"replay of {path.name} at {speed:g} times real time"))
+        _play(schedule, tables, send, speed, pause, stop)
+        send_event(_event("END", f"blocks={len(run.sensors)}"))
+        bus.wait_until_alone(_GOODBYE_S)
+
+
+def _schedule(tables: list[tuple[Topic, Any]], from_ns: int) -> list[tuple[int, int, int]]:
+    """Time, table and row of every message, in order of time; within a block in the order of the tables."""
+    entries = [
+        np.stack([table["t_ns"].astype(np.int64), np.full(len(table), place), np.arange(len(table))], axis=1)
+        for place, (_, table) in enumerate(tables)
+    ]
+    together = np.concatenate(entries)
+    together = together[together[:, 0] >= from_ns]
+    order = np.lexsort((together[:, 1], together[:, 0]))
+    return [(int(t_ns), int(place), int(row)) for t_ns, place, row in together[order]]
+
+
+def _play(
+    schedule: list[tuple[int, int, int]],
+    tables: list[tuple[Topic, Any]],
+    send: dict[str, Any],
+    speed: float,
+    pause: threading.Event,
+    stop: threading.Event,
+) -> None:
+    if not schedule:
+        return
+    first_ns = schedule[0][0]
+    began_s = time.perf_counter()
+    shown_s = 0.0
+    console = Console(stderr=True)
+    live = Live(Text(""), console=console, transient=True) if console.is_terminal else None
+    with live or contextlib.nullcontext():
+        for t_ns, place, row in schedule:
+            if pause.is_set():
+                paused_s = time.perf_counter()
+                while pause.is_set() and not stop.is_set():
+                    time.sleep(_KEY_LOOK_S)
+                began_s += time.perf_counter() - paused_s
+            if stop.is_set():
+                return
+            left_s = began_s + (t_ns - first_ns) * 1e-9 / speed - time.perf_counter()
+            if left_s > 0:
+                time.sleep(left_s)
+            topic, table = tables[place]
+            send[topic.name](table[row : row + 1].tobytes())
+            if live is not None and t_ns * 1e-9 > shown_s + 0.2 * speed:
+                shown_s = t_ns * 1e-9
+                live.update(Text(f"{shown_s:7.1f} s of {schedule[-1][0] * 1e-9:.1f} s; space pauses"))
+
+
+def _header(run: RunData, role: str) -> wire.Header:
+    fields = run.headers[role]
+    return wire.Header(
+        role=role,
+        schema_version=int(fields["schema_version"]),
+        configuration=fields["configuration"],
+        versions=fields["versions"],
+    )
+
+
+def _event(code: str, text: str) -> bytes:
+    sequence = 0 if code == "START" else 1
+    return wire.Event(sequence=sequence, source="plant", code=code, text=text).SerializeToString()
+
+
+@contextlib.contextmanager
+def _keys(toggle: Any, stop: threading.Event) -> Generator[None]:
+    """Listen for the space bar while the body runs, on a terminal; give the terminal back as it was."""
+    if not sys.stdin.isatty():
+        yield
+        return
+    before = termios.tcgetattr(sys.stdin)
+    over = threading.Event()
+
+    def listen() -> None:
+        while not over.is_set() and not stop.is_set():
+            if select.select([sys.stdin], [], [], _KEY_LOOK_S)[0] and sys.stdin.read(1) == " ":
+                toggle()
+
+    thread = threading.Thread(target=listen, daemon=True)
+    try:
+        tty.setcbreak(sys.stdin)
+        thread.start()
+        yield
+    finally:
+        over.set()
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

@@ -1,0 +1,57 @@
+"""The live progress line of a run, fed from the bus."""
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from bridge.faults import Fault
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.topics import STATE
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
+
+_LOOK_S = 0.1
+
+
+def progress_line(state: wire.State, duration_s: float) -> str:
+    """What is going on, in one line."""
+    t_s = state.t_ns * 1e-9
+    share = min(t_s / duration_s, 1.0) if duration_s else 0.0
+    bar = "#" * round(20 * share)
+    ratio = f"v_a/v_d {state.velocity_ratio:4.2f}" if state.velocity_ratio > 0.01 else "no vibration"
+    return (
+        f"{t_s:6.1f} s [{bar:<20}] {wire.ContactState.Name(state.state):<10} {wire.Mode.Name(state.mode):<8} "
+        f"F_d {state.drive_force_N:5.2f} N  {ratio:<12}  slips {state.slips}"
+    )
+
+
+def follower(config: BusConfig, duration_s: float) -> Callable[[threading.Event], None]:
+    """A watcher for `run_processes`: shows the progress line on a terminal, says nothing elsewhere."""
+
+    def follow(over: threading.Event) -> None:
+        if not sys.stderr.isatty():
+            return
+        while not over.is_set():
+            try:
+                with Bus(config, "cockpit", lockstep=False, stop=over) as bus:
+                    _show(bus, duration_s, over)
+            except Fault:
+                time.sleep(_LOOK_S)
+
+    return follow
+
+
+def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
+    inbox = Inbox(1000)
+    bus.listen(STATE, inbox.push)
+    with Live(Text("starting"), console=Console(stderr=True), refresh_per_second=8, transient=True) as live:
+        while not over.wait(_LOOK_S):
+            newest = None
+            while (received := inbox.get_nowait()) is not None:
+                newest = received
+            if newest is not None:
+                live.update(Text(progress_line(wire.State.FromString(newest.payload), duration_s)))

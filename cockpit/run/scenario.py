@@ -1,0 +1,162 @@
+"""A scenario file: one rig, one controller, one duration. And where the files that come with the project are."""
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from bridge.config import Strict, read_toml, validate, with_overrides
+from bridge.faults import Fault
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import SCHEMA_VERSION
+from bridge.wire.zenoh_link import BusConfig
+from controller.config import ControllerConfig, candidate_frequencies_Hz
+from plant.config import RigConfig
+from plant.config_limits import refuse_what_no_rig_does
+
+
+class Scenario(Strict):
+    """One run, with every default filled in."""
+
+    name: str = "unnamed"
+    description: str = ""
+    duration_s: Annotated[float, Field(ge=0)] = 16.0  # 0: until stopped
+    seed: Annotated[int, Field(ge=0)] = 1
+    rig: RigConfig
+    controller: ControllerConfig = ControllerConfig()
+    bus: BusConfig = BusConfig()
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> "Scenario":
+        refuse_what_no_rig_does(self.rig)
+        solver, controller = self.rig.solver, self.controller
+        for name in ("block_s", "samples_per_block"):
+            theirs, ours = getattr(solver, name), getattr(controller, name)
+            if theirs != ours:
+                raise ValueError(f"controller.{name} = {ours}: must equal rig.solver.{name} = {theirs}")
+        # a frequency that the rig holds at its own limit is another than the one whose v_a the controller measures
+        candidates_Hz, piezo = candidate_frequencies_Hz(controller), self.rig.piezo
+        lowest_Hz, highest_Hz = candidates_Hz[0], candidates_Hz[-1]
+        for name, commanded_Hz, beyond in (
+            ("frequency_min_Hz", lowest_Hz, lowest_Hz < piezo.frequency_min_Hz),
+            ("frequency_max_Hz", highest_Hz, highest_Hz > piezo.frequency_max_Hz),
+        ):
+            theirs_Hz, ours_Hz = getattr(piezo, name), getattr(controller.limits, name)
+            if beyond:
+                raise ValueError(
+                    f"controller.limits.{name} = {ours_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
+                    f"rig.piezo.{name} = {theirs_Hz:g}; set it to {theirs_Hz:g} as well"
+                )
+        profile = np.array(self.rig.drive.profile)
+        corners_s = np.unique(np.clip([0.0, *profile[:, 0], self.duration_s], 0.0, self.duration_s))
+        travel_m = float(np.trapezoid(np.interp(corners_s, profile[:, 0], profile[:, 1]), corners_s))
+        range_m = self.rig.sensors.position_range_m
+        if travel_m > range_m:
+            raise ValueError(
+                f"duration_s = {self.duration_s:g}: the drive would travel {travel_m * 1e3:.1f} mm, beyond the transducers' "
+                f"{range_m * 1e3:g} mm; shorten the run or slow the drive"
+            )
+        return self
+
+
+def deploy_folder() -> Path:
+    """The folder of rigs and scenarios: inside an installed package, beside the packages in a checkout."""
+    installed = Path(__file__).parents[1] / "deploy"
+    return installed if installed.is_dir() else Path(__file__).parents[2] / "deploy"
+
+
+def _find(name: str, kind: str) -> Path:
+    """A file by path, or by the name of one that comes with the project."""
+    given = Path(name)
+    if given.suffix == ".toml":
+        return given
+    known = {path.stem: path for path in sorted((deploy_folder() / kind).glob("*.toml"))}
+    if name not in known:
+        raise Fault(
+            "CONFIG",
+            f"{name}: no such {kind.removesuffix('s')}; known: {', '.join(known)}; or give the path of a .toml file",
+        )
+    return known[name]
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    result = dict(below)
+    for key, value in above.items():
+        inner = result.get(key)
+        result[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
+    return result
+
+
+def load_rig(name: str, settings: list[str]) -> RigConfig:
+    """A rig by name or path, with `key=value` settings applied. Raises Fault CONFIG."""
+    path = _find(name, "rigs")
+    return validate(RigConfig, with_overrides(_rig_table(path), settings), path.name)
+
+
+def _rig_table(path: Path) -> dict[str, Any]:
+    table = read_toml(path)
+    if "rig" in table:
+        raise Fault(
+            "CONFIG", f"{path}: is a scenario, not a rig; give the rig that it names, or the whole with --scenario"
+        )
+    return table
+
+
+def rig_setting(name: str) -> str:
+    """The setting that puts another rig in the place of a scenario's. Raises Fault CONFIG when there is none of that name."""
+    return f"rig={{file={json.dumps(str(_find(name, 'rigs').resolve()), ensure_ascii=False)}}}"
+
+
+def load_scenario(name: str, settings: list[str]) -> Scenario:
+    """A scenario by name or path, with `key=value` settings applied. Raises Fault CONFIG.
+
+    Its table `rig` names a rig file (`file`) and may override any of its keys.
+    """
+    path = _find(name, "scenarios")
+    given = read_toml(path)
+    if "contact" in given and "rig" not in given:
+        raise Fault("CONFIG", f"{path}: is a rig, not a scenario; give it with --rig")
+    table = with_overrides({"name": path.stem} | given, settings)
+    rig = table.get("rig")
+    if isinstance(rig, dict) and "file" in rig:
+        overrides = {key: value for key, value in rig.items() if key != "file"}
+        rig_name = str(rig["file"])
+        beside = path.parent / rig_name
+        rig_path = beside if beside.suffix == ".toml" and beside.is_file() else _find(rig_name, "rigs")
+        table["rig"] = _merged(_rig_table(rig_path), overrides)
+        return validate(Scenario, table, f"{path.name} with {rig_path.name}")
+    return validate(Scenario, table, path.name)
+
+
+def processor() -> str:
+    """Name of this processor: the last bit of a sine or an exponential depends on it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
+    """What a process of this scenario says of itself."""
+    if role == "plant":
+        configuration: dict[str, Any] = {
+            "rig": scenario.rig.model_dump(mode="json"),
+            "seed": scenario.seed,
+            "duration_s": scenario.duration_s,
+            "lockstep": lockstep,
+        }
+    else:
+        configuration = scenario.controller.model_dump(mode="json")
+    versions = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
+    versions |= {"python": platform.python_version(), "libc": "-".join(platform.libc_ver()), "processor": processor()}
+    return wire.Header(
+        role=role,
+        schema_version=SCHEMA_VERSION,
+        configuration=json.dumps(configuration, sort_keys=True),
+        versions=json.dumps(versions, sort_keys=True),
+    )

@@ -1,0 +1,337 @@
+"""Which samples and columns of a run can be used, and what is wrong with the others."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.faults import Fault
+from bridge.log.finding import Finding
+from bridge.log.signal_range import look
+from diagnosis.evidence.manifest import RigTable, RunTable
+from diagnosis.evidence.sign_and_unit import told_stiffness_N_per_m
+
+Floats = npt.NDArray[np.float64]
+Columns = dict[str, Floats]
+Clipped = dict[str, tuple[float, float]]
+Note = Callable[[str, str, str], None]  # kind, column, text
+
+_FEWEST_ROWS = 16
+# more bad rows than this, and the file is not what it says it is
+_LARGEST_BAD_SHARE = 0.1
+_LARGEST_WILD_SHARE = 1e-3  # of samples that no rig shows: a loose contact, or a value that stands for none
+_SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m")
+_COMMANDED = ("vibration_frequency_Hz", "vibration_amplitude_m")
+_GAP_STEPS = 10.0  # times the usual step
+# A pause that is longer, or gaps that take a larger share of a run, hide slips that the model would go on to make
+_LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
+_VELOCITY_TOLERANCE = 0.1  # of the stated drive velocity against the drive position's slope
+_ANOTHER = 3.0  # times as fast, or as slow, or the other way: another drive than the one stated
+_FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
+_LEAST_TRAVEL = 0.002  # of the way to the first slip; the noise of a drive at rest is less
+_FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
+_ANOTHER_UNIT = 5.0  # times: an acceleration in g is off by 9.8, a stiffness in N/mm by 1000
+_STRIDE_S = 0.1
+_FEWEST_IN_A_SLIP = 3.0  # samples
+_SHORTEST_S = 1.0  # of a run
+_QUICKEST_S = 2e-6  # between samples: 500 kHz
+_SLOWEST_S = 0.05  # between samples, where nothing slips: with a force drive
+# Largest values that can be right; a factor of 1000, as between mm and m, shows in at least one of them on a bench rig.
+_LARGEST = {
+    "mass_accel_mps2": 1e5,
+    "base_accel_mps2": 1e5,
+    "mass_position_m": 10.0,  # of travel
+    "drive_position_m": 10.0,
+    "vibration_frequency_Hz": 1e6,
+    "vibration_amplitude_m": 1e-3,  # piezo stacks move by a tenth of a millimetre
+}
+# a force sensor that never shows 1/300 of the friction, or shows 300 times that, measures in another unit
+_FORCE_FACTOR = 300.0
+
+
+def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, Clipped, list[Finding]]:
+    """Usable columns, the limits where they are clipped, and the findings. Raises Fault BAD_EVIDENCE when no time is left."""
+    findings: list[Finding] = []
+    file = table.file
+
+    def note(kind: str, name: str, text: str, times: int = 1) -> None:
+        findings.append(Finding(kind, f"{file}: {name}", text, times))
+
+    _check_shape(columns, file)
+    usable = dict(columns)
+    for name in list(usable):
+        bad = ~np.isfinite(usable[name])
+        if name in _COMMANDED and bad.any():  # the model would run without it
+            line = f"{file}: {name}: {bad.sum()} of {len(bad)} samples are no finite number, first row {np.argmax(bad) + 1}"
+            raise Fault("BAD_EVIDENCE", f"{line}: must be one in every row; write 0 where the vibration is off")
+        if name != "t_s" and bad.mean() > 0.5:
+            note(
+                "not-finite", name, f"{bad.sum()} of {len(bad)} samples are no finite number; not used", int(bad.sum())
+            )
+            del usable[name]
+    usable, rows = _good_rows(usable, rig, file, findings)
+    t_s = usable["t_s"]
+    step_s = np.diff(t_s)
+    usual_s = float(np.median(step_s))
+    _check_length(float(t_s[-1] - t_s[0]) + usual_s, usual_s, file)
+    gaps = np.flatnonzero(step_s > _GAP_STEPS * usual_s)
+    if len(gaps):
+        at = gaps[0]
+        text = f"{len(gaps)} gaps in time, first at {t_s[at]:.6g} s: {step_s[at]:.3g} s without a sample"
+        longest_s, share = float(step_s.max()), float(step_s[gaps].sum() / (t_s[-1] - t_s[0]))
+        if longest_s > _LONGEST_GAP_S or share > _LARGEST_GAP_SHARE:
+            line = (
+                f"{file}: t_s: {text}, the longest {longest_s:.3g} s, {100 * share:.2g} % of the run in all: must be "
+                f"{_LONGEST_GAP_S:g} s and {100 * _LARGEST_GAP_SHARE:g} % at most; split the file there into runs of their own"
+            )
+            raise Fault("BAD_EVIDENCE", line)
+        note("time-gap", "t_s", text, len(gaps))
+    _check_rate(usual_s, rig, file)
+    clipped: Clipped = {}
+    for name in [name for name in usable if name != "t_s"]:
+        values = usable[name]
+        seen = look(values, dwells=name.endswith("_m"))
+        wrong = _wrong_unit(name, values, rig) or _too_far(name, usable, rig, table)
+        if wrong and name in _COMMANDED:
+            raise Fault("BAD_EVIDENCE", f"{file}: {name}: {wrong}; set channels.{name}.scale")
+        if wrong:
+            note("units", name, f"{wrong}; not used; set channels.{name}.scale")
+            del usable[name]
+        elif seen.constant and not name.startswith("vibration"):
+            used = "" if name == "drive_position_m" else "; not used"
+            note("constant", name, f"is {seen.lowest:g} in every row{used}", seen.samples)
+            if name in _SENSORS:
+                del usable[name]
+        elif (seen.clipped_high or seen.clipped_low) and name in (*_SENSORS, "drive_position_m"):
+            for times, limit in ((seen.clipped_high, seen.highest), (seen.clipped_low, seen.lowest)):
+                if times:
+                    row = int(rows[np.flatnonzero(values == limit)[0]]) + 1
+                    note("clipped", name, f"{times} samples at {limit:g}, first row {row}; so are the model's", times)
+            clipped[name] = (
+                seen.lowest if seen.clipped_low else -math.inf,
+                seen.highest if seen.clipped_high else math.inf,
+            )
+    _compare_velocity(usable, rig, table, note)
+    _check_moves(usable, rig, table, note)
+    if (
+        rig.drive_stiffness_N_per_m
+        and "drive_force_N" in usable
+        and _pulls_back(usable, table, rig.drive_stiffness_N_per_m)
+    ):
+        text = "pulls against the drive's motion: a positive force pulls towards larger positions; not used; change the sign of"
+        note("sign", "drive_force_N", f"{text} channels.drive_force_N.scale")
+        del usable["drive_force_N"]
+    _check_bending(usable, rig, note)
+    return usable, clipped, findings
+
+
+def _check_length(length_s: float, step_s: float, file: str) -> None:
+    if length_s < _SHORTEST_S:
+        remedy = "give a longer run"
+        if step_s < _QUICKEST_S:
+            remedy += f"; a sample every {step_s:.3g} s: is the column in seconds? If not, set channels.t_s.scale"
+        raise Fault("BAD_EVIDENCE", f"{file}: t_s: {length_s:.3g} s long: must be {_SHORTEST_S:g} s at least; {remedy}")
+
+
+def _check_rate(step_s: float, rig: RigTable, file: str) -> None:
+    longest_s, why = _SLOWEST_S, ""
+    if rig.drive_stiffness_N_per_m is not None:
+        slip_s = math.pi * math.sqrt(rig.mass_kg / rig.drive_stiffness_N_per_m)
+        longest_s, why = (
+            slip_s / _FEWEST_IN_A_SLIP,
+            f", a third of a slip, pi sqrt(mass / drive stiffness) = {slip_s:.3g} s",
+        )
+    if step_s > longest_s:
+        line = (
+            f"{file}: t_s: a sample every {step_s:g} s: must be {longest_s:.3g} s at most{why}; is the column in ms? Then set "
+            "channels.t_s.scale = 0.001; or record faster"
+        )
+        raise Fault("BAD_EVIDENCE", line)
+
+
+def _check_shape(columns: Columns, file: str) -> None:
+    if "t_s" not in columns:
+        has = ", ".join(columns) or "no standard column"
+        raise Fault("BAD_EVIDENCE", f"{file}: t_s: missing; the file has {has}; add the column or map it in [channels]")
+    rows = len(columns["t_s"])
+    if rows < _FEWEST_ROWS:
+        line = f"{file}: t_s: {rows} rows: must have {_FEWEST_ROWS} at least; give a longer run"
+        raise Fault("BAD_EVIDENCE", line)
+    for name, values in columns.items():
+        if len(values) != rows:
+            line = (
+                f"{file}: {name}: {len(values)} rows: must have {rows}, as t_s; every column needs one value a sample"
+            )
+            raise Fault("BAD_EVIDENCE", line)
+
+
+def _good_rows(
+    columns: Columns, rig: RigTable, file: str, findings: list[Finding]
+) -> tuple[Columns, npt.NDArray[np.int64]]:
+    """Only rows that are finite throughout, without a wild sample, and later than every row before, and which those are."""
+    t_s = columns["t_s"]
+    rows = len(t_s)
+    good = np.ones(rows, np.bool_)
+    found: list[Finding] = []
+    for name, values in columns.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            text = f"{len(bad)} samples are no finite number, first row {bad[0] + 1}; these rows are not used"
+            found.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
+            good[bad] = False
+        limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else _LARGEST.get(name, math.inf)
+        wild = np.flatnonzero(np.isfinite(values) & (np.abs(values) > limit))
+        # more of them, and it is the unit that is wrong
+        if not name.endswith("position_m") and 0 < len(wild) <= _LARGEST_WILD_SHARE * rows:
+            at = int(wild[0])
+            text = (
+                f"{len(wild)} samples are beyond {limit:g}, first row {at + 1}: {values[at]:g}; these rows are not used"
+            )
+            found.append(Finding("wild", f"{file}: {name}", text, len(wild)))
+            good[wild] = False
+    latest_s = np.maximum.accumulate(np.where(np.isfinite(t_s), t_s, -np.inf))
+    repeated = np.zeros(rows, np.bool_)
+    repeated[1:] = np.isfinite(t_s[1:]) & (t_s[1:] <= latest_s[:-1])
+    back = np.flatnonzero(repeated)
+    if len(back):
+        at = int(back[0])
+        text = (
+            f"{len(back)} rows are not later than the one before, first row {at + 1}: {t_s[at]:.9g} s after "
+            f"{latest_s[at - 1]:.9g} s; these rows are not used"
+        )
+        found.append(Finding("time", f"{file}: t_s", text, len(back)))
+        good[back] = False
+    lost = rows - int(good.sum())
+    if lost > _LARGEST_BAD_SHARE * rows or rows - lost < _FEWEST_ROWS:
+        worst = max(found, key=lambda one: one.times)
+        few = (
+            f"{_FEWEST_ROWS} rows must be left"
+            if rows - lost < _FEWEST_ROWS
+            else f"must be below {100 * _LARGEST_BAD_SHARE:g} %"
+        )
+        remedy = "repair the file, or cut it where the trouble begins"
+        if len(back) and worst.kind == "time" and (np.diff(t_s[np.isfinite(t_s)]) >= 0.0).all():
+            remedy = (
+                "it stands but never goes back: write it with more digits, or give `stickslip log import` the "
+                "source.sample_rate_Hz in place of channels.t_s"
+            )
+        line = f"{worst.where}: {worst.text}: {lost} of {rows} rows cannot be used: {few}; {remedy}"
+        raise Fault("BAD_EVIDENCE", line)
+    findings += found
+    return ({name: values[good] for name, values in columns.items()} if lost else columns), np.flatnonzero(good)
+
+
+def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
+    """Why the unit of a column cannot be right; empty when it can."""
+    size = float(np.abs(values).max())
+    if name == "drive_force_N":
+        static_N = rig.static_force_N
+        factor = size / static_N
+        if factor > _FORCE_FACTOR or 0.0 < factor < 1.0 / _FORCE_FACTOR:
+            return f"largest value {size:g} N, {factor:.2g} times rig.static_force_N = {static_N:g}: the unit cannot be right"
+        return ""
+    if name.endswith("position_m"):
+        size = float(np.ptp(values))
+    if name in _LARGEST and size > _LARGEST[name]:
+        return f"reaches {size:g}: must be below {_LARGEST[name]:g}, the unit cannot be right"
+    return ""
+
+
+def _too_far(name: str, columns: Columns, rig: RigTable, table: RunTable) -> str:
+    """Why a position cannot be in metres where the drive's motion is known; empty when it can."""
+    if rig.drive_stiffness_N_per_m is None or not name.endswith("position_m"):
+        return ""
+    if table.drive_velocity_mps:
+        drive_m = abs(table.drive_velocity_mps) * float(columns["t_s"][-1] - columns["t_s"][0])
+    elif "drive_position_m" in columns:
+        drive_m = float(np.ptp(columns["drive_position_m"]))
+    else:
+        return ""
+    furthest_m = _FURTHEST * (drive_m + rig.static_force_N / rig.drive_stiffness_N_per_m)
+    travel_m = float(np.ptp(columns[name]))
+    if travel_m <= furthest_m:
+        return ""
+    return f"travels {travel_m:.3g}: the drive moves by {drive_m:.3g} m in this time, the unit cannot be right"
+
+
+def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
+    if rig.drive == "force":
+        return
+    stated_mps, moved_mps = table.drive_velocity_mps, 0.0
+    if "drive_position_m" in columns:
+        t_s, position_m = columns["t_s"], columns["drive_position_m"]
+        travel_m = float(position_m[-1] - position_m[0])
+        measured_mps = travel_m / float(t_s[-1] - t_s[0])
+        moved_mps = _way_m(t_s, position_m) / float(t_s[-1] - t_s[0])  # to and fro
+        if stated_mps is not None:
+            text = (
+                f"moves at {measured_mps:.4g} m/s on average, drive_velocity_mps says {stated_mps:.4g}: check units and time; "
+                "where the drive changes its speed leave drive_velocity_mps out"
+            )
+            reach_m = rig.static_force_N / (rig.drive_stiffness_N_per_m or math.inf)
+            another = (
+                not 1.0 / _ANOTHER < measured_mps / stated_mps < _ANOTHER if stated_mps else abs(travel_m) > reach_m
+            )
+            if another:
+                raise Fault("BAD_EVIDENCE", f"{table.file}: drive_position_m: {text}")
+            if abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps) > 0.0:
+                note("units", "drive_position_m", f"{text}; the stated one is used")
+    where = "drive_position_m" if stated_mps is None else "drive_velocity_mps"
+    fastest_mps = moved_mps if stated_mps is None else abs(stated_mps)
+    if fastest_mps > _FASTEST * rig.stribeck_velocity_mps:
+        times = fastest_mps / rig.stribeck_velocity_mps
+        note("units", where, f"{fastest_mps:.3g} m/s, {times:.3g} times rig.stribeck_velocity_mps: is it in mm?")
+
+
+def _way_m(t_s: Floats, position_m: Floats) -> float:
+    """The way of a position there and back, from one tenth of a second to the next: noise must not add up."""
+    at = np.searchsorted(t_s, np.arange(t_s[0], t_s[-1], _STRIDE_S))
+    return float(np.abs(np.diff(position_m[[*at, -1]])).sum())
+
+
+def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
+    """Note a drive that stands still, whose run fits nearly every rig."""
+    if rig.drive_stiffness_N_per_m is None:
+        return
+    if "drive_position_m" in columns:
+        where, travel_m = "drive_position_m", float(np.ptp(columns["drive_position_m"]))
+    elif table.drive_velocity_mps is not None:
+        t_s = columns["t_s"]
+        where, travel_m = "drive_velocity_mps", abs(table.drive_velocity_mps) * float(t_s[-1] - t_s[0])
+    else:
+        return
+    share = travel_m * rig.drive_stiffness_N_per_m / rig.static_force_N
+    if share < _LEAST_TRAVEL:
+        text = f"{travel_m:.2g} m in all, {share:.2g} of what breaks the mass away: it stands still in the whole run"
+        note("still", where, f"{text}: friction and drive are not tested")
+
+
+def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
+    """Drop a mass acceleration the wrong way round; note a drive stiffness in another unit."""
+    described = rig.drive_stiffness_N_per_m
+    told = told_stiffness_N_per_m(columns["t_s"], columns) if described else None
+    if not described or told is None:
+        return
+    if told < 0.0:
+        text = (
+            "points backwards: the mass accelerates as the force that pulls it bends down; not used; change the sign of"
+        )
+        note("sign", "mass_accel_mps2", f"{text} channels.mass_accel_mps2.scale")
+        del columns["mass_accel_mps2"]
+    elif not 1.0 / _ANOTHER_UNIT < told / described < _ANOTHER_UNIT:
+        text = (
+            f"bends with the acceleration of the mass as a spring of {told:.2g} N/m makes it, rig.drive_stiffness_N_per_m says "
+            f"{described:g}: check the units of these three"
+        )
+        note("units", "drive_force_N", text)
+
+
+def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> bool:
+    """Whether the drive takes more work out of what it drags than a loaded spring can hold: friction gives none back."""
+    force_N, t_s = columns["drive_force_N"], columns["t_s"]
+    if "drive_position_m" in columns:
+        work_J = float(force_N[1:] @ np.diff(columns["drive_position_m"]))
+    else:
+        work_J = float(force_N.mean()) * (table.drive_velocity_mps or 0.0) * float(t_s[-1] - t_s[0])
+    return work_J < -0.5 * float(np.abs(force_N).max()) ** 2 / stiffness_N_per_m

@@ -1,0 +1,208 @@
+"""An evidence folder read into memory: the rig as described, the runs as float64 arrays in SI units, and every doubt.
+
+What cannot be used is left out and reported as a finding; where nothing usable remains, a Fault says so.
+"""
+
+from collections.abc import Iterator
+from difflib import get_close_matches
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.faults import Fault
+from bridge.files import check_file
+from bridge.log.finding import Finding
+from bridge.tables.readers import Table, read_table
+from diagnosis.evidence.column_checks import Columns, checked
+from diagnosis.evidence.exciter_harmonics import DISTORTED, Distortion, distortion
+from diagnosis.evidence.force_pickup import PICK_UP, PickUp, pick_up
+from diagnosis.evidence.manifest import MANIFEST, STANDARD, ChannelMap, Manifest, RigTable, RunTable, read_manifest
+from diagnosis.evidence.run_log import columns_of_log
+
+Floats = npt.NDArray[np.float64]
+_LACKING = "column"  # kind of finding: one that the channel map names is not in this file
+_NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "drive_stiffness_N_per_m")
+_ALIKE = 0.85  # of two names, by `difflib`: a letter or the case is another
+SHAKE_RATE_HZ = 8000.0  # a slower accelerometer has too few samples a millisecond to tell how strongly it vibrates
+# what each column tells that no other one does, by kind of drive
+_COST_SPRING = {
+    "drive_force_N": "slips are seen in the acceleration only, and no force level or drive stiffness can be judged",
+    "mass_accel_mps2": "mass, normal-load fluctuation and the fast part of a slip are judged from the force alone",
+    "base_accel_mps2": "what the piezo really delivers, and a base that gives way, cannot be seen",
+    "mass_position_m": "position-dependent friction and frame compliance are judged from the drive position only",
+    "drive_position_m": "the drive counts as perfectly even: no speed ripple can be seen",
+}
+_COST_FORCE = {
+    "mass_accel_mps2": "the acceleration is taken from the position, twice differentiated",
+    "mass_position_m": "the motion is taken from the acceleration: nothing that goes with place or a slow drift can be judged",
+}
+
+
+class Run(NamedTuple):
+    """One run. Every column has the length of `t_s`, which increases, and is finite."""
+
+    file: str
+    t_s: Floats
+    columns: dict[str, Floats]  # by standard name, without t_s; only the usable ones
+    clipped: dict[
+        str, tuple[float, float]
+    ]  # by standard name: limits that the sensor could not pass, infinite where none showed
+    drive_velocity_mps: float | None
+    holdout: bool
+    pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
+    distortion: Distortion | None = None  # a base that vibrates at other frequencies than the commanded one
+
+
+class Evidence(NamedTuple):
+    """A whole folder."""
+
+    folder: Path
+    rig: RigTable
+    runs: tuple[Run, ...]
+    findings: tuple[Finding, ...]
+
+
+def load_evidence(folder: Path) -> Evidence:
+    """Read and check an evidence folder. Raises Fault BAD_EVIDENCE: file, key or column, row, expectation, remedy."""
+    manifest = read_manifest(folder)
+    runs: list[Run] = []
+    findings = [
+        Finding(
+            "tolerance", f"{MANIFEST}: rig.tolerance.{name}", "is relative, and 0 is described: counts as known exactly"
+        )
+        for name, share in manifest.rig.tolerance.items()
+        if share > 0.0 and manifest.rig.values()[name] == 0.0
+    ]
+    if exact := [name for name in _NEVER_EXACT if manifest.rig.values()[name] and not manifest.rig.tolerance.get(name)]:
+        text = f"none for {', '.join(exact)}: known exactly, so an ordinary difference there will be called an effect"
+        findings.append(Finding("tolerance", f"{MANIFEST}: rig.tolerance", text))
+    for table in manifest.run:
+        check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
+    read = [read_columns(folder / table.file, manifest.channels) for table in manifest.run]
+    _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
+    for table, (columns, damaged) in zip(manifest.run, read, strict=True):
+        run, found = examine(columns, manifest.rig, table)
+        runs.append(run)
+        findings += damaged + found
+    if len(runs) > 1 and not any(run.holdout for run in runs):
+        # the last one, so that adding nothing but a run never changes an earlier choice silently
+        runs[-1] = runs[-1]._replace(holdout=True)
+        text = "no run is marked holdout: this one is kept for judging; mark one to choose for yourself"
+        findings.append(Finding("holdout", runs[-1].file, text))
+    return Evidence(folder, manifest.rig, tuple(runs), tuple(findings))
+
+
+def _refuse_misspelt(manifest: Manifest, findings: list[Finding]) -> None:
+    """A column that some runs lack is missing there; one that no run has is misspelt. Raises Fault BAD_EVIDENCE."""
+    tables = sum(not table.file.endswith(".mcap") for table in manifest.run)
+    for name in manifest.channels:
+        lacking = [finding for finding in findings if finding.kind == _LACKING and finding.where.endswith(f": {name}")]
+        if len(lacking) == tables > 0:
+            line = f"{lacking[0].where.partition(':')[0]}: {lacking[0].text}"
+            raise Fault("BAD_EVIDENCE", f"{line}; no run has it: correct channels.{name}.column")
+
+
+def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list[Finding]]:
+    """A run out of its raw columns, with what was found on the way. Raises Fault BAD_EVIDENCE."""
+    usable, clipped, findings = checked(columns, rig, table)
+    reasons = "; ".join(f"{finding.where}: {finding.text}" for finding in findings if finding.kind != "clipped")
+
+    def refuse(rule: str) -> Fault:
+        return Fault("BAD_EVIDENCE", f"{table.file}: {rule}" + (f" ({reasons})" if reasons else ""))
+
+    has = ", ".join(sorted(usable)) or "nothing"
+    if rig.drive == "force" and "drive_force_N" not in usable:
+        raise refuse(f'drive_force_N: missing; with drive = "force" it is the input; it has {has}')
+    if not {"drive_force_N", "mass_accel_mps2"} & usable.keys():
+        raise refuse(f"has {has}: must have drive_force_N or mass_accel_mps2; map one in [channels]")
+    if rig.drive == "force" and not {"mass_accel_mps2", "mass_position_m"} & usable.keys():
+        raise refuse(f'has {has}: with drive = "force" must have mass_accel_mps2 or mass_position_m; map one')
+    if rig.drive == "spring" and "drive_position_m" not in usable and table.drive_velocity_mps is None:
+        raise refuse("drive_velocity_mps: missing in [[run]]; without the column drive_position_m it is needed")
+    wanted = _COST_SPRING if rig.drive == "spring" else _COST_FORCE
+    findings += [
+        Finding("missing", f"{table.file}: {name}", f"not there: {cost}")
+        for name, cost in wanted.items()
+        if name not in usable
+    ]
+    t_s = usable.pop("t_s")
+    findings += [Finding(kind, f"{table.file}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
+    vibrates = pick_up(rig, t_s, usable)
+    if vibrates:
+        findings.append(Finding(PICK_UP, f"{table.file}: drive_force_N", vibrates.text))
+    distorted = distortion(t_s, usable)
+    if distorted:
+        findings.append(Finding(DISTORTED, f"{table.file}: base_accel_mps2", distorted.text))
+    return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates, distorted), findings
+
+
+def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
+    """Kind, column and text of what cannot be known about the vibration."""
+    told = [name for name in ("vibration_frequency_Hz", "vibration_amplitude_m") if name in columns]
+    if len(told) == 1:
+        yield (
+            "missing",
+            told[0],
+            "stands alone: frequency and amplitude are needed, the run counts as one without vibration",
+        )
+    for name in told:
+        if negative := int((columns[name] < 0.0).sum()):
+            yield (
+                "sign",
+                name,
+                f"{negative} samples are negative: must be 0 where it is off, above it else; not used there",
+            )
+    rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
+    if len(told) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
+        for name in ("mass_accel_mps2", "base_accel_mps2"):
+            if name in columns:
+                yield (
+                    "rate",
+                    name,
+                    f"{rate_Hz:.4g} Hz, below {SHAKE_RATE_HZ:g} Hz: how strongly it vibrates is not compared",
+                )
+
+
+def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, list[Finding]]:
+    """The standard columns of a data file, mapped and in SI units, unchecked, and what it has besides, lacks or has lost.
+
+    A run log has the standard columns; one of them that `channels` maps is scaled like any other. Raises Fault BAD_EVIDENCE.
+    """
+    try:
+        if path.suffix == ".mcap":
+            logged, damaged = columns_of_log(path)
+            return {name: _scaled(values, channels.get(name), name) for name, values in logged.items()}, damaged
+        table = read_table(path)
+        found: Columns = {}
+        lacking: list[Finding] = []
+        for name in STANDARD:
+            if name in channels:
+                source = channels[name]
+                if source.column not in table.columns and name != "t_s":
+                    text = f"column {source.column}: not in the file; known here: {', '.join(sorted(table.columns)) or 'none'}"
+                    lacking.append(Finding(_LACKING, f"{path.name}: {name}", text))
+                    continue
+                found[name] = table.column(source.column) * source.scale + source.offset
+            elif name in table.columns:
+                found[name] = table.column(name)
+    except Fault as fault:
+        line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
+        raise Fault("BAD_EVIDENCE", line) from None
+    return found, [*lacking, *_misspelt(path.name, found, table)]
+
+
+def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
+    """Columns that are not used and have nearly the name of one that is not there."""
+    for name in STANDARD:
+        near = [] if name in found else get_close_matches(name, table.columns.keys() - found.keys(), 1, _ALIKE)
+        for other in near:
+            yield Finding(
+                "missing", f"{file}: {name}", f'not there, but {other} is: set channels.{name}.column = "{other}"'
+            )
+
+
+def _scaled(values: Floats, channel: ChannelMap | None, name: str) -> Floats:
+    """A column of a run log; a map that names another column is that of the folder's other files."""
+    return values if channel is None or channel.column != name else values * channel.scale + channel.offset

@@ -1,0 +1,83 @@
+"""Whether the force signal holds a vibration that the spring cannot carry: the exciter's voltage in the sensor's cable.
+
+The rest of the diagnosis compares means over 1 ms, in which the vibration is gone: of the four such rigs of two sealed sets, 0.13
+to 0.45 N beside a spring that carries 0.03 to 0.07 mN (seeds 4742003 and 8156207), it saw none.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.units import quantity
+from diagnosis.evidence.lock_in import BESIDE_HZ, FEWEST_WINDOWS, WINDOW_S, LockIn
+from diagnosis.evidence.manifest import RigTable
+
+Floats = npt.NDArray[np.floating[Any]]
+PICK_UP = "pick-up"  # kind of the finding
+_SHARE = 0.005  # of the static friction: what a surface's roughness counts as at most
+_OF_SPRING = 3.0  # times what the spring carries by the described numbers, which are not exact
+_OF_BESIDE = 4.0  # times what is found where nothing vibrates: noise, and slips where they are quick
+
+
+class PickUp(NamedTuple):
+    """A vibration in the force signal of one run."""
+
+    frequency_Hz: float  # as commanded; of a sweep the median
+    force_N: float  # amplitude, median over the windows
+    spring_N: float  # what the spring would carry
+    limit_N: float  # above which it is told
+
+    @property
+    def limits(self) -> float:
+        """How many times what is ordinary."""
+        return self.force_N / self.limit_N
+
+    @property
+    def band_Hz(self) -> tuple[float, float]:
+        """Where it lies, to one line of a window."""
+        return self.frequency_Hz - 1.0 / WINDOW_S, self.frequency_Hz + 1.0 / WINDOW_S
+
+    @property
+    def text(self) -> str:
+        """The finding."""
+        return (
+            f"vibrates with {_rounded(self.force_N)} at {self.frequency_Hz:.0f} Hz, where the spring carries "
+            f"{_rounded(self.spring_N)}: "
+            "the exciter's voltage in the sensor's cable, or the sensor's own mass; not in the means over 1 ms that are compared"
+        )
+
+
+def _rounded(force_N: float) -> str:
+    return quantity(float(f"{force_N:.2g}"), "N")
+
+
+def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> PickUp | None:
+    """The vibration in the force signal of a run of a spring drive; None where it is ordinary or cannot be known.
+
+    Force, mass acceleration and the vibration's frequency are needed in `columns`, [samples] as `t_s`. The median window of each
+    frequency counts: a slip is in few of them. Of several frequencies the one where it stands out most is told: a pick-up of a
+    voltage grows with the frequency.
+    """
+    stiffness_N_per_m = rig.drive_stiffness_N_per_m
+    needed = {"drive_force_N", "mass_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}
+    if stiffness_N_per_m is None or not needed <= columns.keys():
+        return None
+    lock_in = LockIn(t_s, columns)
+    if len(lock_in.used) < FEWEST_WINDOWS:
+        return None
+    force_N, accel_mps2 = (lock_in.amplitude(columns[name]) for name in ("drive_force_N", "mass_accel_mps2"))
+    beside_N = [lock_in.amplitude(columns["drive_force_N"], apart_Hz=apart_Hz) for apart_Hz in (-BESIDE_HZ, BESIDE_HZ)]
+
+    def of(own: npt.NDArray[np.int64]) -> PickUp:
+        angular = 2.0 * np.pi * lock_in.lowest_Hz[own]
+        yields = np.abs(stiffness_N_per_m + 1j * angular * (rig.drive_damping_Ns_per_m or 0.0))
+        spring_N = float(np.median(yields * accel_mps2[own] / angular**2))
+        around_N = max(float(np.median(each[own])) for each in beside_N)
+        limit_N = max(_SHARE * rig.static_force_N, _OF_SPRING * spring_N, _OF_BESIDE * around_N)
+        return PickUp(float(np.median(lock_in.lowest_Hz[own])), float(np.median(force_N[own])), spring_N, limit_N)
+
+    each = [of(own) for own in lock_in.steady()] or [of(lock_in.used)]
+    found = max(each, key=lambda one: one.limits)
+    return found if found.limits > 1.0 else None

@@ -1,0 +1,26 @@
+"""`manifest.toml` as text."""
+
+import json
+from typing import Any
+
+from diagnosis.evidence.manifest import FORMAT, RigTable, RunTable
+
+
+def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> str:
+    """A manifest with these runs; the names in `assumed` carry the remark that nobody measured them."""
+    lines = [f"format = {_value(FORMAT)}", "", "[rig]", f"drive = {_value(rig.drive)}"]
+    for name, value in rig.values().items():
+        if value is not None:
+            lines.append(f"{name} = {_value(value)}" + ("  # assumed, not measured" if name in assumed else ""))
+    if rig.tolerance:
+        lines += ["", "[rig.tolerance]"]
+        lines += [f"{name} = {_value(value)}" for name, value in rig.tolerance.items()]
+    for run in runs:
+        lines += ["", "[[run]]"]
+        lines += [f"{name} = {_value(value)}" for name, value in run.model_dump().items() if value is not None]
+    return "\n".join(lines) + "\n"
+
+
+def _value(value: Any) -> str:
+    """A number, a truth value or a text: JSON writes these as TOML does, but for DEL; `repr` keeps every digit of a number."""
+    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

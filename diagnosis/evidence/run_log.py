@@ -1,0 +1,50 @@
+"""A run log of this project as evidence: its sensor blocks, and the commands that were in force."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.faults import Fault
+from bridge.log.finding import Finding
+from bridge.log.log_check import damage_findings
+from bridge.log.logfile import RunData, block_period_ns, read_run, sample_times_s
+from bridge.tables.export import CHANNELS
+
+Columns = dict[str, npt.NDArray[np.float64]]
+
+
+def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
+    """The standard columns of a run log, one row a sample, and what of it is damaged. Raises Fault BAD_LOG, BAD_MESSAGE."""
+    run = read_run(path)
+    sensors = run.sensors
+    if not len(sensors):
+        raise Fault("BAD_LOG", f"{path.name}: holds no sensor block; give another log")
+    columns: Columns = {"t_s": sample_times_s(sensors, block_period_ns(sensors)).ravel()}
+    # an imported log has zeros where its source had no such channel, and says so
+    absent = run.headers.get("import", {}).get("missing", "")
+    columns |= {name: sensors[name].astype(np.float64).ravel() for name in CHANNELS if name not in absent}
+    if len(run.command):
+        frequency_Hz, amplitude_m = _commanded(run)
+        samples = sensors["drive_force_N"].shape[1]
+        columns["vibration_frequency_Hz"] = np.repeat(frequency_Hz, samples)
+        columns["vibration_amplitude_m"] = np.repeat(amplitude_m, samples)
+    return columns, damage_findings(run.damage, path)
+
+
+def _commanded(run: RunData) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Frequency and amplitude in force during each block, [blocks]; 0 before the first command."""
+    block = run.sensors["sequence"]
+    # the command that answers the block before, as in lockstep; what the rig says of itself is surer
+    answered = np.where(block > 0, block - np.uint64(1), np.uint64(2**64 - 1))
+    if len(run.applied):
+        order = np.argsort(run.applied["sequence"], kind="stable")
+        numbers = run.applied["sequence"][order]
+        at = np.minimum(np.searchsorted(numbers, block), len(numbers) - 1)
+        answered = np.where(numbers[at] == block, run.applied["command_block"][order][at], answered)
+    order = np.argsort(run.command["block"], kind="stable")
+    blocks = run.command["block"][order]
+    at = np.minimum(np.searchsorted(blocks, answered), len(blocks) - 1)
+    known = blocks[at] == answered
+    found = run.command[order][at]
+    return np.where(known, found["frequency_Hz"], 0.0), np.where(known, found["amplitude_m"], 0.0)

@@ -1,0 +1,165 @@
+"""What could be measured next on a rig with a spring drive: a few runs, sized by the speeds and vibrations already used."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import Scales
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import Segment
+from diagnosis.features.slips import settled
+from diagnosis.gap.prepare import Prepared
+from diagnosis.gap.problem import Point, Problem
+from diagnosis.model.segment_starts import entries_of
+
+_LONGEST_S = 45.0
+_SHORTEST_S = 4.0
+_CYCLES = 5.0  # stick-slip cycles that a run should show
+_FARTHEST_M = 0.02
+_LEAST_S = 1.0  # of a run that can be diagnosed
+_HOLDS_S = (1.0, 10.0, 30.0)
+_WATCHED_S = 10.0
+_SHIFT_M = 3.7e-3  # no whole number of anything on a machine
+
+
+class Step(NamedTuple):
+    """A stretch of constant command."""
+
+    seconds: float
+    velocity_mps: float
+    frequency_Hz: float = 0.0
+    amplitude_m: float = 0.0
+
+
+class Plan(NamedTuple):
+    """One run that could be measured."""
+
+    what: str
+    steps: tuple[Step, ...]
+    shift_m: float = 0.0  # of the start, from where an earlier run began
+    beyond: bool = False  # far outside the speeds that were used, where the rig may do something new
+
+    @property
+    def effort_s(self) -> float:
+        """How long it takes, and a little more where the rig has to be watched."""
+        return sum(step.seconds for step in self.steps) + (_WATCHED_S if self.beyond else 0.0)
+
+
+def plans(problem: Problem) -> list[Plan]:
+    """At most ten runs within the reach that the evidence shows."""
+    used = [segment for run in problem.runs for segment in run.commands.segments if segment.drive_velocity_mps != 0.0]
+    if not used:
+        return []
+    length_s: dict[float, float] = {}
+    for segment in used:
+        speed = float(f"{abs(segment.drive_velocity_mps):.2g}")
+        length_s[speed] = length_s.get(speed, 0.0) + (segment.last - segment.first) * BLOCK_S
+    usual = max(length_s, key=lambda speed: length_s[speed])
+    cycle_m = _cycle_m(problem.rig, problem.scales)
+    found: list[Plan] = []
+    slowest, fastest = min(length_s), max(length_s)
+    seen_m = max(abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S for segment in used)
+    for speed, beyond in ((0.2 * slowest, True), (0.5 * slowest, False), (2.0 * fastest, False), (5.0 * fastest, True)):
+        travel_m = min(_travel_m(problem.scales, cycle_m), _FARTHEST_M)
+        seconds = max(travel_m / speed, min(_SHORTEST_S, _FARTHEST_M / speed), _LEAST_S)
+        if seconds <= _LONGEST_S and _LEAST_S * speed <= max(_FARTHEST_M, seen_m):
+            what = f"Drag at {_speed(speed)} for {seconds:.2g} s without vibration."
+            found.append(Plan(what, (Step(seconds, speed),), beyond=beyond))
+    some_s = max(_travel_m(problem.scales, 2.0 * cycle_m) / usual, 2.0)
+    if some_s * 3.0 <= _LONGEST_S:
+        found += _others(usual, some_s, cycle_m)
+    found += _vibrations(used, usual, 2.0 * cycle_m / usual + 1.0)
+    return found
+
+
+def _others(usual: float, some_s: float, cycle_m: float) -> list[Plan]:
+    again_s = max(2.0 * cycle_m / usual, 1.0)
+    holds = [step for hold_s in _HOLDS_S for step in (Step(hold_s, 0.0), Step(again_s, usual))]
+    dwells = ", ".join(f"{hold_s:g}" for hold_s in _HOLDS_S)
+    back = (Step(some_s, usual), Step(some_s, -usual))
+    return [
+        Plan(
+            f"Drag at {_speed(usual)}, hold the drive for {dwells} s in turn, and drag on after each.",
+            (Step(some_s, usual), *holds),
+        ),
+        Plan(f"Drag at {_speed(usual)} for {some_s:.0f} s, then back for {some_s:.0f} s.", back),
+        Plan(
+            f"Drag at {_speed(usual)} for {some_s:.0f} s, go back, wait 10 s, and drag along the same track again.",
+            (*back, Step(10.0, 0.0), Step(some_s, usual)),
+        ),
+        Plan(
+            f"Drag at {_speed(usual)} for {some_s:.0f} s from a start {_SHIFT_M * 1e3:.1f} mm further on.",
+            (Step(some_s, usual),),
+            _SHIFT_M,
+        ),
+    ]
+
+
+def _vibrations(used: list[Segment], usual: float, each_s: float) -> list[Plan]:
+    """Other frequencies, and other amplitudes, where the rig has an exciter."""
+    shaken = [segment for segment in used if segment.frequency_Hz > 0.0]
+    if not shaken:
+        return []
+    highest_Hz = max(segment.frequency_Hz for segment in shaken)
+    amplitude_m = float(np.median([segment.amplitude_m for segment in shaken]))
+    each_s = min(max(each_s, 1.5), 3.0)
+    frequencies = [share * highest_Hz for share in (0.5, 1.5, 2.0)]
+    amplitudes = [share * amplitude_m for share in (0.5, 1.5, 2.0)]
+    told_Hz = ", ".join(f"{frequency_Hz * 1e-3:.3g}" for frequency_Hz in frequencies)
+    told_m = ", ".join(f"{value_m * 1e9:.3g}" for value_m in amplitudes)
+    return [
+        Plan(
+            f"Drag at {_speed(usual)} with {amplitude_m * 1e9:.3g} nm at {told_Hz} kHz, {each_s:.1f} s each.",
+            tuple(Step(each_s, usual, frequency_Hz, amplitude_m) for frequency_Hz in frequencies),
+        ),
+        Plan(
+            f"Drag at {_speed(usual)} with {told_m} nm at {0.5 * highest_Hz * 1e-3:.3g} kHz, {each_s:.1f} s each.",
+            tuple(Step(each_s, usual, 0.5 * highest_Hz, value_m) for value_m in amplitudes),
+        ),
+    ]
+
+
+def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
+    """The plan as a run whose measurement is what the model at `point` predicts, with the channels of the richest run."""
+    with_exciter = any(step.frequency_Hz > 0.0 for step in plan.steps)
+    template = max(
+        problem.runs, key=lambda run: (with_exciter and bool(run.commands.frequency_Hz.any()), len(run.signals))
+    )
+    counts = [round(step.seconds / BLOCK_S) for step in plan.steps]
+    edges = np.concatenate([[0], np.cumsum(counts)]).tolist()
+    segments = tuple(
+        Segment(first, last, step.velocity_mps, step.frequency_Hz, step.amplitude_m)
+        for first, last, step in zip(edges[:-1], edges[1:], plan.steps, strict=True)
+    )
+    commands = template.commands._replace(
+        drive=np.repeat([step.velocity_mps for step in plan.steps], counts),
+        frequency_Hz=np.repeat([step.frequency_Hz for step in plan.steps], counts),
+        amplitude_m=np.repeat([step.amplitude_m for step in plan.steps], counts),
+        segments=segments,
+    )
+    start = template.start._replace(position_m=template.start.position_m + plan.shift_m)
+    run = template._replace(file=plan.what, holdout=False, commands=commands, start=start, entries=(), clipped={})
+    signals = problem.signals(run, point)
+    settled_ones = tuple(settled(signals, segment, problem.scales) for segment in segments)
+    commands = commands._replace(segments=settled_ones)
+    return run._replace(signals=signals, commands=commands, entries=entries_of(signals, commands, problem.scales))
+
+
+def _cycle_m(rig: RigTable, scales: Scales) -> float:
+    """Drive travel of one stick-slip cycle: the force falls by twice the difference of static and sliding friction.
+
+    At a tenth of the static friction, or a run for cycles of next to nothing would be too short for anything else.
+    """
+    return max(2.0 * (rig.static_force_N - rig.coulomb_force_N), 0.1 * rig.static_force_N) / scales.stiffness_N_per_m
+
+
+def _travel_m(scales: Scales, cycle_m: float) -> float:
+    """Travel that loads the spring and shows some cycles."""
+    return 0.5 * scales.force_N / scales.stiffness_N_per_m + _CYCLES * cycle_m
+
+
+def _speed(speed_mps: float) -> str:
+    if speed_mps >= 1e-4:
+        return f"{float(f'{speed_mps * 1e3:.2g}'):g} mm/s"
+    return f"{speed_mps * 1e6:.2g} µm/s"

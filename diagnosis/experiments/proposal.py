@@ -1,0 +1,189 @@
+"""Which run to measure next: the shortest that surely separates the two leading explanations, else the one that separates most.
+
+Both predict every run that could be measured. The difference counts in floors, and only as far as neither explanation could
+imitate the other by moving what the present runs leave uncertain: its rig numbers, its sensors and its own parameters.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.units import signal_name
+from diagnosis.experiments.candidate_runs import Plan, as_run, plans
+from diagnosis.experiments.checks_by_hand import advice
+from diagnosis.features.feature import Feature
+from diagnosis.fits.fit import Fit
+from diagnosis.fits.retuning import ROUGHNESS
+from diagnosis.gap.floor import Floor, compress, floor_of, replicates, slope_of_compress
+from diagnosis.gap.problem import Point, Problem
+from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.result import Experiment
+from plant.effects.library import EFFECTS
+
+Floats = npt.NDArray[np.floating[Any]]
+_FEW, _SOME = 2, 6  # replicates for a first look, and for a judgement
+_DECISIVE = 10.0  # standard deviations: more is not more certain, only longer
+_PROMISING = 1.5  # times that, at first look, where nothing is imitated yet
+_JUDGED = 3  # experiments that are judged where none is promising, best first
+_SEPARATES = 2.0  # standard deviations, below which nothing is worth an hour at the rig
+_CERTAIN = 0.05  # tolerances: what the present runs know so well imitates nothing
+_STEP, _STEP_OF_EFFECT = 0.5, 0.15
+_MISSING = 4.0  # floors, where one explanation slips and the other does not
+
+
+class _Look(NamedTuple):
+    """How one experiment separates two explanations."""
+
+    plan: Plan
+    separation: float  # standard deviations
+    feature: Feature | None  # that differs most
+
+
+def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) -> Experiment:
+    """The best next run for the first two leaders; a check by hand where no run separates them."""
+    if len(leaders) < 2 or leaders[0].form.effects == leaders[1].form.effects:
+        text = "Only one explanation is left: a run under conditions that were not measured yet would test it hardest."
+        return Experiment("Repeat a run at another drive speed, from another start.", text, None)
+    first, second = leaders[0], leaders[1]
+    names = tuple(dict.fromkeys((*first.form.effects, *second.form.effects)))
+    both = f"{_name(first)} and {_name(second)}"
+    if problem.rig.drive == "force":
+        return Experiment(advice(names, "force"), f"Of what was tried, {both} explain these runs best.", None)
+    # how far the two are apart in the present runs, with everything fitted
+    present = float(np.linalg.norm(first.residual - second.residual))
+    best = _best(problem, nuisances, first, second)
+    if best is None or best.separation < _SEPARATES or best.feature is None:
+        most = (
+            "no run within reach of this rig separates them"
+            if best is None
+            else f"no run separates them by more than {best.separation:.1f} standard deviations"
+        )
+        return Experiment(advice(names, "spring"), f"{both} look alike: {most}: this is a check by hand.", None)
+    there = f"{best.separation:.1f} standard deviations, most in {_in_words(best.feature)}"
+    if present > _DECISIVE:
+        why = (
+            f"{both} differ by {present:.1f} standard deviations in the present runs already; "
+            f"a run like this would confirm it, with {there}."
+        )
+    elif present > best.separation:
+        why = (
+            f"{both} differ by {present:.1f} standard deviations in the present runs; there it would again be {there}."
+        )
+    else:
+        why = f"There {both} differ by {there}; in the present runs by {present:.1f}."
+    return Experiment(best.plan.what, why, best.separation)
+
+
+def _best(problem: Problem, nuisances: Nuisances, first: Fit, second: Fit) -> _Look | None:
+    """The first decisive plan, shortest first; where none is, the one that separates most."""
+    left: list[_Look] = []
+    judged: list[_Look] = []
+    possible = sorted(plans(problem), key=lambda plan: plan.effort_s)
+    if any(EFFECTS[name].acts_on == "piezo" for fit in (first, second) for name in fit.form.effects):
+        # without vibration the two differ only in what one of them had to put into other numbers
+        possible = [plan for plan in possible if any(step.frequency_Hz > 0.0 for step in plan.steps)]
+    for plan in possible:
+        look = _first_look(problem, nuisances, plan, first, second)
+        if look is None:
+            continue
+        if look.separation < _PROMISING * _DECISIVE:
+            left.append(look)
+            continue
+        judged.append(_judged(problem, nuisances, plan, first, second))
+        if judged[-1].separation > _DECISIVE:
+            return judged[-1]
+    left.sort(key=lambda look: -look.separation)
+    judged += [_judged(problem, nuisances, look.plan, first, second) for look in left[: max(_JUDGED - len(judged), 0)]]
+    return max(judged, key=lambda look: look.separation, default=None)
+
+
+def _name(fit: Fit) -> str:
+    return " + ".join(fit.form.effects) or "the rig as described"
+
+
+class _Imagined:
+    """One experiment as if it had been measured under the first explanation, with its floor."""
+
+    def __init__(self, problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit, count: int) -> None:
+        self._nuisances = nuisances
+        here, there = (nuisances.point(fit.deviations, fit.effects) for fit in (first, second))
+        self.problem = Problem(problem.rig, [as_run(problem, plan, here)])
+        drawn = replicates(self.problem, here, ROUGHNESS, count, 3, perhaps=(here, there))
+        self.floor: Floor = floor_of(self.problem, here, drawn)
+        expected, other = self._expected([here, there])
+        self.apart = np.where(np.isfinite(other - expected), other - expected, _MISSING)
+        """How far the second explanation is from the first, in floors [compared]."""
+
+    def _expected(self, points: list[Point]) -> list[Floats]:
+        """Expected features, in floors [compared] each."""
+        found = self.problem.predicted_many(points)
+        return [(self.floor.expected(one) / self.floor.scatter)[self.floor.compared] for one in found]
+
+    def columns(self, fit: Fit, which: npt.NDArray[np.int64]) -> Floats:
+        """How the expectation changes with each coordinate, in floors, [compared, which].
+
+        Args:
+            which: indices into nuisances, then the form's axes.
+
+        """
+        own = len(fit.deviations)
+        at = np.concatenate([fit.deviations, fit.w])
+        steps = [(_STEP if i < own else _STEP_OF_EFFECT) * (-1.0 if at[i] > 0.0 else 1.0) for i in which.tolist()]
+        ahead = [at, *(at + step * (np.arange(len(at)) == i) for i, step in zip(which.tolist(), steps, strict=True))]
+        here, *there = self._expected([self._nuisances.point(one[:own], fit.form.tables(one[own:])) for one in ahead])
+        columns = [(one - here) / step for one, step in zip(there, steps, strict=True)]
+        columns = [np.where(np.isfinite(column), column, 0.0) for column in columns]
+        return np.column_stack(columns) if columns else np.zeros((len(here), 0))
+
+
+def _first_look(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit) -> _Look | None:
+    """An upper bound: nothing is imitated."""
+    imagined = _Imagined(problem, nuisances, plan, first, second, _FEW)
+    if not imagined.floor.compared.any():
+        return None
+    return _Look(plan, float(np.linalg.norm(compress(imagined.apart))), None)
+
+
+def _judged(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit) -> _Look:
+    imagined = _Imagined(problem, nuisances, plan, first, second, _SOME)
+    z = imagined.apart
+    whitening = imagined.floor.whitening
+    slope = slope_of_compress(z)
+    apart = whitening @ compress(z)
+    free: list[Floats] = []
+    for fit in (first, second):
+        covariance = fit.covariance()
+        uncertain = np.flatnonzero(np.sqrt(np.diag(covariance)) > _CERTAIN)
+        root = np.linalg.cholesky(covariance[uncertain[:, None], uncertain])
+        free.append(whitening @ (imagined.columns(fit, uncertain) * slope[:, None]) @ root)
+    imitated = np.column_stack(free)
+    inner = np.eye(imitated.shape[1]) + imitated.T @ imitated
+    left = apart - imitated @ np.linalg.solve(inner, imitated.T @ apart)
+    share = compress(z) * (whitening.T @ left)
+    labels = [label for (_, label), used in zip(imagined.problem.labels, imagined.floor.compared, strict=True) if used]
+    return _Look(plan, math.sqrt(max(float(apart @ left), 0.0)), labels[int(np.argmax(share))])
+
+
+def _in_words(feature: Feature) -> str:
+    name, signal = feature.name, signal_name(feature.signal)
+    if feature.regime == "breakaway" and name == "mean":
+        return "the force at which it breaks away"
+    if feature.regime == "restick" and name == "mean":
+        return "the force at which it sticks again"
+    if name.startswith("wave") and feature.signal == "drive_position_m":
+        return "how evenly the drive moves"
+    if name.startswith("wave"):
+        return f"how the {feature.regime} force changes along the run"
+    words = {
+        "period": "the time from slip to slip",
+        "scatter": f"the scatter of the {feature.regime} force",
+        "shape": f"the shape of a slip in the {signal}",
+        "ring": f"how the {signal} rings after a slip",
+        "rate": "how fast the force climbs at rest",
+        "spring": "the force over the extension of the spring",
+        "vibration": f"the vibration in the {signal}",
+        "ripple": f"the ripple of the {signal}",
+    }
+    return words.get(name.split()[0], f"the level of the {signal}")

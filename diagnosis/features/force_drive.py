@@ -1,0 +1,193 @@
+"""Features of a force-driven axis: the force that is left after inertia, over velocity, position, direction and time.
+
+Both sides are sorted by the measured motion (`diagnosis.axis_motion`), so every mean is over the same blocks, and all but the
+powers are linear in the force. In this order, each of what the one before left: a curve over velocity, with branches where
+it speeds up and slows down; what goes with acceleration and its rate; waves over time and position, of the friction (with the
+sign of the velocity) and of a force that knows no direction.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import dct
+from scipy.ndimage import uniform_filter1d
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.axis_motion import Motion
+from diagnosis.features.feature import LOW, Features, Signals
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import Commands
+
+Floats = npt.NDArray[np.floating[Any]]
+Indices = npt.NDArray[np.int64]
+_EDGE = 50  # blocks at either end, where the smoothed motion is not to be trusted
+_SLOW = np.array([0.25, 0.5, 1.0, 2.0, 4.0])  # edges in Stribeck velocities: below the first it is about to stick
+_FAST = 8  # bins from there to the greatest speed
+_FORGOTTEN = 20.0  # presliding lengths F_s / k_t of travel, after which it no longer matters how a bristle began
+_FEWEST = 5  # blocks in a bin
+_FRICTION_WAVES_TIME = 72  # half waves: 3 Hz in 12 s
+_FRICTION_WAVES_POSITION = 80  # half waves: 5 mm on a stroke of 0.2 m
+_FORCE_WAVES = 8
+_BINS_PER_WAVE = 4  # of a half wave
+_RATE_WINDOW = 61  # blocks
+_BANDS_HZ = ((3.0, 8.0), (8.0, 24.0))
+_SHORTEST_REST_S = 0.2
+
+
+def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Features:
+    """All features of a run with a force drive."""
+    found = Features()
+    motion = commands.motion
+    assert motion is not None, "a force drive has a motion"  # noqa: S101
+    rest_N = signals["drive_force_N"] - motion.inertia_N
+    _breakaways(found, rest_N, motion, rig.stribeck_velocity_mps)
+    inner = slice(_first(motion, rig), len(rest_N) - _EDGE)
+    cut = Motion(*(values[inner] for values in motion))
+    # a velocity out of an acceleration is off by some mm/s: it does not tell when the axis turns
+    slowest = 0 if "mass_position_m" in signals else len(_SLOW)
+    rest_N = _without_curve(found, rest_N[inner], cut, rig.stribeck_velocity_mps, slowest)
+    # near a turn of the motion every error of the bristle would pass for a wave
+    sliding = np.abs(cut.velocity_mps) > _SLOW[-2] * rig.stribeck_velocity_mps
+    rest_N = _without_inertia(found, np.where(sliding, rest_N, 0.0), cut, sliding)
+    _waves(found, rest_N, cut, sliding)
+    friction_N = rest_N * np.sign(cut.velocity_mps)
+    for low_Hz, high_Hz in _BANDS_HZ:
+        band = _smooth(friction_N, high_Hz) - _smooth(friction_N, low_Hz)
+        power = float(np.var(band[sliding])) if sliding.any() else math.nan
+        found.add("ripple", "drive_force_N", "steady", (low_Hz, high_Hz), -1, power)
+    if "mass_accel_mps2" in signals and "mass_position_m" in signals:
+        accel = signals["mass_accel_mps2"][inner]
+        about = cut.accel_mps2 - cut.accel_mps2.mean()
+        gain = float(accel @ about) / (float(about @ about) + 1e-12)
+        found.add("gain", "mass_accel_mps2", "steady", LOW, -1, gain)
+    return found
+
+
+def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Friction over its mean at that direction and speed, less 1, [blocks]; and where it slides fast enough to say so."""
+    rest_N = force_N - motion.inertia_N
+    speed = np.abs(motion.velocity_mps)
+    edges = np.quantile(speed, np.linspace(0.15, 1.0, 9))
+    bins = np.searchsorted(edges, speed, side="right") * 2 + (motion.velocity_mps > 0.0)
+    mean = _means(rest_N, bins, int(bins.max()) + 1)[bins]
+    valid = (speed > edges[0]) & np.isfinite(mean)
+    valid[:_EDGE] = valid[-_EDGE:] = False
+    size_N = float(np.abs(mean[valid]).mean())
+    return np.where(valid, np.sign(motion.velocity_mps) * (rest_N - mean) / size_N, 0.0), valid
+
+
+def moving_s(motion: Motion, rig: RigTable) -> float:
+    """How much of a run its features can use."""
+    if float(np.ptp(motion.position_m)) <= _forgotten_m(rig):
+        return 0.0
+    return max(len(motion.position_m) - _EDGE - _first(motion, rig), 0) * BLOCK_S
+
+
+def _forgotten_m(rig: RigTable) -> float:
+    return _FORGOTTEN * rig.static_force_N / rig.contact_stiffness_N_per_m
+
+
+def _first(motion: Motion, rig: RigTable) -> int:
+    """Block from which the features count."""
+    gone_m = np.abs(motion.position_m - motion.position_m[0])
+    gone = gone_m > _forgotten_m(rig)
+    return max(int(np.argmax(gone)), _EDGE)
+
+
+def _means(values: Floats, bins: Indices, count: int) -> Floats:
+    """Mean of every bin, NaN where too little is in it."""
+    held = np.bincount(bins, minlength=count)
+    sums = np.bincount(bins, values, count)
+    return np.where(held >= _FEWEST, sums / np.maximum(held, 1), np.nan)
+
+
+def _profile(values: Floats, bins: Indices, count: int) -> Floats:
+    """Mean of every bin, the less the fewer blocks are in it, since what the motion passes but once is rough."""
+    held = np.bincount(bins, minlength=count)
+    sums = np.bincount(bins, values, count)
+    return sums / np.maximum(held, max(float(np.median(held)), 1.0))
+
+
+def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float, slowest: int) -> Floats:
+    """Features of the force over velocity, from the ring `slowest` on, and what they leave."""
+    speed = np.abs(motion.velocity_mps) / stribeck_mps
+    fastest = max(float(speed.max()), 1.01 * float(_SLOW[-1]))
+    edges = np.concatenate([_SLOW, np.linspace(_SLOW[-1], fastest, _FAST + 1)[1:-1]])
+    ring = np.searchsorted(edges, speed, side="right")
+    slow = len(_SLOW) - 1  # rings of it have two branches
+    forward = motion.velocity_mps > 0.0
+    speeding = (motion.accel_mps2 > 0.0) == forward
+    # about to stick, there is no direction but that of the acceleration
+    way = np.where(ring == 0, motion.accel_mps2 > 0.0, forward)
+    branch = np.where((ring > 0) & (ring <= slow), speeding, False)
+    bins = ring * 4 + way * 2 + branch
+    count = (len(edges) + 1) * 4
+    means = _means(rest_N, bins, count)
+    for number in range(len(edges) + 1):
+        for side, sign in ((0, "-"), (2, "+")):
+            for fork in (0, 1) if 0 < number <= slow else (0,):
+                regime = "stick" if number == 0 else "steady" if number > slow else "breakaway" if fork else "restick"
+                name = f"friction {sign}{number}{'ab'[fork]}"
+                mean_N = float(means[number * 4 + side + fork]) if number >= slowest else math.nan
+                found.add(name, "drive_force_N", regime, LOW, -1, mean_N)
+    return rest_N - np.nan_to_num(means)[bins]
+
+
+def _without_inertia(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray[np.bool_]) -> Floats:
+    # smoothed well below what leads the model, or the encoder's noise in both would pass for a lag
+    smooth = uniform_filter1d(uniform_filter1d(motion.accel_mps2, _RATE_WINDOW), _RATE_WINDOW)
+    for name, column in (("inertia", motion.accel_mps2), ("lag", np.gradient(smooth, BLOCK_S))):
+        about = np.where(sliding, column - column.mean(), 0.0)
+        size = math.sqrt(float(about @ about) / max(int(sliding.sum()), 1)) + 1e-12
+        about = about / size
+        force_N = float(rest_N @ about) / max(int(sliding.sum()), 1)
+        found.add(name, "drive_force_N", "slip", LOW, -1, force_N)
+        rest_N = rest_N - force_N * about
+    return rest_N
+
+
+def _waves(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray[np.bool_]) -> None:
+    time = np.arange(len(rest_N)) / len(rest_N)
+    way = motion.position_m - motion.position_m.min()
+    way = way / max(float(way.max()), 1e-12)
+    friction_N = rest_N * np.sign(motion.velocity_mps)
+    for name, over, values, waves in (
+        ("friction over time", time, friction_N, _FRICTION_WAVES_TIME),
+        ("force over time", time, rest_N, _FORCE_WAVES),
+        ("friction over position", way, friction_N, _FRICTION_WAVES_POSITION),
+        ("force over position", way, rest_N, _FORCE_WAVES),
+    ):
+        bins = waves * _BINS_PER_WAVE
+        at = np.minimum((over * bins).astype(np.int64), bins - 1)
+        profile = _profile(values[sliding], at[sliding], bins)
+        weights = np.asarray(dct(profile))[1 : waves + 1] / bins
+        for wave, value in enumerate(weights.tolist(), start=1):
+            found.add(f"{name} {wave}", "drive_force_N", "steady", LOW, -1, value)
+
+
+def _breakaways(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float) -> None:
+    """The force at which motion starts after a rest, and how it grows with the rest."""
+    still = np.abs(motion.velocity_mps) < _SLOW[0] * stribeck_mps
+    ends = np.flatnonzero(still[:-1] & ~still[1:]) + 1
+    begins = np.concatenate([[0] if still[0] else [], np.flatnonzero(~still[:-1] & still[1:]) + 1]).astype(np.int64)
+    rests: list[float] = []
+    forces: list[float] = []
+    for end in ends.tolist():
+        begin = int(begins[np.searchsorted(begins, end) - 1])
+        if (end - begin) * BLOCK_S >= _SHORTEST_REST_S:
+            rests.append(math.log((end - begin) * BLOCK_S))
+            sign = float(np.sign(motion.velocity_mps[end]))
+            forces.append(float(sign * rest_N[end : end + 20].mean()))
+    mean = float(np.mean(forces)) if forces else math.nan
+    slope = math.nan
+    if len(rests) >= 3 and np.ptp(rests) > 0.3:
+        slope = float(np.polyfit(rests, forces, 1)[0])
+    found.add("mean", "drive_force_N", "breakaway", LOW, -1, mean)
+    found.add("over rest", "drive_force_N", "breakaway", LOW, -1, slope)
+
+
+def _smooth(values: Floats, frequency_Hz: float) -> Floats:
+    """Moving mean with a cut-off (half the power) at about this frequency."""
+    return uniform_filter1d(values, max(round(0.44 / (frequency_Hz * BLOCK_S)), 1))

@@ -1,0 +1,233 @@
+"""What a run looks like, in numbers that do not depend on when its slips happen.
+
+Everything is taken per segment of constant command: means and trends over the cycles, shapes aligned at the middle of a
+slip, the level over time where nothing slips, the vibration that arrives; and per run the parity relations between channels
+that need no friction model. A measured and a predicted run pass through the same code; a feature that one of them does not
+have is NaN.
+"""
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import dct
+from scipy.ndimage import uniform_filter1d
+
+from diagnosis.features.feature import DRIVE_WAVES, HIGH, LOW, MIDDLE, RESOLVED_M, Features, Scales, Signals
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import Commands, Segment
+from diagnosis.features.slips import NO_SLIPS, SHAPE_AT, Slips, find_slips, slip_pairs
+from diagnosis.features.spring_law import spring_bend, spring_law
+
+Floats = npt.NDArray[np.floating[Any]]
+
+_LEVELS = 8  # bins of a segment without slips
+_BREAKAWAY_WAVES = 5
+
+
+def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Features:
+    """All features of a run with a spring drive; which ones, depends on commands and channels only."""
+    found = Features()
+    for number, segment in enumerate(commands.segments):
+        own = slice(segment.first, segment.last)
+        cut = {
+            name: values[own] if name.endswith("shake_mps2") else segment.sign * values[own]
+            for name, values in signals.items()
+        }
+        slips = find_slips(cut, scales)
+        if segment.slips == 0:
+            slips = NO_SLIPS
+        if "drive_force_N" in cut:
+            travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
+            expected = travel_m * scales.stiffness_N_per_m / scales.fall_N
+            _cycles(found, number, cut["drive_force_N"], slips, segment, expected)
+            _level(found, number, cut["drive_force_N"], slips, segment)
+        _period(found, number, slips, segment)
+        _shapes(found, number, cut, slips, scales, segment.frequency_Hz)
+        if segment.frequency_Hz > 0.0:
+            _vibration(found, number, cut)
+    _parity(found, signals, commands, scales)
+    if "drive_position_m" in signals:
+        _drive(found, signals["drive_position_m"], commands)
+    return found
+
+
+def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment, expected: float) -> None:
+    name = "drive_force_N"
+    for regime, at, waves in (("breakaway", slips.tops, _BREAKAWAY_WAVES), ("restick", slips.bottoms, 3)):
+        carried = min(waves, max(int(expected / 2.0) - 1, 0)) if expected >= 5.0 else 0
+        moments, scatter = _moments(force_N[at], at / len(force_N), slips.weights, carried)
+        found.add("mean", name, regime, LOW, number, moments[0])
+        for wave in range(1, waves + 1):
+            found.add(f"wave {wave}", name, regime, LOW, number, moments[wave] if wave <= carried else math.nan)
+        found.add("scatter", name, regime, LOW, number, scatter)
+    # the climb between a re-stick and the next breakaway, in three parts
+    rates = np.full(3, np.nan)
+    weights = slip_pairs(slips)
+    if segment.sticks and weights.sum() > 0.1:
+        start, end = slips.bottoms[:-1], slips.tops[1:]
+        blocks = np.arange(len(force_N))
+        level = [np.interp(start + share * (end - start), blocks, force_N) for share in (0.1, 0.4, 0.7, 0.95)]
+        length = (end - start) * BLOCK_S
+        parts = zip(level[:-1], level[1:], (0.3, 0.3, 0.25), strict=True)
+        rates = np.array([float(weights @ ((high - low) / (share * length))) for low, high, share in parts])
+        rates /= weights.sum()
+    for part, rate in zip(("early", "middle", "late"), rates, strict=True):
+        found.add(f"rate {part}", name, "stick", LOW, number, float(rate))
+
+
+def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple[list[float], float]:
+    """Mean and cosine waves over the segment, and the power of what is left; NaN where there are too few slips."""
+    total = float(weights.sum())
+    moments = [math.nan] * (carried + 1)
+    if total <= 0.1:
+        return moments, math.nan
+    mean = float(weights @ values) / total
+    moments[0] = mean
+    if len(values) < carried + 2:
+        return moments, math.nan
+    root = np.sqrt(weights)
+    columns = np.cos(np.pi * np.outer(at, np.arange(carried + 1)))
+    fitted, *_ = np.linalg.lstsq(columns * root[:, None], values * root, rcond=None)
+    moments[1:] = fitted[1:].tolist()
+    left = values - columns @ fitted
+    free = total - carried - 1.0
+    return moments, float(weights @ (left * left)) / free if free > 1.0 else math.nan
+
+
+def _period(found: Features, number: int, slips: Slips, segment: Segment) -> None:
+    weights = slip_pairs(slips)
+    periods_s = np.diff(slips.middles) * BLOCK_S
+    known = segment.sticks and weights.sum() > 0.1
+    value = math.log(float(weights @ periods_s) / float(weights.sum())) if known else math.nan
+    found.add("period", "drive_force_N", "stick", LOW, number, value)
+
+
+def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment) -> None:
+    """Levels over whole cycles, as much as their slips count; over the segment where nothing slips.
+
+    A jump at the start of a segment, as a late force makes it, is a slip of no weight. Counted as one it moved a mean level by
+    six floors, and a slow sensor was named.
+    """
+    name = "drive_force_N"
+    still = segment.still and not segment.at_the_edge
+    whole, counts = force_N, np.ones(len(force_N))
+    weights = slip_pairs(slips)
+    if weights.sum() > 0.1:
+        whole, counts = force_N[slips.tops[0] : slips.tops[-1]], np.repeat(weights, np.diff(slips.tops))
+    levels = np.full(4, np.nan)
+    if still or (segment.slips > 2 and not segment.at_the_edge):
+        mean_N = np.average(whole, weights=counts)
+        deviation_N = np.average((whole - mean_N) ** 2, weights=counts) ** 0.5
+        levels = np.array(
+            [mean_N, deviation_N, *np.quantile(whole, (0.05, 0.95), weights=counts, method="inverted_cdf")]
+        )
+    for level, value in zip(("mean level", "deviation", "low level", "high level"), levels.tolist(), strict=True):
+        found.add(level, name, "steady", LOW, number, value)
+    edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64)
+    for bin_ in range(_LEVELS):
+        value = float(force_N[edges[bin_] : edges[bin_ + 1]].mean()) if still else math.nan
+        found.add(f"level {bin_}", name, "steady", LOW, number, value)
+    middle = fast = math.nan
+    if still:
+        short = uniform_filter1d(force_N, 5)
+        middle, fast = float(np.var(short - uniform_filter1d(force_N, 100))), float(np.var(force_N - short))
+    found.add("ripple", name, "steady", MIDDLE, number, middle)
+    found.add("ripple", name, "steady", HIGH, number, fast)
+
+
+def _regime(at: float) -> str:
+    return "breakaway" if at < -0.4 else "slip" if at < 0.6 else "restick"
+
+
+_SHAPES = tuple((f"shape {instant:g}", _regime(instant)) for instant in SHAPE_AT.tolist())
+
+
+def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Scales, frequency_Hz: float) -> None:
+    width = scales.slip_s / BLOCK_S
+    shaken = frequency_Hz > 0.0  # a vibration that the sampling folds down would pass for a ring
+    names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]
+    if not names:
+        return
+    shapes, powers = np.full((len(names), len(SHAPE_AT)), np.nan), np.full(len(names), np.nan)
+    if slips.some:
+        signals = np.array([cut[name] for name in names])
+        last = signals.shape[1] - 1
+        inside = slips.weights > 0.0
+        middles = slips.middles[inside, None]
+        weights = slips.weights[inside] / max(float(slips.weights.sum()), 1e-9)
+        at = np.clip(middles + SHAPE_AT * width, 0.0, last)
+        before = np.minimum(at.astype(np.int64), last - 1)
+        low = signals[:, before]
+        shapes = weights @ (low + (at - before) * (signals[:, before + 1] - low))
+        fast = signals - uniform_filter1d(signals, 5)
+        rings = fast[:, np.minimum((middles + np.arange(int(3.0 * width))).astype(np.int64), last)]
+        powers = np.einsum("nij,nij,i->n", rings, rings, weights) / rings.shape[2]
+    for i, name in enumerate(names):
+        shape, ring = shapes[i], math.nan if shaken and name.endswith("accel_mps2") else float(powers[i])
+        if name == "drive_force_N":
+            shape = shape - shape.mean()
+        if name == "mass_position_m":
+            shape = shape - shape[0]
+        for (label, regime), value in zip(_SHAPES, shape.tolist(), strict=True):
+            found.add(label, name, regime, MIDDLE, number, value)
+        found.add("ring", name, "restick", HIGH, number, ring)
+
+
+def _vibration(found: Features, number: int, cut: Signals) -> None:
+    for name, source in (("base_shake_mps2", "base_accel_mps2"), ("mass_shake_mps2", "mass_accel_mps2")):
+        if name not in cut:
+            continue
+        shake = cut[name]
+        mean = float(shake.mean())
+        found.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
+        if source == "base_accel_mps2":
+            time = np.linspace(-1.0, 1.0, len(shake))
+            shaken = mean > 0.0  # a sensor that went dead, or an amplifier that tripped, shows nothing to divide by
+            over_time = float(shake @ time) / (mean * len(shake) / 3.0) if shaken else math.nan
+            found.add("vibration over time", source, "steady", HIGH, number, over_time)
+            if "drive_force_N" in cut:
+                force = cut["drive_force_N"] - cut["drive_force_N"].mean()
+                over_force = float(shake @ force) / (mean * (float(force @ force) + 1e-9)) if shaken else math.nan
+                found.add("vibration over force", source, "steady", HIGH, number, over_force)
+
+
+def _parity(found: Features, signals: Signals, commands: Commands, scales: Scales) -> None:
+    """Relations of a run that hold whatever the friction is."""
+    if not {"drive_force_N", "mass_position_m", "drive_position_m"} <= signals.keys():
+        return
+    force_N, extension_m = signals["drive_force_N"], signals["drive_position_m"] - signals["mass_position_m"]
+    law = spring_law(force_N, extension_m, commands.segments, scales.force_N, scales.stiffness_N_per_m)
+    law["bend"] = spring_bend(force_N, extension_m, commands.segments, scales.slip_s)
+    for name, value in law.items():
+        found.add(f"spring {name}", "drive_force_N", "stick", MIDDLE if name == "rest" else LOW, -1, value)
+
+
+def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
+    """Waves of what the drive position does besides its even path."""
+    rest_m = np.zeros_like(position_m)
+    for segment in commands.segments:
+        rows = slice(segment.first, segment.last)
+        rest_m[rows] = _without_line(position_m[rows], segment)
+    waves = np.asarray(dct(rest_m))[1 : DRIVE_WAVES + 1] / len(rest_m)
+    for wave, value in enumerate(waves.tolist(), start=1):
+        found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
+    fast = rest_m - uniform_filter1d(rest_m, 100)
+    found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + RESOLVED_M**2)
+
+
+def _without_line(position_m: Floats, segment: Segment) -> Floats:
+    rest = position_m - position_m.mean()
+    for column, power in _line_and_bow(segment.last - segment.first):
+        rest -= column * (float(rest @ column) / power)
+    return rest
+
+
+@lru_cache(maxsize=64)
+def _line_and_bow(blocks: int) -> tuple[tuple[Floats, float], ...]:
+    """A line, a sensor's zero and the speed, and a bow, its linearity: [blocks], and the square of each."""
+    line = np.linspace(-1.0, 1.0, blocks)
+    bow = line * line - 1.0 / 3.0
+    return (line, float(line @ line)), (bow, float(bow @ bow))

@@ -1,0 +1,95 @@
+"""How the force follows the extension of the spring: a massless, linear one that is measured at once pulls k e, and no more."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import Segment
+
+Floats = npt.NDArray[np.floating[Any]]
+_ROUND_ENTRY = 10  # blocks: longer than the delays of a measuring chain
+# In slips: short against one, as the noise of displacement sensors grows with the square of frequency, and long, as a sensor's
+# bow changes the stiffness along the track. Without the second the bends of 60 rigs without a gap were up to 1.6 ms2 k.
+_SHORT, _LONG = 0.25, 8.0
+
+
+def spring_law(
+    force_N: Floats, extension_m: Floats, segments: Sequence[Segment], scale_N: float, stiffness_N_per_m: float
+) -> dict[str, float]:
+    """Force against extension, its rate, its cube, time and direction, one after the other, and the power of the rest.
+
+    Args:
+        force_N, extension_m: [blocks] each.
+        segments: of the run.
+        scale_N, stiffness_N_per_m: typical force and stiffness, by which the columns are sized.
+
+    """
+    even = _even(segments, len(force_N), _ROUND_ENTRY)
+    rate_mps = np.gradient(uniform_filter1d(extension_m, 5), BLOCK_S)[even]
+    force_N, extension_m = force_N[even], extension_m[even]
+    extension_m = extension_m - extension_m.mean() + force_N.mean() / stiffness_N_per_m
+    reaches = extension_m * (stiffness_N_per_m / scale_N)
+    both = force_N.min() < -0.3 * scale_N and force_N.max() > 0.3 * scale_N
+    columns = {
+        "stiffness": reaches,
+        "rate": rate_mps * 1e3,
+        "cube": reaches * reaches * reaches,  # a power takes as long as all the rest of this
+        "time": np.linspace(-1.0, 1.0, len(even))[even],
+    }
+    if both:
+        columns["direction"] = np.sign(force_N)
+    law, rest = _one_after_the_other(columns, force_N)
+    law.setdefault("direction", math.nan)
+    return law | {"rest": max(rest, 0.0) / len(force_N)}
+
+
+def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment], slip_s: float) -> float:
+    """The force [N] that goes with the second derivative of the extension [m/s2] where slips are fast.
+
+    A force that comes T later is F - T F' + T^2 F'' / 2, one behind n equal low-passes that take as long has (n + 1) / 2 n in
+    place of the half, and a frame that swings bends it without making it late: so the bend tells them apart.
+    """
+    short, long = (max(round(slips * slip_s / BLOCK_S), 1) for slips in (_SHORT, _LONG))
+    level_m = uniform_filter1d(extension_m, short)
+    padded_m = np.pad(level_m, short, mode="edge")
+    earlier_m, later_m = padded_m[: -2 * short], padded_m[2 * short :]
+    columns = {
+        "stiffness": level_m,
+        "rate": (later_m - earlier_m) / (2 * short * BLOCK_S),
+        "bend": (later_m - 2.0 * level_m + earlier_m) / (short * BLOCK_S) ** 2,
+    }
+    even = _even(segments, len(force_N), _ROUND_ENTRY + 2 * short)
+    fast = {name: (values - uniform_filter1d(values, long))[even] for name, values in columns.items()}
+    level_N = uniform_filter1d(force_N, short)
+    law, _ = _one_after_the_other(fast, (level_N - uniform_filter1d(level_N, long))[even])
+    return law["bend"]
+
+
+def _even(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[np.bool_]:
+    """All blocks [blocks] but those so near to the start of a segment, where the model jumps to the measured force."""
+    even = np.ones(blocks, np.bool_)
+    for segment in segments:
+        if segment.still or segment.slips > 0:
+            even[max(segment.first - about, 0) : segment.first + about] = False
+    return even
+
+
+def _one_after_the_other(columns: Mapping[str, Floats], force_N: Floats) -> tuple[dict[str, float], float]:
+    """What of a force [blocks] goes with each column, freed of those before it, and the square of what is left.
+
+    All at once they would pass noise on to each other.
+    """
+    centred = np.array([*columns.values(), force_N])
+    centred -= centred.mean(axis=1, keepdims=True)
+    products = centred @ centred.T
+    shares: dict[str, float] = {}
+    for i, name in enumerate(columns):
+        freed = products[i] / (products[i, i] + 1e-30)
+        shares[name] = float(freed[-1])
+        products -= np.outer(products[i], freed)
+    return shares, float(products[-1, -1])

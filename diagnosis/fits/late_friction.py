@@ -1,0 +1,95 @@
+"""Where the refit of friction that lags starts when it is late by much.
+
+Under vibration the friction takes the speed that the base had a dead time ago. chi2 over the dead time is a comb then, with a
+tooth every half period, and a refit stays where it began. Runs without vibration have no comb: friction late by 5.53 ms came to
+chi2 958 from all runs at once, to 5.38 ms from the runs without, and to 181 from the best tooth beside that.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.fits.fit import Fit
+from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.fits.refits import Start, refits
+from diagnosis.hypotheses.trials import Trial
+from diagnosis.processes import each
+
+Floats = npt.NDArray[np.floating[Any]]
+EFFECT = "frictional-lag"
+_LATER = (1.0, 3.0, 10.0)  # times the longest lag that the library begins with: up to longer than a slip
+_BEST = 3  # fits that are gone on with
+_SPAN = (0.85, 1.15)  # times the dead time of the runs without vibration; three of them told it to within 7 %
+_PER_HALF_PERIOD = 2.5  # points: from one 33 us beside a tooth at 4.5 kHz a refit still came to it
+_TEETH = 2  # of every fit that get a refit
+
+
+def late_fits(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Fit]:
+    """Fits of friction that lags by much, best first; none where every run vibrates, or none does."""
+    found = _refits(fitter, late_starts(fitter, trials, jobs), jobs)
+    for fit in [fit for fit in found if _is_late_in_time(fit)][
+        :1
+    ]:  # from the numbers of all runs other teeth stand out
+        found += _refits(fitter, _teeth(fitter, fit, jobs), jobs)
+    return sorted(found, key=_chi2)
+
+
+def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Start]:
+    """Where they begin: fits to the runs without vibration, and what is to be had of all runs at a dead time beside theirs."""
+    runs = fitter.problem.runs
+    still = {run.file for run in runs if not run.commands.frequency_Hz.any()}
+    if len(still) in {0, len(runs)}:
+        return []
+    longest = {trial.form.forms[EFFECT]: trial for trial in trials if trial.form.effects == (EFFECT,)}
+    described = np.zeros(len(fitter.nuisances))
+    starts: list[Start] = [
+        (trial.form, described, np.array([trial.w[0] + math.log(later), *trial.w[1:]]))
+        for trial in longest.values()
+        for later in _LATER
+    ]
+    found: list[Start] = []
+    unvibrated = fitter.of_runs(still)
+    if not unvibrated.floor.compared.any():  # a climb without a slip, whose force alone is known
+        return []
+    for fit in _refits(unvibrated, starts, jobs)[:_BEST]:
+        found += _teeth(fitter, fit, jobs) if _is_late_in_time(fit) else [(fit.form, fit.deviations, fit.w)]
+    return found
+
+
+def _refits(fitter: Fitter, starts: list[Start], jobs: int) -> list[Fit]:
+    """Best first."""
+    return sorted(refits(fitter, starts, jobs), key=_chi2)
+
+
+def _chi2(fit: Fit) -> float:
+    return fit.chi2
+
+
+def _is_late_in_time(fit: Fit) -> bool:
+    return fit.form.axes[0].name == "delay_s"
+
+
+def _teeth(fitter: Fitter, fit: Fit, jobs: int) -> list[Start]:
+    """The best dead times about that of a fit, everything else as there."""
+    axis = fit.form.axes[0]
+    delay_s = axis.value(float(fit.w[0]))
+    highest_Hz = max(float(run.commands.frequency_Hz.max()) for run in fitter.problem.runs)
+    low_s, high_s = (share * delay_s for share in _SPAN)
+    count = max(math.ceil((high_s - low_s) * 2.0 * highest_Hz * _PER_HALF_PERIOD), _TEETH)
+    tried = [np.array([math.log(one / axis.scale), *fit.w[1:]]) for one in np.linspace(low_s, high_s, count).tolist()]
+    chi2 = np.full(count + 2, math.inf)
+    for i, share in enumerate(each(jobs, _chi2s, fitter, [(fit, tried[i::jobs]) for i in range(jobs)])):
+        chi2[1 + i : 1 + count : jobs] = share
+    teeth = [i for i in range(count) if chi2[i + 1] <= min(chi2[i], chi2[i + 2])]
+    best = sorted(teeth, key=lambda i: chi2[i + 1])[:_TEETH]
+    return [(fit.form, fit.deviations, tried[i]) for i in best]
+
+
+def _chi2s(fitter: Fitter, share: tuple[Fit, list[Floats]]) -> list[float]:
+    """Of the differences alone: the priors hardly change along a dead time."""
+    fit, tried = share
+    predicted = fitter.predicted_many([(fit.deviations, fit.form.tables(w)) for w in tried])
+    residuals = [fitter.whitened(one)[0] for one in predicted]
+    return [float(one @ one) for one in residuals]

@@ -1,0 +1,91 @@
+"""A measured run made ready: grid, segments, features, the force and state with which each segment begins."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bridge.faults import Fault
+from diagnosis.evidence.folder import Evidence, Run
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import Signals, scales_of
+from diagnosis.features.force_drive import moving_s
+from diagnosis.features.grid import BLOCK_S, SHAKEN, averaged, reduce_run, without_vibration
+from diagnosis.features.noise import Noise, noise_of
+from diagnosis.features.segments import Commands, commands_of
+from diagnosis.features.slips import settled
+from diagnosis.model.predict import predict
+from diagnosis.model.rig import Entry, Start, rig_config
+from diagnosis.model.segment_starts import entries_of
+
+_SHORTEST_MOTION_S = 0.5
+
+
+class Prepared(NamedTuple):
+    """One run, ready."""
+
+    file: str
+    holdout: bool
+    signals: Signals
+    commands: Commands
+    start: Start
+    entries: tuple[Entry, ...]  # as the force sensor read it
+    before_s: float  # how long the rig had run in the runs before, in the manifest's order
+    noise: Noise
+    clipped: dict[str, tuple[float, float]]  # by signal: limits that the sensor could not pass
+
+
+def prepare(evidence: Evidence) -> list[Prepared]:
+    """Reduce every run and find its commands, start and noise. Raises Fault BAD_EVIDENCE when an axis hardly moves."""
+    prepared: list[Prepared] = []
+    before_s = 0.0
+    for run in evidence.runs:
+        prepared.append(_prepare(evidence.rig, run, before_s))
+        before_s += len(prepared[-1].commands.drive) * BLOCK_S
+    return prepared
+
+
+def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
+    signals = reduce_run(run)
+    for shake, source in SHAKEN.items():  # a clipped vibration is not that of a clipped mean
+        if source in run.clipped:
+            signals.pop(shake, None)
+    commands = commands_of(run, rig, signals)
+    if rig.drive == "spring":
+        scales = scales_of(rig)
+        commands = commands._replace(segments=tuple(settled(signals, one, scales) for one in commands.segments))
+    if commands.motion is not None and (seconds := moving_s(commands.motion, rig)) < _SHORTEST_MOTION_S:
+        told = "mass_position_m" if "mass_position_m" in signals else "mass_accel_mps2"
+        line = (
+            f"{run.file}: {told}: moves for {seconds:.3g} s: must be {_SHORTEST_MOTION_S:g} s at "
+            f"least, or there is no friction to compare; leave the run out, or check channels.{told}.scale"
+        )
+        raise Fault("BAD_EVIDENCE", line)
+    start = _start(rig, signals, commands)
+    noisy = without_vibration(signals, averaged(commands.frequency_Hz))
+    if commands.motion is not None and "mass_position_m" in signals:
+        led = predict(rig_config(rig, {}, {}, None), True, commands, start)
+        noisy = signals | {"mass_position_m": signals["mass_position_m"] - led["mass_position_m"]}
+    noise = noise_of(noisy, commands, scales_of(rig))
+    clipped = {name: limits for name, limits in run.clipped.items() if name in signals}
+    entries = entries_of(signals, commands, scales_of(rig))
+    return Prepared(run.file, run.holdout, signals, commands, start, entries, before_s, noise, clipped)
+
+
+def _start(rig: RigTable, signals: Signals, commands: Commands) -> Start:
+    first = slice(0, 10)
+    if rig.drive == "force":
+        assert commands.motion is not None, "a force drive has a motion"  # noqa: S101
+        at_m, velocity_mps = (float(values[0]) for values in commands.motion[:2])
+        # the bristle as it is in steady sliding, or as it holds the force at rest
+        sliding = abs(velocity_mps) > rig.stribeck_velocity_mps
+        force_N = float(signals["drive_force_N"][first].mean())
+        return Start(np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)
+    force_N = float(signals["drive_force_N"][first].mean()) if "drive_force_N" in signals else 0.7 * rig.coulomb_force_N
+    if "mass_position_m" in signals:
+        at_m = float(signals["mass_position_m"][first].mean())
+    elif "drive_position_m" in signals:
+        at_m = float(signals["drive_position_m"][first].mean()) - force_N / scales_of(rig).stiffness_N_per_m
+    else:
+        at_m = 0.0
+    drive_m = float(signals["drive_position_m"][first].mean()) if "drive_position_m" in signals else None
+    return Start(force_N, at_m, drive_m=drive_m)

@@ -1,0 +1,281 @@
+"""Runs of one evidence made ready for comparison: measured features, and predicted ones for any parameters and effects."""
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ValidationError
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import Feature, Features, Signals, scales_of
+from diagnosis.features.force_drive import axis_features
+from diagnosis.features.grid import BLOCK_S, averaged, without_vibration
+from diagnosis.features.segments import Commands
+from diagnosis.features.spring_drive import spring_features
+from diagnosis.gap.prepare import Prepared
+from diagnosis.model.four_rigs_step import LANES
+from diagnosis.model.per_run import in_run, of_run
+from diagnosis.model.predict import predict_many
+from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD, Effects, Entry, Roughness, Start, rig_config
+from diagnosis.model.segment_starts import misread
+from diagnosis.model.sensor_chain import SENSOR_EFFECTS, Chain, sensed, true_force_N
+from diagnosis.model.true_force import relative, true_commands
+from plant.config import RigConfig
+from plant.effects.library import EFFECTS
+
+Floats = npt.NDArray[np.floating[Any]]
+AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # how old the contact was when a run began
+PIEZO_EFFECTS = frozenset(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
+# of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
+_SCALE_SPREAD = 0.004
+_KEPT = 64  # simulated runs, of 0.6 MB each
+_DIVERGED = 1e100  # SI units, of a feature: its square must still be a number
+
+
+class Point(NamedTuple):
+    """Where the model is evaluated."""
+
+    values: dict[str, float]  # of the rig table, those that differ from the described ones
+    chain: Chain
+    effects: Effects
+
+
+class Draw(NamedTuple):
+    """What is random about one replicate."""
+
+    random: np.random.Generator
+    roughness: Roughness
+
+
+class _Asked(NamedTuple):
+    """A run of the model as it is to be simulated."""
+
+    point: Point
+    draw: Draw | None
+    effects: Effects  # those that sensors have no part in
+    start: Start
+    entries: tuple[Entry, ...]
+    chain: Chain
+
+
+class Problem:
+    """A set of runs under one rig table. Arrays of features are [features], the runs' features one after the other."""
+
+    def __init__(self, rig: RigTable, runs: list[Prepared]) -> None:
+        self.rig = rig
+        self.runs = runs
+        self.scales = scales_of(rig)
+        self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
+        self._simulated: dict[object, Signals | None] = {}
+        self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}
+        self._measured = [self._features(run, run.signals) for run in runs]
+        self.measured = np.concatenate([np.array(found.values) for found in self._measured])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: without what was simulated here."""
+        return self.__dict__ | {"_simulated": {}}
+
+    @property
+    def labels(self) -> list[tuple[str, Feature]]:
+        """File and feature of every entry."""
+        return [
+            (run.file, label) for run, found in zip(self.runs, self._measured, strict=True) for label in found.labels
+        ]
+
+    def predicted(self, point: Point) -> Floats:
+        """Features of the model, [features]; NaN where no rig is like that."""
+        return self.predicted_many([point])[0]
+
+    def predicted_many(
+        self, points: Sequence[Point], draws: Sequence[Draw] = (), perhaps: Sequence[Point] = ()
+    ) -> list[Floats]:
+        """As `predicted` of every point, in less time than one after the other.
+
+        Args:
+            points: where.
+            draws: of each point what is random about it; without draws nothing is.
+            perhaps: points that may be asked for next, to be simulated where that costs nothing.
+
+        """
+        parts: list[list[float]] = [[] for _ in points]
+        with np.errstate(over="ignore", invalid="ignore"):  # where a far start of a refit makes the model diverge
+            for run in self.runs:
+                found = self._signals(run, points, draws or [None] * len(points), perhaps)
+                for part, signals in zip(parts, found, strict=True):
+                    part.extend([math.nan] if signals is None else self._features(run, signals).values)
+        result: list[Floats] = []
+        for part in parts:
+            features = np.array(part) if len(part) == len(self.measured) else np.full(len(self.measured), np.nan)
+            result.append(np.where(np.abs(features) < _DIVERGED, features, np.nan))
+        return result
+
+    def signals(self, run: Prepared, point: Point) -> Signals:
+        """Predicted signals of one run, as its sensors would show them. Raises ValueError where no rig is like that."""
+        (found,) = self._signals(run, [point], [None])
+        if found is None:
+            raise ValueError(f"no rig is like that: {point}")
+        return found
+
+    def _signals(
+        self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None], perhaps: Sequence[Point] = ()
+    ) -> list[Signals | None]:
+        """Of every point; None where no rig is like that."""
+        asked = [_asked(run, point, draw) for point, draw in zip(points, draws, strict=True)]
+        if self.rig.drive == "force":
+            return [self._led(run, one) for one in asked]
+        raws = self._raw(run, run.commands, asked, perhaps=perhaps)
+        return [None if raw is None else _shown(run, one, raw) for one, raw in zip(asked, raws, strict=True)]
+
+    def _led(self, run: Prepared, one: _Asked) -> Signals | None:
+        """As `_signals`, for a force drive: the force that leads the model along the measured motion."""
+        effects, draw = one.point.effects, one.draw
+        chain = relative(one.point.chain)
+        commands = true_commands(run.commands, effects, chain)
+        blocks = len(commands.drive)
+        noise: Signals = {}
+        if draw is not None:
+            noise = {name: run.noise.drawn(name, blocks, draw.random) for name in run.signals}
+            motion = commands.motion
+            if motion is not None and "mass_position_m" in noise:
+                motion = motion._replace(position_m=motion.position_m + noise["mass_position_m"])
+            # a disturbed input moves the mass, and what it takes to put that right is what noise costs
+            commands = commands._replace(drive=commands.drive + noise["drive_force_N"], motion=motion)
+        sensors = {name: table for name, table in effects.items() if name in SENSOR_EFFECTS}
+        (raw,) = self._raw(run, commands, [one], (chain, _hashable(sensors)))
+        if raw is None:
+            return None
+        result = sensed(raw, commands.frequency_Hz, effects, chain)
+        result = {name: result[name] for name in run.signals}
+        for name, values in noise.items():
+            result[name] = result[name] - values if name == "drive_force_N" else result[name] + values
+        for name, (low, high) in run.clipped.items():
+            result[name] = np.clip(result[name], low, high)
+        return result
+
+    def _raw(
+        self,
+        run: Prepared,
+        commands: Commands,
+        asked: Sequence[_Asked],
+        inputs: object = None,
+        perhaps: Sequence[Point] = (),
+    ) -> list[Signals | None]:
+        """Simulated signals; what was drawn is nobody's else, the rest may be there already."""
+        keys = [number if one.draw is not None else _key(run, one, inputs) for number, one in enumerate(asked)]
+        found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
+        todo = {key: one for key, one in zip(keys, asked, strict=True) if key not in found}
+        spare: dict[object, _Asked] = {}
+        if len(todo) % LANES:
+            soon = [_asked(run, point, None) for point in perhaps]
+            known = todo.keys() | found.keys() | self._simulated.keys()
+            spare = {key: one for one in soon if (key := _key(run, one, inputs)) not in known}
+        simulated = self._simulate(commands, [*todo.values(), *spare.values()], len(todo))
+        for key, signals in zip([*todo, *spare], simulated, strict=True):
+            if key in todo:
+                found[key] = signals
+            elif signals is not None:
+                self._simulated[key] = signals
+        # at the end again: where all trials start from is asked for again and again
+        self._simulated |= {key: found[key] for key, one in zip(keys, asked, strict=True) if one.draw is None}
+        for key in list(self._simulated)[:-_KEPT]:
+            del self._simulated[key]
+        return [found[key] for key in keys]
+
+    def _simulate(self, commands: Commands, asked: Sequence[_Asked], wanted: int) -> list[Signals | None]:
+        """The signals of the first `wanted`, None where no rig is like that; of the others where there was a lane for them."""
+        configs: dict[int, RigConfig] = {}
+        for number, one in enumerate(asked):
+            with suppress(ValidationError):
+                configs[number] = rig_config(
+                    self.rig, one.point.values, one.effects, one.draw.roughness if one.draw else None
+                )
+        starts = [asked[number].start for number in configs]
+        entries = [asked[number].entries for number in configs]
+        possible = sum(number < wanted for number in configs)
+        found = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries, possible)
+        by_number = dict(zip(configs, found, strict=True))
+        return [by_number.get(number) for number in range(len(asked))]
+
+    def _features(self, run: Prepared, signals: Signals) -> Features:
+        if self.rig.drive == "force":
+            return axis_features(signals, run.commands, self.rig)
+        return spring_features(without_vibration(signals, self._averaged[run.file]), run.commands, self.scales)
+
+
+def _truly(reading_N: float, effects: Effects, t_s: float) -> float:
+    return float(true_force_N(np.array(reading_N), effects, np.array(t_s)))
+
+
+def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
+    start = run.start._replace(force_N=_truly(run.start.force_N, point.effects, 0.0))
+    age_s = point.effects.get(AGEING, {}).get(of_run(AGE_BEFORE, run.file))
+    if age_s is not None:
+        start = start._replace(age_s=float(age_s))
+    if draw is not None:
+        start = start._replace(age_s=AGE_BEFORE_S * math.exp(AGE_SPREAD * float(draw.random.normal())))
+    entries = tuple(
+        entry._replace(
+            force_N=_truly(entry.force_N, point.effects, entry.block * BLOCK_S),
+            age_s=entry.age_s + start.age_s if entry.from_before and entry.age_s is not None else entry.age_s,
+        )
+        for entry in run.entries
+    )
+    chain = point.chain
+    if draw is not None:
+        chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
+        entries = tuple(misread(entry, run.noise, draw.random) for entry in entries)
+    return _Asked(point, draw, _moving(run, point.effects, draw), start, entries, chain)
+
+
+def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
+    """The effects that move the rig in this run, as it shows them."""
+    seed = draw.roughness.seed if draw else None
+    shown = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
+    moving = {name: table for name, table in shown.items() if table is not None and name not in SENSOR_EFFECTS}
+    if not run.commands.frequency_Hz.any():
+        moving = {name: table for name, table in moving.items() if name not in PIEZO_EFFECTS}
+    if "before_s" in moving.get("friction-drift", {}):
+        moving["friction-drift"] = moving["friction-drift"] | {"before_s": run.before_s}
+    return _with_paths(moving, run, draw)
+
+
+def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
+    """What the sensors make of a simulated run."""
+    result = sensed(raw, run.commands.frequency_Hz, one.point.effects, one.chain)
+    result = {name: result[name] for name in run.signals}
+    for name in result:
+        if name.endswith("shake_mps2"):
+            result[name] = np.hypot(result[name], run.noise.shake_mps2[name])
+    if one.draw is not None:
+        for name, values in result.items():
+            result[name] = values + run.noise.drawn(name, len(values), one.draw.random)
+    for name, (low, high) in run.clipped.items():
+        result[name] = np.clip(result[name], low, high)
+    return result
+
+
+def _key(run: Prepared, one: _Asked, inputs: object) -> object:
+    """What decides how a run of the model goes of which nothing is drawn."""
+    rig = _hashable({"rig": one.point.values})
+    return run.file, one.start.force_N, one.start.age_s, one.entries, inputs, rig, _hashable(one.effects)
+
+
+def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:
+    return tuple((name, tuple(sorted(table.items(), key=str))) for name, table in sorted(tables.items()))
+
+
+def _with_paths(effects: Effects, run: Prepared, draw: Draw | None) -> Effects:
+    """Random effects on a path: that of their seed, with seed 0 that of the draw; without a draw on none, which is their mean.
+
+    What goes over time takes another path in every run, what goes over place the same.
+    """
+    result: Effects = {}
+    for name, table in effects.items():
+        if table["form"] != "random":
+            result[name] = table
+        elif seed := float(table["seed"]) or (1.0 + draw.roughness.seed if draw else 0.0):
+            result[name] = table | {"seed": seed + (run.before_s if "frequency_Hz" in table else 0.0)}
+    return result

@@ -1,0 +1,38 @@
+"""Where to look for a wave on a force-driven axis: lines in the friction, relative to its mean at that speed and direction.
+
+Only starting points for a refit come from here, never a verdict.
+"""
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from diagnosis.features.force_drive import friction_share
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.gap.prepare import Prepared
+from diagnosis.hypotheses.waves import Series, Wave, fitted, wave_of
+
+_EVERY = 8  # blocks that make one sample
+_MOST_TURNS = 200  # of a wave within the longest run
+_STEPS_PER_TURN = 3  # a line is as narrow as the run is long
+
+
+def axis_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
+    """The strongest waves of the friction over `position` [m] or `time` [s], strongest first."""
+    series: list[Series] = []
+    for run in runs:
+        motion = run.commands.motion
+        if motion is None:
+            continue
+        share, valid = friction_share(run.signals["drive_force_N"], motion)
+        time_s = np.arange(len(share)) * BLOCK_S
+        at = motion.position_m if over == "position" else time_s
+        series.append(Series(at[valid][::_EVERY], uniform_filter1d(share, _EVERY)[valid][::_EVERY]))
+    span = max((float(np.ptp(one.at)) for one in series), default=0.0)
+    if span <= 0.0:
+        return []
+    periods = span * _STEPS_PER_TURN / np.arange(1, _MOST_TURNS * _STEPS_PER_TURN)
+    power, shares = fitted(series, periods)
+    near = 2 * _STEPS_PER_TURN
+    peaks = [i for i in range(len(power)) if power[i] == power[max(0, i - near) : i + near + 1].max()]
+    best = [wave_of(float(periods[i]), shares[i]) for i in sorted(peaks, key=lambda i: -power[i])[:most]]
+    return [wave._replace(spread=min(0.5 * wave.period / span, 0.2)) for wave in best]

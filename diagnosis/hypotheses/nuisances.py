@@ -1,0 +1,80 @@
+"""What may differ from the description without being a gap: the rig's numbers within their tolerances, and ordinary sensors.
+
+All of it is refitted before any effect is judged. An incomplete set makes every effect look alike: what a missing nuisance
+would have taken up, each effect takes up in its own way.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.gap.problem import Point
+from diagnosis.model.rig import Effects
+from diagnosis.model.sensor_chain import Chain
+from diagnosis.result import Parameter
+
+Floats = npt.NDArray[np.floating[Any]]
+# Mean and standard deviation of what no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz displacement by 200 us,
+# an open one by nothing; displacement sensors are linear to 0.2 % of their range: up to 0.8 % in slope, and of 40 mm 0.2 / m;
+# accelerometers of the bench begin at 0 to 0.5 Hz and end at 10 kHz or well above.
+_CHAIN = {
+    "force_delay_s": (4e-5, 4e-5),
+    "position_delay_s": (1e-4, 1e-4),
+    "position_scale": (1.0, 0.004),
+    "drive_slope": (0.0, 0.006),
+    "drive_bow_per_m": (0.0, 0.2),
+    "accel_lowest_Hz": (0.25, 0.25),
+    "accel_rolled_off": (0.5, 0.5),
+}
+# A table states two friction levels and a velocity; the curve between them differs from law to law, and from a Gaussian by this.
+_TAIL = 0.4
+_NOT_NEGATIVE = ("accel_lowest_Hz", "accel_rolled_off")
+
+
+class Nuisances:
+    """The nuisances of a rig as a vector in units of their tolerances, 0 as described. [nuisances]"""
+
+    def __init__(self, rig: RigTable) -> None:
+        known = {name: value for name, value in rig.values().items() if value is not None}
+        # a value of 0 has no relative tolerance
+        self.rig_names = tuple(name for name, share in rig.tolerance.items() if share > 0.0 and known[name] > 0.0)
+        self._described = known
+        self._tolerance = rig.tolerance
+        self.names = (*self.rig_names, "stribeck_tail", *_CHAIN)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def value(self, name: str, deviation: float) -> float:
+        """A number of the rig table at a deviation from its described value; never below a tenth of that."""
+        described = self._described[name]
+        return described * max(1.0 + self._tolerance[name] * deviation, 0.1)
+
+    def growth(self, name: str, deviation: float) -> float:
+        """By what share of its value a number of the rig table grows per tolerance, at a deviation."""
+        return self._tolerance[name] * self._described[name] / self.value(name, deviation)
+
+    def parameters(self, deviations: Floats) -> tuple[Parameter, ...]:
+        """The rig's numbers at these deviations, as the model has them, the shape of its Stribeck curve included."""
+        own = len(self.rig_names)
+        values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
+        values = self._described | values
+        values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
+        numbers = [
+            Parameter(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
+        ]
+        return (*numbers, Parameter("stribeck_tail", 0.0, _TAIL * float(deviations[own]), _TAIL))
+
+    def point(self, deviations: Floats, effects: Effects) -> Point:
+        """The model at these deviations, with these effects."""
+        own = len(self.rig_names)
+        values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
+        values["stribeck_tail"] = _TAIL * float(deviations[own])
+        chain: dict[str, float] = {}
+        for (name, (mean, spread)), deviation in zip(_CHAIN.items(), deviations[own + 1 :].tolist(), strict=True):
+            chain[name] = mean + spread * deviation
+            if name in _NOT_NEGATIVE:
+                chain[name] = max(chain[name], 0.0)
+        return Point(values, Chain(**chain), effects)

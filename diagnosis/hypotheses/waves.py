@@ -1,0 +1,222 @@
+"""Where to look for a wave: the periods that the scatter of the breakaways, the level of sliding and the drive position show.
+
+Only starting points for a refit come from here, never a verdict.
+"""
+
+from collections.abc import Mapping
+from itertools import combinations, pairwise
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.features.cycles import turning_points
+from diagnosis.features.feature import Scales
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.gap.prepare import Prepared
+from diagnosis.model.per_run import phase_of
+
+Floats = npt.NDArray[np.floating[Any]]
+_GRID = 1500
+_LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
+_LOBE = 10  # grid points within which peaks are one
+_TWO_WAVES = 3  # pairs of waves that are tried
+_STEEPEST = 0.8  # of a second harmonic, relative to the first
+
+
+class Wave(NamedTuple):
+    """ratio (sin a + second_sin sin 2a + second_cos cos 2a), a = 2 pi u / period + phase_rad, over a coordinate u."""
+
+    period: float
+    ratio: float
+    phase_rad: float
+    second_sin: float = 0.0
+    second_cos: float = 0.0
+    spread: float = 0.2  # of the period, relative: one standard deviation
+    phases_of: Mapping[str, float] = MappingProxyType(
+        {}
+    )  # in the runs after the first, where it begins in another phase there
+
+
+class Series(NamedTuple):
+    """A quantity along a coordinate; its mean is free."""
+
+    at: Floats
+    value: Floats  # relative to the mean of its stretch
+    weight: float = 1.0
+    run: str = ""  # file
+    of_slips: bool = False  # one value a breakaway; else as it goes on
+
+
+def friction_waves(runs: list[Prepared], scales: Scales, over: str, most: int, harmonics: int = 1) -> list[Wave]:
+    """The strongest waves of the friction over `position` [m] or `time` [s], two in each of `most` ranges of periods."""
+    return _strongest(friction_series(runs, scales, over), most, harmonics)
+
+
+def friction_waves_beside(runs: list[Prepared], scales: Scales, waves: list[Wave], at: tuple[float, ...]) -> list[Wave]:
+    """Waves along the track with their harmonic, at periods `at` so many spreads from those of `waves`, each in its own phase."""
+    series = friction_series(runs, scales, "position")
+    found: list[Wave] = []
+    for wave in waves:
+        periods = wave.period * (1.0 + wave.spread * np.array(at))
+        _, shares = fitted(series, periods, 2)
+        beside = zip(periods.tolist(), shares, strict=True)
+        found += [wave_of(period, own)._replace(spread=wave.spread) for period, own in beside]
+    return found
+
+
+def two_friction_waves(runs: list[Prepared], scales: Scales, most: int) -> list[tuple[Wave, Wave]]:
+    """The two waves of the friction along the track that take most together, of the strongest of each range of periods."""
+    series = friction_series(runs, scales, "position")
+    together = [_both(series, *two) for two in combinations(_strongest(series, most), 2)]
+    together.sort(key=lambda one: -one[0])
+    return [two for _, two in together[:_TWO_WAVES]]
+
+
+def _both(series: list[Series], first: Wave, second: Wave) -> tuple[float, tuple[Wave, Wave]]:
+    """What two waves take of the sum of squares together, and both as they are then."""
+    columns: list[Floats] = []
+    for one in series:
+        turns = [2.0 * np.pi * one.at / wave.period for wave in (first, second)]
+        own = np.column_stack([part(angle) for angle in turns for part in (np.sin, np.cos)])
+        columns.append(own - own.mean(axis=0))
+    stacked, value = np.concatenate(columns), np.concatenate([one.value for one in series])
+    shares = np.linalg.lstsq(stacked, value)[0]
+    found = [
+        wave_of(wave.period, own)._replace(spread=wave.spread)
+        for wave, own in zip((first, second), (shares[:2], shares[2:]), strict=True)
+    ]
+    found.sort(key=lambda wave: -wave.ratio)
+    return float(value @ (stacked @ shares)), (found[0], found[1])
+
+
+def friction_series(runs: list[Prepared], scales: Scales, over: str) -> list[Series]:
+    """Breakaways, or levels where nothing slips, over `position` [m] or `time` [s]; one series a segment."""
+    series: list[Series] = []
+    for run in runs:
+        force = run.signals.get("drive_force_N")
+        if force is None:
+            continue
+        blocks = np.arange(len(force))
+        if over == "position":
+            coordinate = run.signals.get("mass_position_m")
+            if coordinate is None:
+                path_m = np.cumsum(run.commands.drive) * BLOCK_S
+                coordinate = run.start.position_m + path_m - (force - force[0]) / scales.stiffness_N_per_m
+        else:
+            coordinate = (blocks + 0.5) * BLOCK_S
+        for segment in run.commands.segments:
+            own = slice(segment.first, segment.last)
+            cut = segment.sign * force[own]
+            tops, bottoms = turning_points(cut, scales.drop_N)
+            if len(bottoms) >= 2:
+                at = tops[: len(bottoms)]
+                series.append(Series(coordinate[own][at], cut[at] / cut[at].mean() - 1.0, run=run.file, of_slips=True))
+            elif len(tops) == 0 and len(cut) > 500:
+                # where nothing slips the slide moves evenly, once the climb to that level is over
+                even = cut[len(cut) // 3 :]
+                level = even[: len(even) // 20 * 20].reshape(-1, 20).mean(axis=1)
+                if np.ptp(level) < 0.2 * scales.force_N and level.mean() > 0.5 * scales.force_N:
+                    there = coordinate[own][len(cut) // 3 + 10 :: 20][: len(level)]
+                    series.append(Series(there, level / level.mean() - 1.0, run=run.file))
+    return series
+
+
+def drive_waves(runs: list[Prepared], over: str, most: int) -> list[Wave]:
+    """The strongest waves of the drive's velocity over its `position` [m] or `time` [s], relative to it, likewise."""
+    return _strongest(drive_series(runs, over), most, 2)
+
+
+def drive_series(runs: list[Prepared], over: str) -> list[Series]:
+    """The drive's velocity relative to its mean over its `position` [m] or `time` [s]; one series a segment."""
+    series: list[Series] = []
+    for run in runs:
+        position = run.signals.get("drive_position_m")
+        if position is None:
+            continue
+        for segment in run.commands.segments:
+            own = position[segment.first : segment.last]
+            whole = len(own) // 20 * 20
+            if whole < 400 or segment.drive_velocity_mps == 0.0:
+                continue
+            mean = own[:whole].reshape(-1, 20).mean(axis=1)
+            t_s = (segment.first + 10.0 + 20.0 * np.arange(len(mean))) * BLOCK_S
+            slope = np.gradient(mean, 20 * BLOCK_S) / segment.drive_velocity_mps
+            # noise of the position is the smaller in a relative velocity the faster the drive
+            speed_mm_per_s = 1e3 * abs(segment.drive_velocity_mps)
+            series.append(
+                Series(mean if over == "position" else t_s, slope / slope.mean() - 1.0, speed_mm_per_s, run.file)
+            )
+    return series
+
+
+def waves_apart(series: list[Series], runs: list[Prepared], most: int) -> list[Wave]:
+    """The strongest waves over time if each run may begin in another phase; none where no two runs show any."""
+    by_run = {run.file: [one for one in series if one.run == run.file] for run in runs}
+    if sum(bool(own) for own in by_run.values()) < 2:
+        return []
+    waves: list[Wave] = []
+    for wave in _strongest(series, most, apart=True):
+        first, *others = (
+            wave_of(wave.period, fitted(own, np.array([wave.period]))[1][0]) if own else wave for own in by_run.values()
+        )
+        ratio = float(np.sqrt(np.mean([one.ratio**2 for one in (first, *others)])))
+        phases_of = {phase_of(run.file): one.phase_rad for run, one in zip(runs[1:], others, strict=True)}
+        waves.append(wave._replace(ratio=ratio, phase_rad=first.phase_rad, phases_of=phases_of))
+    return waves
+
+
+def _strongest(series: list[Series], most: int, harmonics: int = 1, apart: bool = False) -> list[Wave]:
+    if not series:
+        return []
+    span = max(float(np.ptp(one.at)) for one in series)
+    spacing = min(float(np.median(np.abs(np.diff(one.at)))) for one in series)
+    if span <= 0.0 or spacing <= 0.0:
+        return []
+    reach = max(float(one.at.max()) for one in series) - min(float(one.at.min()) for one in series)
+    # what turns less than once is a drift
+    periods = np.geomspace(max(0.3 * spacing, span / 100.0), min(2.0 * span, reach), _GRID)
+    power, shares = fitted(series, periods, harmonics)
+    if apart:
+        runs = dict.fromkeys(one.run for one in series)
+        power = np.sum([fitted([one for one in series if one.run == run], periods)[0] for run in runs], axis=0)
+    # the best of every range of periods: short ones fit the few breakaways best whatever is there
+    edges = np.linspace(0, _GRID, most + 1).astype(np.int64)
+    best: list[int] = []
+    for first, last in pairwise(edges.tolist()):
+        peaks = [i for i in range(first, last) if power[i] == power[max(0, i - _LOBE) : i + _LOBE + 1].max()]
+        best += sorted(peaks, key=lambda i: -power[i])[:_LOBES]
+    waves = [wave_of(float(periods[i]), shares[i]) for i in best if power[i] > 0.0]
+    return [wave._replace(spread=min(0.5 * wave.period / reach, 0.2)) for wave in waves]
+
+
+def fitted(series: list[Series], periods: Floats, harmonics: int = 1) -> tuple[Floats, Floats]:
+    """Waves with up to two harmonics, fitted each alone.
+
+    Returns:
+        What each takes of the sum of squares [periods], and its shares of sine and cosine [periods, 2 x harmonics].
+
+    """
+    normal = np.zeros((len(periods), 2 * harmonics, 2 * harmonics))
+    right = np.zeros((len(periods), 2 * harmonics))
+    for one in series:
+        turns = 2.0 * np.pi * one.at / periods[:, None]
+        columns = np.stack([wave(k * turns) for k in range(1, harmonics + 1) for wave in (np.sin, np.cos)], axis=2)
+        columns = one.weight * (columns - columns.mean(axis=1, keepdims=True))
+        normal += columns.transpose(0, 2, 1) @ columns
+        right += one.weight * (one.value @ columns)
+    held = 1e-9 * np.trace(normal, axis1=1, axis2=2)
+    shares = np.linalg.solve(normal + held[:, None, None] * np.eye(2 * harmonics), right[..., None])[..., 0]
+    return np.sum(right * shares, axis=1), shares
+
+
+def wave_of(period: float, shares: Floats) -> Wave:
+    """The wave of one period with its shares of sine and cosine [2 x harmonics]."""
+    ratio, phase = float(np.hypot(*shares[:2])), float(np.arctan2(shares[1], shares[0]))
+    wave = Wave(period, ratio, phase)
+    if len(shares) == 4 and ratio > 0.0:
+        turned = complex(*shares[2:]) * np.exp(-2j * phase) / ratio
+        second = np.clip((turned.real, turned.imag), -_STEEPEST, _STEEPEST).tolist()
+        wave = wave._replace(second_sin=second[0], second_cos=second[1])
+    return wave

@@ -1,0 +1,169 @@
+"""The model beside the rig: one run predicted under the run's own commands, reduced to the 1 ms grid.
+
+The equations are the plant's own: with a force drive in its kernel, with a spring in `side_by_side`, many rigs at once. Its
+sensors' bandwidths are opened wide, since a manifest states none. Without vibration 70 us a step are enough: no feature differs
+by a third of a floor from 10 us (tests/truth/test_gap.py). With it, 16 steps a period: as near to 60 as 20 are (0.35 floors rms,
+as the phase decides when a slip comes), 14 are further (0.58).
+
+Every segment begins with the force that was measured there. In what phase of its cycle the slide is when the vibration changes is
+chance; it decides for seconds how the force settles where nothing slips any more, and how many slips a segment has.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.kernel import Record, kernel
+from bridge.wire.messages import CHANNELS
+from diagnosis.features.grid import BLOCK_S, SIGNALS
+from diagnosis.features.segments import Commands
+from diagnosis.model.four_rigs import advance_lanes
+from diagnosis.model.four_rigs_step import LANES
+from diagnosis.model.rig import Entry, Rig, Start, built
+from plant.config import RigConfig
+from plant.core import advance_disturbed
+from plant.records import TRUTH
+
+Floats = npt.NDArray[np.floating[Any]]
+
+# A force-driven model is held to the measured motion by a spring and a damper: this natural frequency, damped critically. Faster
+# follows the noise of the encoder, slower smears a reversal: errors of the friction show up to 10 Hz.
+_HOLDING_RAD_PER_S = 2.0 * math.pi * 10.0
+_RATE_FILTER_S = 3e-3  # of the damper: keeps 0.1 um of encoder noise to 0.2 N, turns the phase at 10 Hz by 11 degrees
+
+
+def predict(
+    config: RigConfig, force_driven: bool, commands: Commands, start: Start, entries: Sequence[Entry] = ()
+) -> dict[str, Floats]:
+    """Signals by name, [blocks] each, free of noise. With a force drive the motion says where the slide is, and no entry."""
+    (found,) = predict_many([config], force_driven, commands, [start], [entries])
+    assert found is not None, "what is wanted is predicted"  # noqa: S101
+    return found
+
+
+def predict_many(
+    configs: Sequence[RigConfig],
+    force_driven: bool,
+    commands: Commands,
+    starts: Sequence[Start],
+    entries: Sequence[Sequence[Entry]],
+    wanted: int | None = None,
+) -> list[dict[str, Floats] | None]:
+    """As `predict` for each of many rigs in the same run; their entries are in the same blocks.
+
+    With `wanted` the first so many are predicted, and of the others those that fill lanes left empty; the rest is None.
+    """
+    rigs = [built(config, force_driven, commands, start) for config, start in zip(configs, starts, strict=True)]
+    if force_driven:
+        return [dict(zip(SIGNALS, _led(rig, commands), strict=True)) for rig in rigs]
+    same_steps: dict[bytes, list[int]] = {}
+    for number, rig in enumerate(rigs):
+        same_steps.setdefault(rig.steps.tobytes(), []).append(number)
+    found: dict[int, Floats] = {}
+    for numbers in same_steps.values():
+        needed = len(numbers) if wanted is None else sum(number < wanted for number in numbers)
+        for group in (numbers[first : first + LANES] for first in range(0, needed, LANES)):
+            lanes = [*group, *[group[-1]] * (LANES - len(group))]
+            signals = _side_by_side([rigs[number] for number in lanes], commands, [entries[one] for one in lanes])
+            found |= zip(group, signals, strict=False)
+    return [dict(zip(SIGNALS, found[number], strict=True)) if number in found else None for number in range(len(rigs))]
+
+
+def _led(rig: Rig, commands: Commands) -> Floats:
+    """A rig with a force drive along the measured motion, [signals, blocks]."""
+    assert commands.motion is not None, "a force drive without a motion is refused when it is read"  # noqa: S101
+    params, state, steps = rig
+    p: Any = params[0]
+    out = np.empty((len(SIGNALS), len(commands.drive)))
+    scratch = int(steps.max())
+    analogue, truth = np.empty((len(CHANNELS), scratch)), np.empty((len(TRUTH), scratch))
+    stiffness = p.m * _HOLDING_RAD_PER_S**2
+    damping = 2.0 * p.m * _HOLDING_RAD_PER_S
+    _follow(
+        params, state, commands.drive, commands.frequency_Hz, commands.amplitude_m, steps,
+        analogue, truth, out, commands.motion.position_m, stiffness, damping,
+    )  # fmt: skip
+    return out
+
+
+def _side_by_side(rigs: Sequence[Rig], commands: Commands, entries: Sequence[Sequence[Entry]]) -> Floats:
+    """`LANES` rigs with the same steps through a run, [LANES, signals, blocks]."""
+    blocks = np.array([entry.block for entry in entries[0]], np.int64)
+    ages_s = [[math.nan if entry.age_s is None else entry.age_s for entry in own] for own in entries]
+    forces_N = [[entry.force_N for entry in own] for own in entries]
+    out = np.empty((LANES, len(SIGNALS), len(commands.drive)))
+    advance_lanes(
+        np.concatenate([rig.params for rig in rigs]), np.concatenate([rig.state for rig in rigs]),
+        commands.drive, commands.frequency_Hz, commands.amplitude_m, rigs[0].steps,
+        blocks, np.array(forces_N).T.copy(), np.array(ages_s).T.copy(), out,
+    )  # fmt: skip
+    return out
+
+
+@kernel
+def _predict(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    drive: Floats,
+    frequency_Hz: Floats,
+    amplitude_m: Floats,
+    steps: npt.NDArray[np.int64],
+    analogue: Floats,
+    truth: Floats,
+    out: Floats,
+) -> None:
+    p: Record = params[0]
+    for block in range(drive.shape[0]):
+        samples = steps[block]
+        p.samples_per_block = samples
+        p.steps_per_sample = 1
+        p.dt_s = BLOCK_S / samples
+        advance_disturbed(params, state, drive[block], frequency_Hz[block], amplitude_m[block],
+                          analogue[:, :samples], truth[:, :samples])  # fmt: skip
+        for row in range(5):
+            total = 0.0
+            for i in range(samples):
+                total += analogue[row, i]
+            out[row, block] = total / samples
+        for row in range(1, 3):
+            total = 0.0
+            for i in range(samples):
+                about = analogue[row, i] - out[row, block]
+                total += about * about
+            out[4 + row, block] = math.sqrt(total / samples)
+
+
+@kernel
+def _follow(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    force_N: Floats,
+    frequency_Hz: Floats,
+    amplitude_m: Floats,
+    steps: npt.NDArray[np.int64],
+    analogue: Floats,
+    truth: Floats,
+    out: Floats,
+    position_m: Floats,
+    stiffness: float,
+    damping: float,
+) -> None:
+    """As `_predict`, along a measured motion: the force of `out` is the one that keeps the model on it."""
+    s: Record = state[0]
+    own = np.empty((out.shape[0], 1))
+    force = np.empty(1)
+    ahead_before_m = position_m[0] - s.x
+    rate_mps = 0.0
+    share = 1.0 - math.exp(-BLOCK_S / _RATE_FILTER_S)
+    for block in range(force_N.shape[0]):
+        ahead_m = position_m[block] - s.x
+        rate_mps += share * ((ahead_m - ahead_before_m) / BLOCK_S - rate_mps)
+        ahead_before_m = ahead_m
+        force[0] = force_N[block] + stiffness * ahead_m + damping * rate_mps
+        _predict(params, state, force, frequency_Hz[block : block + 1], amplitude_m[block : block + 1],
+                 steps[block : block + 1], analogue, truth, own)  # fmt: skip
+        for row in range(out.shape[0]):
+            out[row, block] = own[row, 0]

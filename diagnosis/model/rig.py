@@ -1,0 +1,125 @@
+"""The rig that is predicted: its numbers, its effects, its start, its surface."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import Commands
+from plant.config import RigConfig
+from plant.effects.formulas import even_m, extension_m
+from plant.records import build
+
+Floats = npt.NDArray[np.floating[Any]]
+Effects = dict[str, dict[str, float | str]]
+# How old a contact is when a run begins, and the spread of its logarithm: from a stick that was under way to a quarter of an hour
+AGE_BEFORE_S, AGE_SPREAD = 10.0, 1.5
+_COARSEST_STEP_S = 7e-5
+_STEPS_PER_PERIOD = 16
+_CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiffness
+_LED_STEP_S = 1e-4  # its features are equal to 1e-3 N to those at 10 us
+
+
+class Start(NamedTuple):
+    """State of the rig at the first block; time counts from there, whatever the clock of the log says."""
+
+    force_N: float  # in the drive, spring-driven; in the contact otherwise
+    position_m: float
+    velocity_mps: float = 0.0
+    age_s: float = AGE_BEFORE_S
+    drive_m: float | None = None  # as the drive's own sensor has it, whose zero is not that of the slide's
+
+
+class Entry(NamedTuple):
+    """How a segment begins."""
+
+    block: int
+    force_N: float  # in the drive's spring
+    age_s: float | None  # of the contact, where the slide sticks; None: it slides on
+    from_before: bool = False  # it has stuck since before the run began: the age at the start comes on top
+
+
+class Rig(NamedTuple):
+    """Parameters and state at the start, as the plant's kernel wants them, and steps in every block."""
+
+    params: npt.NDArray[Any]
+    state: npt.NDArray[Any]
+    steps: npt.NDArray[np.int64]
+
+
+class Roughness(NamedTuple):
+    """A rough surface, one of many by its seed."""
+
+    ratio: float
+    length_m: float
+    seed: int
+
+
+def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughness: Roughness | None) -> RigConfig:
+    """The plant's configuration for a described rig with `values` in place of the described ones."""
+    value = {name: known for name, known in rig.values().items() if known is not None} | values
+    contact: dict[str, Any] = {
+        "stiffness_N_per_m": value["contact_stiffness_N_per_m"],
+        "damping_Ns_per_m": value["contact_damping_Ns_per_m"],
+        "viscous_damping_Ns_per_m": value["viscous_damping_Ns_per_m"],
+        "coulomb_force_N": value["coulomb_force_N"],
+        "static_force_N": max(value["static_force_N"], value["coulomb_force_N"]),
+        "stribeck_velocity_mps": value["stribeck_velocity_mps"],
+        "stribeck_tail": value.get("stribeck_tail", 0.0),
+    }
+    if roughness is not None:
+        contact |= {
+            "roughness_ratio": roughness.ratio,
+            "roughness_length_m": roughness.length_m,
+            "roughness_seed": roughness.seed,
+        }
+    table: dict[str, Any] = {"contact": contact, "slide": {"mass_kg": value["mass_kg"]}, "effects": effects}
+    if rig.drive == "spring":
+        table["drive"] = {
+            "stiffness_N_per_m": value["drive_stiffness_N_per_m"],
+            "damping_Ns_per_m": value["drive_damping_Ns_per_m"],
+        }
+    # the exciter of the evidence does as commanded, at once; an exciter that does not is a gap
+    table["piezo"] = {"amplitude_max_m": 1.0, "amplitude_slew_m_per_s": 0.0}
+    return RigConfig.model_validate(table)
+
+
+def built(config: RigConfig, force_driven: bool, commands: Commands, start: Start) -> Rig:
+    """A rig as the kernels want it, where a run begins."""
+    params, state = build(config)
+    p: Any = params[0]
+    p.force_keep = p.accel_keep = p.position_keep = 0.0
+    p.accel_highpass_keep = 1.0
+    p.frequency_min_Hz, p.frequency_max_Hz = 1.0, 1e9
+    p.force_driven = force_driven
+    p.disturbed = p.disturbed or force_driven
+    _set_start(p, state[0], start, force_driven)
+    contact_rad_per_s = math.sqrt(p.k_t / p.m)
+    coarsest_s = min(_LED_STEP_S if force_driven else _COARSEST_STEP_S, _CONTACT_STEP / contact_rad_per_s)
+    if p.base_m_per_N > 0.0:  # the bristle between slide and base: stable up to twice this
+        base_kg = 1.0 / (p.base_m_per_N * (2.0 * math.pi * p.base_Hz) ** 2)
+        coarsest_s = min(coarsest_s, math.sqrt(base_kg / p.k_t))
+    steps = np.maximum(
+        math.ceil(BLOCK_S / coarsest_s - 1e-9),
+        np.ceil(_STEPS_PER_PERIOD * commands.frequency_Hz * BLOCK_S - 1e-9),
+    ).astype(np.int64)
+    return Rig(params, state, steps)
+
+
+def _set_start(p: Any, s: Any, start: Start, force_driven: bool) -> None:
+    held_N = float(np.clip(start.force_N, -p.F_s, p.F_s))
+    s.x, s.v = start.position_m, start.velocity_mps
+    s.z = held_N / p.k_t
+    s.age_s = start.age_s
+    if not force_driven:
+        s.s_d = start.position_m + extension_m(p, held_N)
+        s.drive_N = held_N
+        s.frame_m = held_N * p.frame_m_per_N
+        s.base_m = held_N * p.base_m_per_N
+        s.s_d += s.frame_m
+        s.even_m = s.s_d
+        if start.drive_m is not None and p.ripple_wavelength_m > 0.0:
+            p.ripple_phase_rad += 2.0 * math.pi * (even_m(p, start.drive_m) - s.s_d) / p.ripple_wavelength_m

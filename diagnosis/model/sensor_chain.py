@@ -1,0 +1,126 @@
+"""What the sensors make of predicted signals: the faults of the library, and the small lags that no manifest states.
+
+The plant's kernel has the same effects, sample by sample; here they act on the 1 ms grid, after the kernel, so that a fault of a
+sensor costs no simulation. A slip lasts tens of blocks, so the grid resolves a lag far below 1 ms.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import lfilter
+
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.model.rig import Effects
+from plant.effects.library import EFFECTS, LAG_ORDERS
+
+Floats = npt.NDArray[np.floating[Any]]
+Signals = dict[str, Floats]
+SENSOR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_on == "sensor")
+
+
+class Chain(NamedTuple):
+    """Unstated but ordinary: what every measuring chain does a little."""
+
+    force_delay_s: float = 0.0
+    position_delay_s: float = 0.0
+    position_scale: float = 1.0
+    drive_slope: float = 0.0  # of the drive's displacement sensor against the slide's, at zero,
+    drive_bow_per_m: float = 0.0  # and how it changes along the track
+    accel_lowest_Hz: float = 0.0  # corner of the high-pass that every piezoelectric accelerometer is
+    accel_rolled_off: float = 0.0  # its gain is 1 / sqrt(1 + this (f / 10 kHz)^2)
+
+
+def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chain) -> Signals:
+    """Predicted signals as a chain with these faults would show them; new arrays, the input stays."""
+    result = dict(signals)
+    force_N = result["drive_force_N"]
+    t_s = (np.arange(len(force_N)) + 0.5) * BLOCK_S
+    delay_s = chain.force_delay_s
+    for name in SENSOR_EFFECTS:
+        if name not in effects:
+            continue
+        form = effects[name]["form"]
+        value = {key: float(number) for key, number in effects[name].items() if key != "form"}
+        if name == "force-sensor-lag":
+            for _ in range(LAG_ORDERS[str(form)]):
+                force_N = low_pass(force_N, value["lag_s"])
+        elif name == "force-sensor-delay":
+            delay_s += value["delay_s"]
+        elif name == "accelerometer-gain":
+            for which in ("mass", "base") if form == "both" else (str(form),):
+                for signal in (f"{which}_accel_mps2", f"{which}_shake_mps2"):
+                    result[signal] = result[signal] * (1.0 + value["ratio"])
+    force_N = delayed(force_N, delay_s)
+    result["drive_force_N"] = force_N * _force_gain(effects) + _force_offset_N(effects, t_s)
+    if chain.accel_lowest_Hz > 0.0:
+        memory_s = 0.5 / (np.pi * chain.accel_lowest_Hz)
+        for name in ("mass_accel_mps2", "base_accel_mps2"):
+            result[name] = result[name] - low_pass(result[name], memory_s)
+    gain = 1.0 / np.sqrt(1.0 + chain.accel_rolled_off * (frequency_Hz / 1e4) ** 2)
+    for name in ("mass_shake_mps2", "base_shake_mps2"):
+        result[name] = result[name] * gain
+    for name in ("mass_position_m", "drive_position_m"):
+        result[name] = chain.position_scale * delayed(result[name], chain.position_delay_s)
+    drive_m = result["drive_position_m"]
+    result["drive_position_m"] = drive_m + drive_m * (chain.drive_slope + chain.drive_bow_per_m * drive_m)
+    return result
+
+
+def true_force_N(reading_N: Floats, effects: Effects, t_s: Floats) -> Floats:
+    """What the force was when the sensor read this at the times `t_s`, of one shape; as if it had been constant before."""
+    return (reading_N - _force_offset_N(effects, t_s)) / _force_gain(effects)
+
+
+def _force_gain(effects: Effects) -> float:
+    return 1.0 + float(effects.get("force-sensor-gain", {}).get("ratio", 0.0))
+
+
+def _force_offset_N(effects: Effects, t_s: Floats) -> Floats:
+    """What the force sensor adds at the times `t_s`, of its shape."""
+    offset_N = np.full_like(t_s, float(effects.get("force-sensor-bias", {}).get("bias_N", 0.0)))
+    if "force-sensor-drift" in effects:
+        table = effects["force-sensor-drift"]
+        if table["form"] == "linear":
+            offset_N = offset_N + float(table["rate_N_per_s"]) * t_s
+        else:
+            offset_N = offset_N + float(table["drift_N"]) * (1.0 - np.exp(-t_s / float(table["settling_s"])))
+    return offset_N
+
+
+def delayed(values: Floats, delay_s: float) -> Floats:
+    """Shifted by a time of any sign, a cubic through the four blocks about each instant; level beyond the ends.
+
+    A straight line between blocks would smooth as well, like a slow sensor: up to 0.125 ms2 of `spring bend`, where a delay and
+    two equal low-passes of 1 ms differ by 0.25.
+    """
+    if delay_s == 0.0:
+        return values
+    whole = math.floor(delay_s / BLOCK_S)
+    f = delay_s / BLOCK_S - whole
+    later, earlier = max(whole + 2, 0), max(1 - whole, 0)
+    padded = np.concatenate([np.full(later, values[0]), values, np.full(earlier, values[-1])])
+    weights = (
+        -f * (f - 1.0) * (f - 2.0) / 6.0,
+        (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0,
+        -(f + 1.0) * f * (f - 2.0) / 2.0,
+        (f + 1.0) * f * (f - 1.0) / 6.0,
+    )
+    starts = range(later - whole + 1, later - whole - 3, -1)
+    terms = (weight * padded[start : start + len(values)] for weight, start in zip(weights, starts, strict=True))
+    return sum(terms, np.zeros(len(values)))
+
+
+def low_pass(values: Floats, lag_s: float) -> Floats:
+    """First-order low-pass by the trapezoidal rule, which is right up to the second derivative.
+
+    One that is exact for straight lines between blocks smooths by them as well: another 0.08 ms2 of `spring bend`.
+    """
+    if lag_s < 1e-9:
+        return values
+    turns = 2.0 * lag_s / BLOCK_S
+    now, keep = 1.0 / (1.0 + turns), (turns - 1.0) / (turns + 1.0)
+    # state: at rest on the first value
+    result, _ = lfilter([now, now], [1.0, -keep], values, zi=np.array([values[0] * (1.0 - now)]))
+    return np.asarray(result)

@@ -1,0 +1,45 @@
+"""What really acted on a force-driven axis: there the force sensor's faults, and the chain's delays, hide the input.
+
+The measured force is what `sensing.sensed` makes of the true one; here the way back.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
+
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import Commands
+from diagnosis.model.rig import Effects
+from diagnosis.model.sensor_chain import Chain, delayed, true_force_N
+
+Floats = npt.NDArray[np.floating[Any]]
+_DERIVATIVE_S = 2e-3  # over which the force is smoothed for what a low-pass has taken
+
+
+def relative(chain: Chain) -> Chain:
+    """The same chain in the time of its position sensor: along a measured motion only the difference of the delays shows."""
+    return chain._replace(force_delay_s=chain.force_delay_s - chain.position_delay_s, position_delay_s=0.0)
+
+
+def true_commands(commands: Commands, effects: Effects, chain: Chain) -> Commands:
+    """The commands with the true force and the true motion; `chain` as from `relative`."""
+    motion = commands.motion
+    assert motion is not None, "a force drive has a motion"  # noqa: S101
+    motion = motion._replace(position_m=motion.position_m / chain.position_scale)
+    return commands._replace(drive=_true_force(commands.drive, effects, chain), motion=motion)
+
+
+def _true_force(force_N: Floats, effects: Effects, chain: Chain) -> Floats:
+    force_N = true_force_N(force_N, effects, (np.arange(len(force_N)) + 0.5) * BLOCK_S)
+    delay_s = chain.force_delay_s
+    if "force-sensor-delay" in effects:
+        delay_s += float(effects["force-sensor-delay"]["delay_s"])
+    force_N = delayed(force_N, -delay_s)
+    if "force-sensor-lag" in effects:
+        table = effects["force-sensor-lag"]
+        for _ in range(1 if table["form"] == "first-order" else 2):
+            rate = gaussian_filter1d(force_N, _DERIVATIVE_S / BLOCK_S, order=1) / BLOCK_S
+            force_N = force_N + float(table["lag_s"]) * rate
+    return force_N

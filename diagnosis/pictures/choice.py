@@ -1,0 +1,53 @@
+"""The pictures of a diagnosis: cycles laid over their predictions, and residuals over what explains them."""
+
+from diagnosis.gap.problem import Point, Problem
+from diagnosis.pictures.cycles import Told, Version, force_picture, most_telling, slip_picture, slips_apart
+from diagnosis.pictures.residuals import Model, residual_pictures
+from diagnosis.result import Picture
+
+_MOST_RUNS = 5
+_SLIP_DIFFERS = 0.03  # of the slip: closer, a close-up shows nothing
+
+
+def pictures(
+    problem: Problem, nominal: Point, retuned: Point, named: Point | None, effects: tuple[str, ...]
+) -> tuple[Picture, ...]:
+    """At most ten pictures: of every run its most telling segment, slips close up where they differ, residuals.
+
+    Args:
+        named: the model with the named effects; None when none was named.
+        effects: the named effects.
+
+    """
+    models = [
+        Model("rig as described", "nominal", {run.file: problem.signals(run, nominal) for run in problem.runs}),
+        Model("retuned", "retuned", {run.file: problem.signals(run, retuned) for run in problem.runs}),
+    ]
+    if named is not None:
+        label = "with " + " and ".join(effects)
+        models.append(Model(label, "effect", {run.file: problem.signals(run, named) for run in problem.runs}))
+    rig = problem.rig.model_copy(
+        update={name: retuned.values[name] for name in problem.rig.tolerance if name in retuned.values}
+    )
+    residuals = residual_pictures(rig, problem.runs, problem.scales, models[1:], effects)
+    return (*_cycles(problem, models), *residuals)
+
+
+def _cycles(problem: Problem, models: list[Model]) -> list[Picture]:
+    told: list[Told] = []
+    for run in problem.runs:
+        versions = [Version("measured", "measured", run.signals)]
+        versions += [Version(model.label, model.style, model.signals[run.file]) for model in models]
+        if run.commands.segments:
+            told.append(most_telling(run, tuple(versions), problem.scales))
+    told.sort(key=lambda one: -one.apart)
+    told = sorted(told[:_MOST_RUNS], key=lambda one: one.run.file)
+    drawn = [force_picture(one, problem.scales) for one in told]
+    for name in ("drive_force_N", "mass_accel_mps2"):
+        with_it = [one for one in told if {"drive_force_N", name} <= one.run.signals.keys()]
+        if problem.rig.drive == "spring" and with_it:
+            best = max(with_it, key=lambda one: slips_apart(one, name, problem.scales))
+            picture = slip_picture(best, name, problem.scales)
+            if picture is not None and slips_apart(best, name, problem.scales) > _SLIP_DIFFERS:
+                drawn.append(picture)
+    return drawn

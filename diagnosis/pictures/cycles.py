@@ -1,0 +1,165 @@
+"""Measured cycles laid over predicted ones: of each run the segment in which they differ most."""
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.features.feature import Scales, Signals
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import Segment
+from diagnosis.features.slips import Slips
+from diagnosis.gap.prepare import Prepared
+from diagnosis.pictures.breakaways import slips_of
+from diagnosis.result import Curve, Picture
+
+Floats = npt.NDArray[np.floating[Any]]
+Style = Literal["measured", "nominal", "retuned", "effect"]
+_POINTS = 700
+_AXES = {"drive_force_N": "drive force [N]", "mass_accel_mps2": "acceleration of the mass [m/s²]"}
+
+
+class Version(NamedTuple):
+    """The signals of one run as measured or as one model predicts them."""
+
+    label: str
+    style: Style
+    signals: Signals
+
+
+class Told(NamedTuple):
+    """A segment of a run and how far measurement and retuned rig are apart there, in static friction forces."""
+
+    run: Prepared
+    segment: Segment
+    versions: tuple[Version, ...]  # the measured one first
+    apart: float
+
+
+def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -> Told:
+    """The segment of a run in which measured and retuned (or, without, nominal) differ most."""
+    against = next((one for one in versions if one.style == "retuned"), versions[-1])
+    best = Told(run, run.commands.segments[0], versions, -1.0)
+    for segment in run.commands.segments:
+        apart = _apart(versions[0].signals, against.signals, segment, scales)
+        # where details decide whether anything slips, or when, a difference says little
+        if segment.at_the_edge or not _cycles_there(versions[0].signals, segment, scales):
+            apart *= 0.3
+        if apart > best.apart:
+            best = Told(run, segment, versions, apart)
+    return best
+
+
+def _mean_of(cycles: int) -> str:
+    return f"mean of {cycles} cycles" if cycles > 1 else "one cycle"
+
+
+def _cycles_there(signals: Signals, segment: Segment, scales: Scales) -> bool:
+    """Whether nothing slips, or something twice."""
+    return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
+
+
+def _apart(measured: Signals, predicted: Signals, segment: Segment, scales: Scales) -> float:
+    if "drive_force_N" not in measured:
+        cut = slice(segment.first, segment.last)
+        return float(abs(measured["mass_accel_mps2"][cut].std() - predicted["mass_accel_mps2"][cut].std()))
+    return float(np.abs(_summary(measured, segment, scales) - _summary(predicted, segment, scales)).max())
+
+
+def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
+    """Breakaway, re-stick and mean level, in static friction forces, and a tenth of the logarithm of the period."""
+    force_N = signals["drive_force_N"]
+    slips = slips_of(signals, segment, scales)
+    level_N = segment.sign * float(force_N[segment.first : segment.last].mean())
+    if len(slips.tops) == 0:
+        return np.array([level_N, level_N, level_N, 0.0]) / scales.force_N
+    top_N = segment.sign * float(force_N[slips.tops].mean())
+    bottom_N = segment.sign * float(force_N[slips.bottoms].mean())
+    period = 0.1 * float(np.log(np.diff(slips.middles).mean() * BLOCK_S)) if len(slips.tops) > 1 else 0.0
+    return np.array([top_N, bottom_N, level_N, period * scales.force_N]) / scales.force_N
+
+
+def force_picture(told: Told, scales: Scales) -> Picture:
+    """The whole cycle, slip to slip, where every version has one; else the signal over time."""
+    name = "drive_force_N" if "drive_force_N" in told.run.signals else "mass_accel_mps2"
+    # with a force drive the force is no saw tooth and its phase is not free
+    if name == "drive_force_N" and told.segment.drive_velocity_mps != 0.0:
+        slips = [slips_of(version.signals, told.segment, scales) for version in told.versions]
+        if all(len(one.middles) >= 2 for one in slips):
+            curves = [_whole_cycle(version, found) for version, found in zip(told.versions, slips, strict=True)]
+            title = f"{_place(told)}: {_mean_of(len(slips[0].middles) - 1)} from slip to slip"
+            return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
+        if all(len(one.middles) == 1 for one in slips) or (
+            told.segment.first and all(len(one.middles) for one in slips)
+        ):
+            # the phase of stick-slip is free
+            zeros = [float(one.middles[0]) for one in slips]
+            title = f"{_place(told)}: first slips laid on each other"
+            curves = [_over_time(version, name, told, zero) for version, zero in zip(told.versions, zeros, strict=True)]
+            return Picture("cycle", title, "time after the middle of the first slip [ms]", _AXES[name], tuple(curves))
+    curves = [_over_time(version, name, told, None) for version in told.versions]
+    return Picture("cycle", f"{_place(told)}: over time", "time in the run [s]", _AXES[name], tuple(curves))
+
+
+def slip_picture(told: Told, name: str, scales: Scales) -> Picture | None:
+    """The mean slip close up; None where a version does not slip."""
+    curves: list[Curve] = []
+    reach = np.arange(-1.5, 2.5, 0.02, dtype=np.float64) * scales.slip_s / BLOCK_S
+    count = 0
+    for version in told.versions:
+        middles = slips_of(version.signals, told.segment, scales).middles
+        values = told.segment.sign * version.signals[name]
+        middles = middles[(middles + reach[0] >= 0.0) & (middles + reach[-1] <= len(values) - 1.0)]
+        if len(middles) == 0:
+            return None
+        count = count or len(middles)
+        blocks = np.arange(len(values), dtype=np.float64)
+        mean = np.mean([np.interp(middle + reach, blocks, values) for middle in middles], axis=0)
+        curves.append(Curve(version.label, reach * BLOCK_S * 1e3, mean, version.style))
+    title = f"{_place(told)}: mean of {count} slips, close up"
+    return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
+
+
+def slips_apart(told: Told, name: str, scales: Scales) -> float:
+    """How far measured and retuned differ in the mean slip, relative to the slip itself; 0 where one does not slip."""
+    picture = slip_picture(told, name, scales)
+    if picture is None:
+        return 0.0
+    measured = picture.curves[0].y
+    against = next((curve for curve in picture.curves if curve.style == "retuned"), picture.curves[-1]).y
+    return float((measured - against).std() / (measured.std() + 1e-12))
+
+
+def _whole_cycle(version: Version, slips: Slips) -> Curve:
+    """Every cycle stretched to the mean period, so that the slips at its ends stay sharp, and averaged."""
+    values = version.signals["drive_force_N"]
+    periods = np.diff(slips.middles)
+    share = np.linspace(-0.12, 1.12, _POINTS)
+    blocks = np.arange(len(values), dtype=np.float64)
+    cycles = [
+        np.interp(middle + share * period, blocks, values)
+        for middle, period in zip(slips.middles[:-1].tolist(), periods.tolist(), strict=True)
+    ]
+    return Curve(version.label, share * float(periods.mean()) * BLOCK_S * 1e3, np.mean(cycles, axis=0), version.style)
+
+
+def _over_time(version: Version, name: str, told: Told, zero: float | None) -> Curve:
+    """A whole segment, over time in the run [s] or after block `zero` [ms]."""
+    segment = told.segment
+    values = version.signals[name][segment.first : segment.last]
+    block = max(len(values) // _POINTS, 1)
+    whole = len(values) // block * block
+    mean = values[:whole].reshape(-1, block).mean(axis=1)
+    at = segment.first + (np.arange(len(mean), dtype=np.float64) + 0.5) * block
+    x = at * BLOCK_S if zero is None else (at - zero) * BLOCK_S * 1e3
+    return Curve(version.label, x, mean, version.style)
+
+
+def _place(told: Told) -> str:
+    segment = told.segment
+    words = [told.run.file.rsplit(".", 1)[0] + (" (kept for judging)" if told.run.holdout else "")]
+    if segment.drive_velocity_mps != 0.0:
+        words.append(f"{segment.drive_velocity_mps * 1e3:.3g} mm/s")
+    if segment.frequency_Hz > 0.0:
+        words.append(f"{segment.amplitude_m * 1e9:.3g} nm at {segment.frequency_Hz * 1e-3:.3g} kHz")
+    return ", ".join(words)

@@ -1,0 +1,105 @@
+"""How the mass and the spring of a reduced run move, from whatever channels it has; smooth derivatives on the 1 ms grid."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import Signals, scales_of
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.gap.prepare import Prepared
+from diagnosis.model.sensor_chain import low_pass
+
+Floats = npt.NDArray[np.floating[Any]]
+_SMOOTH_SHARE = 0.14  # sigma, of a slip: 5 ms on the paper's spring, where a slip keeps 90 % of its acceleration
+_SMOOTH_FREE = 5.0  # blocks, where no spring gives a time scale
+_BRISK = 0.4  # of it, for a first derivative
+_EDGE_BLOCKS = 100  # around a change of command, where a drive or a piezo may still be on its way
+_END_BLOCKS = 20
+_SLOW_S = 0.08  # accelerometers do not see what is slower than 0.5 Hz: compared above 2 Hz
+_MOVES_MPS = 2e-3
+
+
+def smoothing_blocks(rig: RigTable) -> float:
+    """Sigma by which signals are smoothed before they are compared."""
+    if rig.drive == "force":
+        return _SMOOTH_FREE
+    return float(np.clip(_SMOOTH_SHARE * scales_of(rig).slip_s / BLOCK_S, 1.0, 50.0))
+
+
+def derivative(values: Floats, smooth_blocks: float) -> Floats:
+    """Per s, smoothed."""
+    return np.asarray(np.gradient(gaussian_filter1d(values, smooth_blocks), BLOCK_S), np.float64)
+
+
+def second_derivative(values: Floats, smooth_blocks: float) -> Floats:
+    """Per s2, smoothed. By differences: the truncated kernel of a derivative does not forget an offset of 0.5 m."""
+    smooth = gaussian_filter1d(values, smooth_blocks, mode="nearest")
+    result = np.zeros_like(smooth)
+    result[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) / BLOCK_S**2
+    return result
+
+
+def without_slow(values: Floats) -> Floats:
+    """What is faster than 2 Hz."""
+    return values - low_pass(values, _SLOW_S)
+
+
+def kept_blocks(run: Prepared) -> npt.NDArray[np.bool_]:
+    """Blocks away from changes of command and from the ends of the run, [blocks]."""
+    commands = run.commands
+    changes = np.zeros(len(commands.drive))
+    if any(segment.drive_velocity_mps != 0.0 for segment in commands.segments):
+        for told in (commands.drive, commands.frequency_Hz, commands.amplitude_m):
+            changes[1:] += np.diff(told) != 0.0
+    kept = maximum_filter1d(changes, 2 * _EDGE_BLOCKS + 1) == 0.0
+    kept[:_END_BLOCKS] = kept[-_END_BLOCKS:] = False
+    return kept
+
+
+def with_drive_path(run: Prepared) -> Signals:
+    """The signals, with the commanded path in place of a drive position that was not measured."""
+    if "drive_position_m" in run.signals:
+        return run.signals
+    path_m = np.cumsum(run.commands.drive) * BLOCK_S
+    return run.signals | {"drive_position_m": path_m}
+
+
+def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
+    """What a residual can be drawn over, by name with unit, [blocks] each; what the channels do not tell is not there."""
+    signals = run.signals
+    blocks = len(run.commands.drive)
+    over: dict[str, Floats] = {"time_s": (np.arange(blocks, dtype=np.float64) + 0.5) * BLOCK_S}
+    spring = rig.drive == "spring"
+    brisk = _BRISK * smoothing_blocks(rig)
+    drive_m = with_drive_path(run)["drive_position_m"] if spring or "drive_position_m" in signals else None
+    if drive_m is not None:
+        over["drive_position_m"] = drive_m
+    position_m = signals.get("mass_position_m")
+    if position_m is None and spring and drive_m is not None and "drive_force_N" in signals:
+        position_m = drive_m - signals["drive_force_N"] / (rig.drive_stiffness_N_per_m or 1.0)
+    if position_m is not None:
+        velocity_mps = derivative(position_m, brisk)
+        over |= {"position_m": position_m, "velocity_mps": velocity_mps, "dwell_s": _since(velocity_mps)}
+        if drive_m is not None and spring:
+            extension_m = drive_m - position_m
+            force_N = signals.get("drive_force_N")
+            if force_N is not None:
+                # the zero is not known: as if the spring were right on average
+                extension_m = extension_m - extension_m.mean() + force_N.mean() / (rig.drive_stiffness_N_per_m or 1.0)
+            over["extension_m"] = extension_m
+            over["extension_rate_mps"] = derivative(extension_m, brisk)
+    if "drive_force_N" in signals:
+        over["force_N"] = signals["drive_force_N"]
+    if "mass_accel_mps2" in signals:
+        over["acceleration_mps2"] = gaussian_filter1d(signals["mass_accel_mps2"], brisk)
+    return over
+
+
+def _since(velocity_mps: Floats) -> Floats:
+    """Time since the mass last moved faster than 2 mm/s [s]; a slip of the paper's rig reaches 22."""
+    at = np.arange(len(velocity_mps), dtype=np.float64)
+    last = np.maximum.accumulate(np.where(np.abs(velocity_mps) > _MOVES_MPS, at, 0.0))
+    return (at - last) * BLOCK_S

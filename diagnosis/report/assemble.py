@@ -1,0 +1,206 @@
+"""From fits and a verdict to what is reported: candidates, cells, what the runs kept aside say, what to do next."""
+
+import math
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.log.finding import Finding
+from diagnosis.evidence.folder import Evidence
+from diagnosis.experiments.checks_by_hand import SINE, UNCOUPLE
+from diagnosis.experiments.proposal import next_experiment
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.segments import SHORTEST_S
+from diagnosis.fits.fit import Fit
+from diagnosis.fits.random_friction import is_random
+from diagnosis.gap.floor import Floor
+from diagnosis.gap.measure import DEFINITION, cell_names, cell_squares, differences
+from diagnosis.gap.prepare import Prepared
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.hypothesis import Axis
+from diagnosis.hypotheses.trials import Trial
+from diagnosis.model.per_run import is_phase
+from diagnosis.pictures.choice import pictures
+from diagnosis.report.summary import summary
+from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
+from diagnosis.verdict.blend import flexible_differences
+from diagnosis.verdict.confirmation import Outcome
+from diagnosis.verdict.held_out import Closed, HeldOut
+from diagnosis.verdict.judge import Verdict, refittable
+from diagnosis.verdict.lookalikes import imitators
+from diagnosis.verdict.selection import Contest
+
+Floats = npt.NDArray[np.floating[Any]]
+_MUCH_CHANGING = 0.2  # of a run: ramps of a drive and a piezo take less
+
+
+def assembled(
+    evidence: Evidence,
+    runs: list[Prepared],
+    contest: Contest,
+    outcome: Outcome,
+    tried: list[Trial],
+    began: float,
+    jobs: int,
+) -> Diagnosis:
+    """The diagnosis of an evidence.
+
+    Args:
+        evidence, runs: what was read, and its runs, those kept aside among them.
+        contest: what was fitted.
+        outcome: what came of it.
+        tried: the library's trials.
+        began: `time.monotonic()` when the work did.
+        jobs: processes.
+
+    """
+    fitter, retuned = contest.rig.fitter, contest.rig.fit
+    verdict, best, _, held_out = outcome
+    nuisances = fitter.nuisances
+    cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(retuned.deviations, {})))
+    judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
+    if held_out is not None:
+        cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
+        judged = _judged(contest, outcome, held_out, tried, jobs)
+    cells += _vibrating(evidence)
+    total = sum(cell.share for cell in cells)
+    where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
+    by_effect = {fit.form.effects[0]: fit for fit in reversed(contest.singles)}
+    if verdict.named is not None:
+        by_effect |= dict.fromkeys(verdict.named.form.effects, verdict.named)
+    elif verdict.ranked and is_random(verdict.ranked[0].fit.form):
+        by_effect[verdict.ranked[0].fit.form.effects[0]] = verdict.ranked[0].fit
+    alone = {"none": retuned.chi2} | {fit.form.effects[0]: fit.chi2 for fit in reversed(contest.singles)}
+    candidates = tuple(
+        _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
+        for name, probability in verdict.probabilities.items()
+    )
+    named = nuisances.point(best.deviations, best.effects) if verdict.named else None
+    effects = best.form.effects if verdict.named else ()
+    followed = [one for one in verdict.ranked if not is_random(one.fit.form)]
+    alike = imitators(fitter, followed, verdict.scale) if refittable(verdict) else ()
+    leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
+    if verdict.outside:
+        if any(run.pick_up for run in evidence.runs):
+            following = Experiment(UNCOUPLE, "No effect of the library makes the force signal vibrate so.", None)
+        else:
+            following = Experiment(SINE, "Every effect of the library shakes the base with a sine.", None)
+    else:
+        following = next_experiment(fitter.problem, nuisances, leaders)
+    done = Diagnosis(
+        verdict=verdict.kind,
+        effects=effects,
+        summary=(),
+        candidates=candidates,
+        not_distinguishable=(alike,) if alike else (),
+        where=tuple(where),
+        gap=judged,
+        next_experiment=following,
+        rig=nuisances.parameters(best.deviations),
+        findings=(*evidence.findings, *_changing(runs)),
+        pictures=pictures(
+            Problem(evidence.rig, runs),
+            nuisances.point(np.zeros(len(nuisances)), {}),
+            nuisances.point(retuned.deviations, {}),
+            named,
+            effects,
+        ),
+        compared_features=len(retuned.residual),
+        elapsed_s=time.monotonic() - began,
+    )
+    return done._replace(summary=summary(done))
+
+
+def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
+    """What is judged on the runs kept aside: what is named, or was until they refuted it (`gone`), then the runner-up."""
+    first, second = verdict.named or gone, verdict.runner_up
+    if first is None or second is None:
+        return [fit for fit in (first, second) if fit is not None]
+    again = first.form.effects == second.form.effects and not is_random(first.form)
+    return [first] if again else [first, second]
+
+
+def _judged(contest: Contest, outcome: Outcome, held_out: HeldOut, tried: list[Trial], jobs: int) -> Gap:
+    verdict, best, gone, _ = outcome
+    fitter, retuned = contest.rig.fitter, contest.rig.fit
+    closed = held_out.closed_by(best)
+    compared = [
+        _shrinkage(" and ".join(fit.form.effects), held_out.closed_by(fit)) for fit in compared_fits(verdict, gone)
+    ]
+    compared.append(_shrinkage("parameters alone", held_out.closed_by(retuned)))
+    blend = flexible_differences(fitter, retuned, tried, held_out, jobs)
+    compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))
+    named = verdict.named is not None
+    return Gap(
+        definition=DEFINITION,
+        runs=tuple(run.file for run in held_out.problem.runs),
+        nominal=held_out.nominal,
+        retuned=held_out.retuned,
+        with_effect=closed.gap,
+        floor=1.0,
+        shrinkage=closed.shrinkage if named else None,
+        interval_90=closed.interval_90 if named else None,
+        compared=tuple(compared),
+        refuted=verdict.refuted,
+    )
+
+
+def _changing(runs: list[Prepared]) -> Iterator[Finding]:
+    """What is not compared since speed or vibration do not stay the same for long enough: nothing else would tell."""
+    for run in runs:
+        seconds, length_s = run.commands.changing_s, len(run.commands.drive) * BLOCK_S
+        if seconds > _MUCH_CHANGING * length_s:
+            text = f"in {seconds:.3g} of {length_s:.3g} s speed or vibration change within {SHORTEST_S:g} s: not compared there"
+            yield Finding("changing", f"{run.file}: commands", f"{text}; hold each one longer")
+
+
+def _shrinkage(who: str, closed: Closed) -> Shrinkage:
+    return Shrinkage(who, closed.gap, closed.shrinkage, closed.interval_90)
+
+
+def _cells(floor: Floor, z: Floats) -> list[Cell]:
+    """Cells with what they hold above the floor; all that they hold where nothing is above it."""
+    squares = cell_squares(floor, z)
+    above = np.maximum(squares - floor.level**2, 0.0)
+    shares = above if above.sum() > 0.0 else squares
+    return [
+        Cell(signal, regime, band_Hz, run, float(share))
+        for (signal, regime, band_Hz, run), share in zip(cell_names(floor), shares, strict=True)
+        if share > 0.0
+    ]
+
+
+def _vibrating(evidence: Evidence) -> list[Cell]:
+    """Cells of what vibrates as no model does, in what is ordinary, as the others are in floors."""
+    found = [
+        (signal, run.file, one)
+        for run in evidence.runs
+        for signal, one in (("drive_force_N", run.pick_up), ("base_accel_mps2", run.distortion))
+    ]
+    return [Cell(signal, "steady", one.band_Hz, file, one.limits**2 - 1.0) for signal, file, one in found if one]
+
+
+def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
+    if fit is None:
+        return Candidate(name, probability)
+    own = len(fit.deviations)
+    deviation = np.sqrt(np.diag(fit.covariance()))[own:]
+    parameters = {
+        axis.name: estimate_of(axis, float(w), float(spread))
+        for axis, w, spread in zip(fit.form.axes, fit.w, deviation, strict=True)
+        if axis.effect == name
+    }
+    return Candidate(name, probability, fit.form.forms[name], parameters)
+
+
+def estimate_of(axis: Axis, w: float, deviation: float) -> Estimate:
+    """A parameter with its 90 % interval, from its coordinate and the standard deviation of that."""
+    value, half = axis.value(w), 1.645 * deviation
+    if is_phase(axis.name):  # round the value, and not round again where it passes pi
+        half = min(half * axis.scale, math.pi)
+        return Estimate(value, (value - half, value + half))
+    low, high = sorted((axis.value(w - half), axis.value(w + half)))
+    return Estimate(value, (low, high))

@@ -1,0 +1,164 @@
+"""The report of a diagnosis: one HTML file that needs nothing else, the answer first."""
+
+import math
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from bridge import units
+from bridge.files import write_whole
+from diagnosis.report import words
+from diagnosis.report.page_plots import STYLES, draw
+from diagnosis.result import Candidate, Cell, Diagnosis, Gap, Parameter
+
+_REGIMES = ("stick", "breakaway", "slip", "restick", "steady")
+_SMALL = 0.005  # a row of the map that no run brings above this is left out, and counted
+_SMALL_PROBABILITY = 0.015
+_BANNERS: Final = {"effect": "An effect was found", "no-gap": "No gap", "unexplained": "Unexplained gap"}
+
+
+class GapBar(NamedTuple):
+    """One bar of the gap chart; `width` in percent of the widest."""
+
+    label: str
+    value: float
+    width: float
+    colour: str
+
+
+class MapRow(NamedTuple):
+    """One row of the map: where, and its share in every run (None: no such cell)."""
+
+    signal: str
+    regime: str
+    band: str
+    shares: list[float | None]
+
+
+class RigRow(NamedTuple):
+    """One number of the rig, in words; `shift_sd` is None where it counts as known exactly or is not a number."""
+
+    name: str
+    described: str
+    retuned: str
+    tolerance: str
+    shift_sd: float | None
+
+
+def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path) -> None:
+    """Write the report to `path`, whole or not at all. Raises OSError when it cannot be written."""
+    write_whole(path, report_page(diagnosis, evidence_name))
+
+
+def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
+    """The report as text."""
+    from jinja2 import Environment, StrictUndefined  # noqa: PLC0415
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {
+        "percent": units.percent,
+        "times": units.times,
+        "interval": units.interval,
+        "sd": lambda shift: f"{shift:+.1f}",
+    }
+    template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
+    shown = [one for one in diagnosis.candidates if not one.probability < _SMALL_PROBABILITY]
+    runs, rows, left_out = where_map(diagnosis.where)
+    return environment.from_string(template).render(
+        diagnosis=diagnosis,
+        evidence_name=evidence_name,
+        banner=_BANNERS[diagnosis.verdict],
+        answer=words.answer(diagnosis),
+        shown=shown,
+        hidden=[one.effect for one in diagnosis.candidates if one.probability < _SMALL_PROBABILITY],
+        estimates=_estimates,
+        meaning=_meaning,
+        gap_bars=gap_bars(diagnosis.gap, bool(diagnosis.effects)),
+        floor_at=_floor_at(diagnosis.gap),
+        runs=runs,
+        rows=rows,
+        left_out=left_out,
+        strongest=max((share for row in rows for share in row.shares if share is not None), default=0.0),
+        largest=_cell_in_words(diagnosis.where[0]) if diagnosis.where else "",
+        drawn=draw(diagnosis.pictures),
+        rig=[rig_row(parameter) for parameter in diagnosis.rig],
+    )
+
+
+def _estimates(candidate: Candidate) -> list[str]:
+    return [words.estimate_in_words(name, estimate) for name, estimate in candidate.parameters.items()]
+
+
+def _meaning(effect: str) -> str:
+    """In plain words; empty for one that has no words here."""
+    return words.EFFECT_WORDS.get(effect, "")
+
+
+def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
+    """Rig as described, retuned, and with the effect if one is named; a bar that is no number has no width."""
+    bars = [("the rig as described", gap.nominal, "nominal"), ("retuned inside its tolerances", gap.retuned, "retuned")]
+    if named:
+        bars.append(("with the best explanation", gap.with_effect, "effect"))
+    widest = _widest(gap)
+    return [
+        GapBar(label, value, 100.0 * max(value, 0.0) / widest if math.isfinite(value) else 0.0, STYLES[style]["color"])
+        for label, value, style in bars
+    ]
+
+
+def _floor_at(gap: Gap) -> float | None:
+    return 100.0 * gap.floor / _widest(gap) if math.isfinite(gap.floor) else None
+
+
+def _widest(gap: Gap) -> float:
+    sizes = [gap.nominal, gap.retuned, gap.with_effect, gap.floor]
+    return max((size for size in sizes if math.isfinite(size) and size > 0.0), default=1.0)
+
+
+def where_map(cells: tuple[Cell, ...]) -> tuple[list[str], list[MapRow], float]:
+    """The runs, the rows that matter, and the share of all the rows that were left out."""
+    runs = sorted({cell.run for cell in cells})
+    table: dict[tuple[str, str, tuple[float, float]], dict[str, float]] = {}
+    for cell in cells:
+        shares = table.setdefault((cell.signal, cell.regime, cell.band_Hz), {})
+        shares[cell.run] = shares.get(cell.run, 0.0) + cell.share
+    rows: list[MapRow] = []
+    left_out = 0.0
+    for key in sorted(table, key=lambda key: (key[0], _place(key[1]), key[2])):
+        shares = table[key]
+        if not max(shares.values()) >= _SMALL:  # written so that NaN is left out too
+            left_out += sum(share for share in shares.values() if math.isfinite(share))
+        else:
+            rows.append(
+                MapRow(units.signal_name(key[0]), key[1], units.band(key[2]), [shares.get(run) for run in runs])
+            )
+    return runs, rows, left_out
+
+
+def _cell_in_words(cell: Cell) -> str:
+    place = f"{units.signal_name(cell.signal)}, {cell.regime}, {units.band(cell.band_Hz)}, {cell.run}"
+    return f"{units.percent(cell.share)} in {place}"
+
+
+def _place(regime: str) -> tuple[int, str]:
+    """The regimes in the order of a cycle, unknown ones last."""
+    return (_REGIMES.index(regime) if regime in _REGIMES else len(_REGIMES), regime)
+
+
+def rig_row(parameter: Parameter) -> RigRow:
+    """A number of the rig as the table shows it."""
+    name, unit = units.name_and_unit(parameter.name)
+    scale = (parameter.described or 1.0) * parameter.tolerance
+    shift: Any = (parameter.retuned - parameter.described) / scale if scale else None
+    return RigRow(
+        name,
+        units.quantity(parameter.described, unit),
+        units.quantity(parameter.retuned, unit),
+        _tolerance(parameter),
+        shift if shift is not None and math.isfinite(shift) else None,
+    )
+
+
+def _tolerance(parameter: Parameter) -> str:
+    if not parameter.tolerance:
+        return "known exactly"
+    return f"± {100.0 * parameter.tolerance:g} %" if parameter.described else f"± {parameter.tolerance:g}"

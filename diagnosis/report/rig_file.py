@@ -1,0 +1,114 @@
+"""A diagnosis turned into a rig file: the refitted numbers, and the named effects with their fitted parameters."""
+
+import math
+from pathlib import Path
+from typing import Any, Final
+
+from bridge.config import validate
+from bridge.faults import Fault
+from bridge.files import write_whole
+from diagnosis.evidence.folder import Evidence
+from diagnosis.model.per_run import as_in_rig_file
+from diagnosis.report.words import headline
+from diagnosis.result import Diagnosis
+from plant.config import RigConfig
+
+# of the evidence's rig table -> of a rig file
+_PLACES: Final = {
+    "mass_kg": ("slide", "mass_kg"),
+    "drive_stiffness_N_per_m": ("drive", "stiffness_N_per_m"),
+    "drive_damping_Ns_per_m": ("drive", "damping_Ns_per_m"),
+    "contact_stiffness_N_per_m": ("contact", "stiffness_N_per_m"),
+    "contact_damping_Ns_per_m": ("contact", "damping_Ns_per_m"),
+    "viscous_damping_Ns_per_m": ("contact", "viscous_damping_Ns_per_m"),
+    "coulomb_force_N": ("contact", "coulomb_force_N"),
+    "static_force_N": ("contact", "static_force_N"),
+    "stribeck_velocity_mps": ("contact", "stribeck_velocity_mps"),
+    "stribeck_tail": ("contact", "stribeck_tail"),
+}
+_DIGITS = 7
+
+
+def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
+    """Write the corrected rig to `path`, whole or not at all; `stickslip run --rig` reads it.
+
+    Raises Fault CONFIG where a diagnosis gives no rig that the plant can be, OSError when the file cannot be written.
+    """
+    refuse_force_drive(evidence)
+    name = evidence.folder.name
+    if diagnosis.verdict == "unexplained":
+        raise Fault(
+            "CONFIG",
+            f"{name}: the verdict is unexplained: there is no effect to apply; measure what the diagnosis suggests next, and "
+            "diagnose again",
+        )
+    table = rig_table(diagnosis, evidence)
+    validate(RigConfig, table, f"the rig diagnosed from {name}")
+    write_whole(path, _comment(diagnosis, evidence) + _toml(table))
+
+
+def refuse_force_drive(evidence: Evidence) -> None:
+    """Raise Fault CONFIG for a rig that no rig file can describe."""
+    name = evidence.folder.name
+    if evidence.rig.drive == "force":
+        raise Fault(
+            "CONFIG",
+            f'{name}: rig.drive = "force": no rig file can say that, the stand-in rig pulls through a spring; use the '
+            "parameters in the JSON of the diagnosis",
+        )
+
+
+def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
+    """The corrected rig as the tables of a rig file."""
+    values = {name: value for name, value in evidence.rig.values().items() if value is not None}
+    values |= {parameter.name: parameter.retuned for parameter in diagnosis.rig}
+    # refitted one by one they may cross; a contact cannot
+    values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
+    table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed"}
+    for name, (part, key) in _PLACES.items():
+        if name in values:
+            table.setdefault(part, {})[key] = values[name]
+    effects: dict[str, dict[str, float | str]] = {}
+    for name in diagnosis.effects:
+        candidate = next(one for one in diagnosis.candidates if one.effect == name)
+        effects[name] = {"form": candidate.form} if candidate.form else {}
+        effects[name] |= as_in_rig_file({key: estimate.value for key, estimate in candidate.parameters.items()})
+    return table | {"effects": effects} if effects else table
+
+
+def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
+    lines = [f"Written by `stickslip diagnose` from the evidence {_word(evidence.folder.name)}."]
+    if diagnosis.effects:
+        lines.append(f"Verdict: {headline(diagnosis)}.")
+    else:
+        lines.append("Verdict: no gap: the rig as described, refitted inside its tolerances.")
+    gap = diagnosis.gap
+    if gap.runs and math.isfinite(gap.with_effect):
+        lines.append(
+            f"Gap on runs kept for judging, in noise floors: {gap.nominal:.3g} as described, {gap.with_effect:.3g} so."
+        )
+    lines += [f"The runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
+    lines.append("What is left out is the paper's rig: piezo, sensors and drive profile.")
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def _toml(table: dict[str, Any]) -> str:
+    lines = [f'name = "{table["name"]}"']
+    for part in ("contact", "slide", "drive"):
+        lines += ["", f"[{part}]", *(_line(key, value) for key, value in table[part].items())]
+    for name, values in table.get("effects", {}).items():
+        lines += ["", f"[effects.{name}]", *(_line(key, value) for key, value in values.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _line(key: str, value: float | str) -> str:
+    if isinstance(value, str):
+        return f'{key} = "{value}"'
+    text = f"{value:.{_DIGITS}g}"
+    # TOML takes 1e5 and 1.0 for floats and 1 for an integer
+    return f"{key} = {text}" if any(mark in text for mark in ".e") else f"{key} = {text}.0"
+
+
+def _word(text: str) -> str:
+    """A folder's name without what a quoted name or a comment cannot hold."""
+    return "".join(letter if letter.isprintable() and letter not in '"\\' else "-" for letter in text) or "evidence"

@@ -1,0 +1,127 @@
+"""The answer in plain words, the first sentence first."""
+
+import math
+
+from bridge.units import percent, signal_name, times
+from diagnosis.evidence.exciter_harmonics import DISTORTED
+from diagnosis.evidence.force_pickup import PICK_UP
+from diagnosis.model.per_run import has_own_phases
+from diagnosis.report.words import EFFECT_WORDS, cannot_tell, estimate_in_words
+from diagnosis.result import Diagnosis
+from diagnosis.verdict.held_out import MORE_THAN_RIGHT
+
+_SMALL_SHARE = 0.05
+
+
+def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Sentences for a person at the machine."""
+    gap, unexplained = diagnosis.gap, diagnosis.verdict == "unexplained"
+    sentences: list[str] = []
+    if diagnosis.verdict == "no-gap":
+        if cannot_tell(diagnosis):
+            sentences.append(
+                "These runs cannot tell: nothing beyond the stated tolerances shows in those that were fitted, yet what was "
+                f"kept aside is {times(gap.retuned)} noise floors off."
+            )
+        else:
+            sentences.append("No gap beyond the stated tolerances: the rig as described explains these runs.")
+        sentences.append(
+            "An effect too small to show here is not excluded, and the probabilities leave room for it: in sealed tests more "
+            "than a quarter of the rigs without a visible gap had one."
+        )
+    elif unexplained:
+        sentences.append("There is a gap, and nothing in the library explains it.")
+        if gap.refuted:
+            names = " and ".join(gap.refuted)
+            with_it = next(one.gap for one in gap.compared if one.who == names)
+            explain, it = ("explains", "it") if len(gap.refuted) == 1 else ("explain", "them")
+            sentences.append(
+                f"{names} {explain} the runs that were fitted, but not {', '.join(gap.runs)}, kept aside: "
+                f"there the gap is {times(with_it)} noise floors with {it}, {times(gap.retuned)} without."
+            )
+        nearest = next((one for one in diagnosis.candidates if one.effect not in ("none", "unexplained")), None)
+        if nearest is not None and nearest.form == "random":
+            sentences.append(
+                f"It scatters as {nearest.effect} at random would (probability {percent(nearest.probability)}), and as bursts "
+                "of debris or a tilted track would: no path can be told from these runs."
+            )
+    still = [finding.where.partition(":")[0] for finding in diagnosis.findings if finding.kind == "still"]
+    if still:
+        sentences.append(f"In {', '.join(still)} the drive stands still: friction and drive are not tested there.")
+    vibrating = [finding for finding in diagnosis.findings if finding.kind in (PICK_UP, DISTORTED)]
+    for kind in dict.fromkeys(finding.kind for finding in vibrating):
+        first, *more = (finding for finding in vibrating if finding.kind == kind)
+        others = ", ".join(finding.where.partition(":")[0] for finding in more)
+        sentences.append(f"{first.where} {first.text}." + (f" So in {others}." if others else ""))
+    if gap.runs and math.isfinite(gap.nominal):
+        sentences.append(
+            f"On {', '.join(gap.runs)}, kept aside, rig and model are {times(gap.nominal)} noise floors apart as described, and "
+            f"{times(gap.retuned)} after refitting the rig's numbers inside their tolerances; 1 is a perfect model."
+            + (
+                " So the gap shows in the fitted runs alone."
+                if unexplained and not vibrating and gap.retuned <= 1.0
+                else ""
+            )
+        )
+    if diagnosis.where and diagnosis.verdict != "no-gap":
+        sentences.append(_where(diagnosis))
+    sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
+    for i, name in enumerate(diagnosis.effects):
+        candidate = next(one for one in diagnosis.candidates if one.effect == name)
+        numbers = ", ".join(estimate_in_words(*item) for item in candidate.parameters.items())
+        says = "explains it" if i == 0 else "is needed besides"
+        if len(diagnosis.effects) > 1 and i == 0:
+            says = f"explains it together with {diagnosis.effects[1]}"
+        sentences.append(
+            f"{name} {says}"
+            + (f" (probability {percent(sure)})" if i == 0 else "")
+            + f": {EFFECT_WORDS[name]}"
+            + (f"; {numbers}." if numbers else ".")
+        )
+        if candidate.form == "random":
+            sentences.append("It varies at random and is known by what it scatters, not by its path.")
+        if has_own_phases(candidate.parameters):
+            sentences.append("It begins in another phase in every run, so it is scatter where its phase is not known.")
+    sentences += [f"These runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
+    if gap.runs and math.isfinite(gap.retuned):
+        kept = ", ".join(gap.runs)
+        if gap.shrinkage is not None and gap.with_effect > gap.retuned:
+            sentences.append(
+                f"On {kept}, kept aside, the gap grows from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
+                "nothing of it is closed there."
+            )
+        elif gap.shrinkage is not None:
+            low, high = gap.interval_90 or (math.nan, math.nan)
+            between = f" (90 %: {percent(low)} to {percent(high)})" if math.isfinite(low) else ""
+            sentences.append(
+                f"On {kept}, kept aside, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
+                f"{percent(gap.shrinkage)} of what could be closed{between}."
+            )
+        elif diagnosis.effects:
+            sentences.append(f"On {kept}, kept aside, there is no gap to close: new data have not tested the name.")
+        if diagnosis.effects and gap.with_effect > MORE_THAN_RIGHT:
+            sentences.append(
+                f"A right explanation leaves about 1 there, not {times(gap.with_effect)}: something else acts as well, if only "
+                "a surface rougher than ground steel, or the cause is another one."
+            )
+    else:
+        why = f"In {', '.join(gap.runs)}, kept aside, nothing can be compared" if gap.runs else "No run was kept aside"
+        sentences.append(f"{why}: how far the gap closes on new data is not known.")
+    if diagnosis.verdict != "no-gap" or diagnosis.next_experiment.gain is not None:
+        sentences.append(f"Next: {diagnosis.next_experiment.what}")
+    return tuple(sentences)
+
+
+def _where(diagnosis: Diagnosis) -> str:
+    by_signal: dict[str, float] = {}
+    by_regime: dict[tuple[str, str], float] = {}
+    for cell in diagnosis.where:
+        by_signal[cell.signal] = by_signal.get(cell.signal, 0.0) + cell.share
+        key = (cell.signal, cell.regime)
+        by_regime[key] = by_regime.get(key, 0.0) + cell.share
+    signal, share = max(by_signal.items(), key=lambda item: item[1])
+    regimes = sorted(((value, regime) for (own, regime), value in by_regime.items() if own == signal), reverse=True)
+    shown = ", ".join(f"{percent(value)} at {regime}" for value, regime in regimes[:2] if value > _SMALL_SHARE)
+    return f"The gap is mostly in the {signal_name(signal)}, {percent(share)} of it" + (
+        f" ({shown})." if shown else "."
+    )

@@ -1,0 +1,121 @@
+"""One run of a made-up rig: from a random start, through its plan, to the columns of its file."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.wire.messages import CHANNELS
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.synthetic.protocols import AxisPlan, RunPlan
+from diagnosis.synthetic.sensors import Chain, measured
+from plant.config import RigConfig
+from plant.core import advance_disturbed
+from plant.effects.formulas import even_m, extension_m
+from plant.records import TRUTH, build
+from plant.simulate import run_blocks
+
+Floats = npt.NDArray[np.float64]
+Columns = dict[str, npt.NDArray[Any]]
+
+_SAME_PLACE_M = 2e-5  # how well a slide goes back to where it started
+_PRIMER_M = 1e-15  # an amplitude that nothing notices
+
+
+class MadeRig(NamedTuple):
+    """The rig that is there."""
+
+    config: RigConfig
+    chain: Chain
+    rate_Hz: float  # of the simulation
+    average: int  # samples of it that make one of the record
+
+
+def spring_run(random: np.random.Generator, rig: MadeRig, plan: RunPlan, start_m: float) -> Columns:
+    """Drag the slide through a spring, from about `start_m` on."""
+    params, state = build(rig.config)
+    blocks = round(plan.duration_s / BLOCK_S)
+    force_N = random.uniform(0.3, 0.95) * float(params[0].F_c)
+    _at_rest(random, params, state, force_N, start_m + random.normal(0.0, _SAME_PLACE_M))
+    points = np.array(plan.velocity)
+    velocity_mps = np.interp(np.arange(blocks) * BLOCK_S, points[:, 0], points[:, 1])
+    frequency_Hz, amplitude_m = np.zeros(blocks), np.zeros(blocks)
+    for step in plan.vibration:
+        at = round(step.from_s / BLOCK_S)
+        frequency_Hz[at:], amplitude_m[at:] = step.frequency_Hz, step.amplitude_m
+    analogue = np.empty((len(CHANNELS), blocks * round(rig.rate_Hz * BLOCK_S)))
+    truth = np.empty((len(TRUTH), analogue.shape[1]))
+    told_Hz, told_m = _primed(random, frequency_Hz, amplitude_m)
+    run_blocks(params, state, velocity_mps, told_Hz, told_m, analogue, truth)
+    rows = _averaged(measured(random, rig.chain, analogue, rig.rate_Hz), rig.average)
+    columns: Columns = {"t_s": np.arange(rows.shape[1]) * rig.average / rig.rate_Hz}
+    columns |= {name: values.astype(np.float32) for name, values in zip(CHANNELS, rows, strict=True)}
+    if plan.vibration:
+        block = (columns["t_s"] / BLOCK_S + 1e-6).astype(np.int64)
+        columns["vibration_frequency_Hz"] = frequency_Hz[block]
+        columns["vibration_amplitude_m"] = amplitude_m[block]
+    return columns
+
+
+def axis_run(random: np.random.Generator, rig: MadeRig, plan: AxisPlan) -> Columns:
+    """Let a motor with a PD controller move the mass to and fro; every row is a sample of its controller.
+
+    The force of a row acts from its time to that of the next one.
+    """
+    params, state = build(rig.config)
+    p: Any = params[0]
+    p.disturbed = p.force_driven = 1
+    blocks = round(plan.duration_s / BLOCK_S)
+    middle_m = random.uniform(0.4, 0.6) * float(p.position_range_m)
+    _at_rest(random, params, state, 0.0, middle_m + random.normal(0.0, 1e-3))
+    t_s = np.arange(blocks) * BLOCK_S
+    swing_m = np.zeros(blocks)
+    for size_m, frequency_Hz in plan.sines:
+        swing_m += size_m * np.sin(2.0 * math.pi * frequency_Hz * t_s + random.uniform(0.0, 2.0 * math.pi))
+    # out of rest without a jerk
+    wanted_m = middle_m + swing_m * np.square(np.sin(0.5 * math.pi * np.minimum(t_s / 1.5, 1.0)))
+    omega = 2.0 * math.pi * 3.0  # of the closed loop, well damped
+    stiffness_N_per_m, damping_Ns_per_m = float(p.m * omega * omega), float(1.4 * p.m * omega)
+    limit_N = 0.8 * float(p.force_range_N)
+    samples = round(rig.rate_Hz * BLOCK_S)
+    analogue, truth = np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples))
+    rows = np.empty((len(CHANNELS), blocks))
+    wanted_mps = np.gradient(wanted_m, BLOCK_S)
+    s: Any = state[0]
+    for block in range(blocks):
+        force_N = stiffness_N_per_m * (wanted_m[block] - s.x) + damping_Ns_per_m * (wanted_mps[block] - s.v)
+        rows[3, block] = s.mass_position_f
+        advance_disturbed(params, state, min(max(float(force_N), -limit_N), limit_N), 0.0, 0.0, analogue, truth)
+        rows[:3, block] = analogue[:3, -1]
+    rows[4] = rows[3]
+    columns: Columns = {"t_s": t_s}
+    seen = measured(random, rig.chain, rows, 1.0 / BLOCK_S)
+    return columns | {"drive_force_N": seen[0].astype(np.float32), "mass_position_m": seen[3].astype(np.float32)}
+
+
+def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: float, position_m: float) -> None:
+    """A slide that rests under a spring force, with every memory of the rig where it would then be."""
+    p, s = params[0], state[0]
+    s.x, s.z = position_m, force_N / p.k_t
+    s.age_s = random.uniform(1.0, 30.0)
+    s.frame_m, s.base_m = force_N * p.frame_m_per_N, force_N * p.base_m_per_N
+    s.s_d = position_m + s.frame_m + extension_m(p, force_N)
+    s.even_m = even_m(p, s.s_d)
+    s.drive_N = s.force_f = force_N
+    s.force_lag[:] = force_N
+    s.delay_line[:] = force_N
+    s.mass_position_f, s.drive_position_f = s.x, s.s_d
+
+
+def _primed(random: np.random.Generator, frequency_Hz: Floats, amplitude_m: Floats) -> tuple[Floats, Floats]:
+    """What the piezo is told, with one block of next to nothing before each start that turns its phase at random."""
+    told_Hz, told_m = frequency_Hz.copy(), amplitude_m.copy()
+    for start in np.flatnonzero((amplitude_m[1:] > 0.0) & (amplitude_m[:-1] == 0.0)):
+        told_Hz[start] = random.uniform(0.5, 1.5) / BLOCK_S
+        told_m[start] = _PRIMER_M
+    return told_Hz, told_m
+
+
+def _averaged(rows: Floats, average: int) -> Floats:
+    return rows if average == 1 else rows.reshape(len(rows), -1, average).mean(axis=2)

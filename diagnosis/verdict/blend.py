@@ -1,0 +1,51 @@
+"""The flexible residual: every effect of the library at once, in its first form, blended linearly with a ridge.
+
+It names nothing; it says how far the gap could be closed by something as free as this. What a named effect closes is measured
+against it.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.fits.fit import Fit
+from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.fits.screening import Directions
+from diagnosis.hypotheses.trials import Trial
+from diagnosis.processes import each
+from diagnosis.verdict.held_out import HeldOut
+
+Floats = npt.NDArray[np.floating[Any]]
+_STEP = 0.5  # of a nuisance's tolerance
+
+
+def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
+    """Differences on the held-out runs in floors [compared] under the blend that was fitted to the others."""
+    trials = list({trial.form.effects: trial for trial in reversed(trials)}.values())
+    directions = Directions(base, fitter.most)
+    here = fitter.predicted(base.deviations, {})
+    _, slope = fitter.whitened(here)
+    shown = each(jobs, _shown, fitter, [(base.deviations, trials[i::jobs]) for i in range(jobs)])
+    columns = [fitter.column(here, shown[i % jobs][i // jobs], slope) for i in range(len(trials))]
+    free = np.stack([directions.freed(column) for column in columns], axis=1)
+    shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
+    blended = np.stack(columns, axis=1) @ shares
+    moved = directions.moved(blended, 1.0) - base.deviations
+    points = [fitter.nuisances.point(base.deviations, {})]
+    points += [fitter.nuisances.point(base.deviations, trial.form.tables(trial.w)) for trial in trials]
+    points += [fitter.nuisances.point(ahead, {}) for ahead in base.deviations + _STEP * np.eye(len(moved))]
+    unseen, *others = held_out.problem.predicted_many(points)
+    total = unseen.copy()
+    for share, there in zip([*shares, *(moved / _STEP)], others, strict=True):
+        total += share * _finite(there - unseen)
+    return held_out.differences_of(total)
+
+
+def _shown(fitter: Fitter, work: tuple[Floats, list[Trial]]) -> list[Floats]:
+    deviations, trials = work
+    return fitter.predicted_many([(deviations, trial.form.tables(trial.w)) for trial in trials])
+
+
+def _finite(values: Floats) -> Floats:
+    return np.where(np.isfinite(values), values, 0.0)

@@ -1,0 +1,127 @@
+"""Export: every value of a log comes back from every format."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow
+import pyarrow.csv
+import pyarrow.parquet
+import pytest
+import scipy.io
+from typer.testing import CliRunner
+
+from bridge.faults import Fault
+from bridge.log.logfile import STREAMING, LogReader, iter_pieces, read_run
+from bridge.tables.export import export
+from bridge.wire.messages import CHANNELS
+from cockpit.commands.log import log_app
+from tests.logs import short_log
+
+ALL = list(STREAMING)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(short_log())
+    return path
+
+
+def columns_of(suffix: str, to: Path, topic: str) -> dict[str, Any]:
+    if suffix == ".mat":
+        struct = scipy.io.loadmat(to, squeeze_me=True, struct_as_record=False)[topic]
+        return {name: getattr(struct, name) for name in struct._fieldnames}
+    path = to.with_name(f"{to.stem}.{topic}{suffix}")
+    # numbers of blocks go up to 2^64 - 1, which a reader that guesses takes for floating point
+    types = pyarrow.csv.ConvertOptions(column_types={"command_block": pyarrow.uint64()})
+    table = (
+        pyarrow.parquet.read_table(path) if suffix == ".parquet" else pyarrow.csv.read_csv(path, convert_options=types)
+    )
+    return {name: table.column(name).to_numpy() for name in table.column_names}
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv", ".mat"])
+def test_every_value_comes_back(log: Path, tmp_path: Path, suffix: str) -> None:
+    to = tmp_path / f"out{suffix}"
+    shares: list[float] = []
+    written = export(log, to, ALL, progress=shares.append)
+    run = read_run(log)
+    for topic in ALL:
+        expected = getattr(run, topic)
+        found = columns_of(suffix, to, topic)
+        for name in expected.dtype.names:
+            if topic == "sensors" and name not in CHANNELS:
+                continue
+            # a CSV file holds a float32 in as few digits as tell it from all others
+            assert (found[name].astype(expected[name].dtype) == expected[name].ravel()).all(), name
+        assert len(found["t_s"]) == written.rows[topic]
+    t_s = columns_of(suffix, to, "sensors")["t_s"]
+    assert t_s == pytest.approx(np.arange(1, 8001) / 20000, abs=1e-12)
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1.0
+    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob("*.columns"))
+
+
+def test_units_are_told(log: Path, tmp_path: Path) -> None:
+    export(log, tmp_path / "one.parquet", ["sensors"])
+    schema = pyarrow.parquet.read_schema(tmp_path / "one.parquet")
+    assert schema.field("mass_accel_mps2").metadata[b"unit"] == b"m/s^2"
+    export(log, tmp_path / "all.mat", ALL)
+    units = scipy.io.loadmat(tmp_path / "all.mat", squeeze_me=True, struct_as_record=False)["units"]
+    assert units.sensors.drive_force_N == "N"
+    assert units.trace.slips == "1"
+    assert units.trace.vibration_velocity_mps == "m/s"
+
+
+def test_only_the_wanted_time(log: Path, tmp_path: Path) -> None:
+    written = export(log, tmp_path / "part.parquet", ["sensors", "trace"], 0.1, 0.2)
+    t_s = pyarrow.parquet.read_table(tmp_path / "part.sensors.parquet").column("t_s").to_numpy()
+    assert t_s.min() == pytest.approx(0.1)
+    assert t_s.max() < 0.2
+    assert written.rows == {"sensors": 2000, "trace": 100}
+
+
+def test_nothing_in_that_time(log: Path, tmp_path: Path) -> None:
+    for suffix in (".parquet", ".mat", ".csv"):
+        assert export(log, tmp_path / f"none{suffix}", ALL, 5.0, 6.0).files == []
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap"]
+
+
+@pytest.mark.parametrize(
+    ("to", "topics", "times", "expected"),
+    [
+        ("a.xls", ["sensors"], (0, 1), "--to"),
+        ("a.csv", ["sensor"], (0, 1), "--topic sensor: no streaming topic; known: sensors, applied"),
+        ("a.csv", ["sensors"], (1, 1), "--from 1 --until 1"),
+        ("run.mcap/a.csv", ["sensors"], (0, 1), "choose another --to"),
+    ],
+)
+def test_a_wrong_request_is_one_clear_line(
+    log: Path, to: str, topics: list[str], times: tuple[float, float], expected: str
+) -> None:
+    with pytest.raises(Fault) as caught:
+        export(log, log.parent / to, topics, *times)
+    assert expected in caught.value.line
+
+
+def test_tables_chunk_by_chunk_are_the_whole_run(log: Path) -> None:
+    pieces: dict[str, list[bytes]] = {name: [] for name in STREAMING}
+    for piece in iter_pieces(LogReader(log)):
+        if piece.topic in STREAMING:
+            pieces[piece.topic].append(piece.records.tobytes())
+    run = read_run(log)
+    assert len(pieces["sensors"]) > 5
+    for name in STREAMING:
+        assert b"".join(pieces[name]) == getattr(run, name).tobytes()
+
+
+def test_the_command(log: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        log_app, ["export", str(log), "--to", str(tmp_path / "x.csv"), "--topic", "trace", "--json"]
+    )
+    assert result.exit_code == 0
+    assert '"rows": {"trace": 400}' in result.stdout
+    result = CliRunner().invoke(log_app, ["export", str(tmp_path / "no.mcap"), "--to", str(tmp_path / "x.csv")])
+    assert result.exit_code == 7

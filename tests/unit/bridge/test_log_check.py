@@ -1,0 +1,175 @@
+"""`log check` finds what was done to a log, and nothing in a sound one."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from typer.testing import CliRunner
+
+from bridge.faults import Fault
+from bridge.log.log_check import check_log
+from bridge.log.logfile import read_run
+from cockpit.commands.log import log_app
+from tests.logs import Tables, doctored, short_log
+
+
+def kinds(path: Path) -> dict[str, str]:
+    return {finding.kind: f"{finding.where}: {finding.text}" for finding in check_log(path).findings}
+
+
+def test_a_sound_log_has_no_findings(tmp_path: Path) -> None:
+    path = tmp_path / "sound.mcap"
+    path.write_bytes(short_log())
+    check = check_log(path)
+    assert check.findings == []
+    assert check.messages["sensors"] == 400
+    assert check.seconds == pytest.approx(0.4)
+    assert CliRunner().invoke(log_app, ["check", str(path)]).exit_code == 0
+
+
+def gap(tables: Tables) -> None:
+    tables["sensors"] = np.delete(tables["sensors"], slice(100, 103))
+
+
+def twice(tables: Tables) -> None:
+    tables["command"] = np.insert(tables["command"], 50, tables["command"][50])
+
+
+def late_one(tables: Tables) -> None:
+    order = np.arange(400)
+    order[[200, 202]] = [202, 200]
+    tables["sensors"] = tables["sensors"][order]
+
+
+def two_runs(tables: Tables) -> None:
+    for name, table in tables.items():
+        tables[name] = np.concatenate([table, table])
+
+
+def clipped(tables: Tables) -> None:
+    force_N = tables["sensors"]["drive_force_N"]
+    np.minimum(force_N, 0.5 * force_N.max(), out=force_N)
+
+
+def at_range(tables: Tables) -> None:
+    tables["sensors"]["mass_accel_mps2"][300, 3] = 490.3325
+
+
+def dead(tables: Tables) -> None:
+    tables["sensors"]["base_accel_mps2"][:] = 0.25
+
+
+def not_finite(tables: Tables) -> None:
+    tables["sensors"]["mass_accel_mps2"][10, 5] = np.nan
+    tables["sensors"]["mass_accel_mps2"][10, 6] = np.inf
+
+
+def clock_jumps(tables: Tables) -> None:
+    tables["sensors"]["t_ns"][200:] += 5_000_000
+
+
+def clock_goes_back(tables: Tables) -> None:
+    tables["trace"]["t_ns"][200:] -= 50_000_000
+
+
+def late(tables: Tables) -> None:
+    tables["applied"]["late_ns"][:40] = 1_500_000
+
+
+def begins_late(tables: Tables) -> None:
+    tables["sensors"] = tables["sensors"][7:]
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "text"),
+    [
+        (gap, "gap", "/sensors: 3 messages missing in 1 gaps, first 100 to 102"),
+        (begins_late, "gap", "begins with block 7"),
+        (twice, "duplicate", "/command: numbers come a second time at 1 places, first 50"),
+        (late_one, "order", "/sensors: 2 messages came after a later one"),
+        (two_runs, "two-runs", "numbers start again at 0 after"),
+        (clipped, "clipped", "/sensors drive_force_N: "),
+        (at_range, "clipped", "/sensors mass_accel_mps2: reaches the end of its range, 490.33"),
+        (dead, "dead", "/sensors base_accel_mps2: constant at 0.25"),
+        (not_finite, "not-finite", "/sensors mass_accel_mps2: 2 samples are no finite number, first after 0.010 s"),
+        (clock_jumps, "clock-jump", "/sensors: t_ns does not follow the numbers at 1 places, first 200"),
+        (clock_goes_back, "clock-jump", "/trace: t_ns does not follow the numbers at 1 places, first 200"),
+        (clock_goes_back, "log-time-back", "/trace: log_time goes back at 1 places, first 200: by 49 ms"),
+        (late, "late", "/applied: 10.0 % of the messages were later than 1 ms"),
+    ],
+)
+def test_what_was_done_is_found(tmp_path: Path, change: Callable[[Tables], None], kind: str, text: str) -> None:
+    path = doctored(tmp_path, change)
+    assert text in kinds(path)[kind]
+    result = CliRunner().invoke(log_app, ["check", str(path), "--json"])
+    assert result.exit_code == 1
+    assert kind in {finding["kind"] for finding in json.loads(result.stdout)["findings"]}
+
+
+def test_a_late_message_closes_its_gap(tmp_path: Path) -> None:
+    def change(tables: Tables) -> None:
+        tables["sensors"] = tables["sensors"][[*range(2), 3, 2, 4, *range(6, 400)]]
+
+    found = kinds(doctored(tmp_path, change))
+    assert "/sensors: 1 messages missing in 1 gaps, first 5 to 5" in found["gap"]
+    assert "order" in found
+
+
+def test_a_cut_log(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(short_log()[:-4000])
+    assert "stickslip log recover" in kinds(path)["cut"]
+
+
+def test_a_log_with_a_damaged_chunk(tmp_path: Path) -> None:
+    data = bytearray(short_log())
+    data[data.index(b"zstd", len(data) // 2) + 100] ^= 0x40
+    path = tmp_path / "flipped.mcap"
+    path.write_bytes(data)
+    assert {"damaged", "gap"} <= kinds(path).keys()
+
+
+def test_no_log_is_a_fault(tmp_path: Path) -> None:
+    (tmp_path / "empty.mcap").touch()
+    with (tmp_path / "foreign.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("std_msgs/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/chatter", "cdr", schema)
+        writer.add_message(channel, 1, b"hello", 1)
+        writer.finish()
+    version = (tmp_path / "version.mcap", short_log().replace(b"stickslip schema 1", b"stickslip schema 2"))
+    version[0].write_bytes(version[1])
+    (tmp_path / "text.mcap").write_text("t_s,drive_force_N\n" * 100)
+    (tmp_path / "folder.mcap").mkdir()
+    expected = {
+        "empty": "0 bytes, no MCAP file",
+        "foreign": "must be 'stickslip schema 1'",
+        "version": "written by 'stickslip schema 2'",
+        "text": "no MCAP file",
+        "folder": "is a folder, must be a file; ",
+        "absent": "no such file; ",
+        "long" * 70: "cannot be read: File name too long; ",
+    }
+    for name, line in expected.items():
+        path = tmp_path / f"{name}.mcap"
+        for use in (check_log, read_run):
+            with pytest.raises(Fault) as caught:
+                use(path)
+            assert caught.value.kind.code == "BAD_LOG"
+            assert line in caught.value.line
+        for command in ("check", "info", "recover"):
+            assert CliRunner().invoke(log_app, [command, str(path)]).exit_code == 7
+        export = ["export", str(path), "--to", str(tmp_path / "out.csv")]
+        assert CliRunner().invoke(log_app, export).exit_code == 7
+
+
+def test_the_verdict_on_a_cut_log_says_what_was_lost(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(short_log()[: len(short_log()) * 2 // 3])
+    told = json.loads(CliRunner().invoke(log_app, ["info", str(path), "--json"]).stdout)
+    assert told["good"] is False
+    assert "bytes of an open chunk were lost" in " ".join(told["faults"])

@@ -1,0 +1,309 @@
+"""Commands that read a log or draw: what comes of logs and options that are not as usual."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from bridge.faults import Fault
+from bridge.log.logfile import read_run
+from bridge.log.runlog import RunLog
+from bridge.wire import stickslip_pb2 as wire
+from cockpit.cli import app
+from cockpit.judge.verdict import headline, in_words, judge_run
+from cockpit.run.in_process import run_onboard
+from cockpit.run.replay import outcome
+from cockpit.run.run import keep_aside
+from cockpit.run.scenario import load_scenario
+from tests.logs import doctored, empty_log, short_log
+
+PNG = b"\x89PNG"
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(short_log())
+    return path
+
+
+def call(*arguments: str):
+    return CliRunner().invoke(app, list(arguments))
+
+
+def test_a_log_without_a_block_is_drawn(tmp_path: Path) -> None:
+    out = tmp_path / "run.png"
+    result = call("plot", str(empty_log(tmp_path)), "--out", str(out))
+    assert result.exit_code == 0, result.output
+    assert out.read_bytes().startswith(PNG)
+
+
+def test_a_picture_of_another_name_is_a_png_and_a_run_without_vibration_has_no_legend_of_it(log: Path) -> None:
+    out = log.with_name("run.foo")
+    result = call("plot", str(log), "--out", str(out))
+    assert result.exit_code == 0, result.output
+    assert out.read_bytes().startswith(PNG)
+
+
+def test_a_picture_without_a_name_is_beside_its_log(log: Path) -> None:
+    result = call("plot", str(log))
+    assert result.exit_code == 0, result.output
+    assert log.with_name("run.png").read_bytes().startswith(PNG)
+
+
+def test_a_folder_has_no_picture() -> None:
+    result = call("plot", ".")
+    assert result.exit_code == 7, result.output
+    assert ".: is a folder, must be a file" in result.stderr
+
+
+def test_a_picture_never_replaces_its_log(log: Path) -> None:
+    before = log.read_bytes()
+    result = call("plot", str(log), "--out", str(log))
+    assert result.exit_code == 2, result.output
+    assert f"--out {log}: is the log" in result.stderr
+    assert log.read_bytes() == before
+
+
+@pytest.mark.parametrize("time", ["inf", "nan", "-1s", "1e300s", "soon"])
+def test_what_is_no_time_is_refused(log: Path, time: str) -> None:
+    for option in (f"--from={time}", f"--set=limits.v_ratio=1.1@{time}"):
+        result = call("replay", str(log), option)
+        assert result.exit_code == 2, result.output
+        assert f"{time!r} is no time; must be from 0 to 1e+09 s" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["plot", "map", "reproduce"])
+def test_a_folder_as_the_file_to_write_is_refused_at_once(log: Path, command: str) -> None:
+    more = [str(log)] if command == "plot" else []
+    result = call(command, *more, "--out", str(log.parent))
+    assert result.exit_code == 5
+    assert result.stderr.startswith(f"stickslip: LOG_WRITE: --out {log.parent}: is a folder; ")
+    under_a_file = log / "picture"
+    assert f"{under_a_file}: cannot be written" in call(command, *more, "--out", str(under_a_file)).stderr
+    long = log.parent / ("x" * 300)
+    assert f"{long}: cannot be written: File name too long" in call(command, *more, "--out", str(long)).stderr
+
+
+def test_a_rig_that_cannot_be_read_is_no_picture_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").mkdir()
+    result = call("map", "--rig", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "map.png"))
+    assert result.exit_code != 0
+    assert "LOG_WRITE" not in result.output
+
+
+@pytest.mark.parametrize(
+    ("options", "place", "remedy"),
+    [
+        (["--to-bus", "--closed-loop"], "--closed-loop: not with --to-bus", "leave one"),
+        (["--to-bus", "--json"], "--json: not with --to-bus", "leave one"),
+        (["--to-bus", "--set", "limits.v_ratio=1.1"], "--set: not with --to-bus", "leave one"),
+        (["--to-bus", "--log", "new.mcap"], "--log: only with --closed-loop", "leave it out"),
+        (["--speed", "1.0"], "--speed: only with --to-bus", "leave it out"),
+        (["--all"], "--all: only with --to-bus", "leave it out"),
+        (["--closed-loop", "--wait"], "--wait: only with --to-bus", "leave it out"),
+        (["--endpoint", "tcp/127.0.0.1:7448"], "--endpoint: only with --to-bus", "leave it out"),
+        (["--prefix", "hall"], "--prefix: only with --to-bus", "leave it out"),
+        (["--log", "new.mcap"], "--log: only with --closed-loop", "leave it out"),
+        (["--closed-loop", "--from", "0.1s"], "--from 0.1s: not with --closed-loop", "leave it out"),
+        (["--closed-loop", "--log", "{log}"], "--log {log}: is the recorded run", "choose another"),
+    ],
+)
+def test_options_that_a_replay_would_not_follow_are_refused(
+    log: Path, options: list[str], place: str, remedy: str
+) -> None:
+    before = log.read_bytes()
+    result = call("replay", str(log), *(option.format(log=log) for option in options))
+    assert log.read_bytes() == before
+    words = result.output + result.stderr
+    assert result.exit_code == 2, words
+    assert place.format(log=log) in words
+    assert remedy in words
+
+
+def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> None:
+    def begin_late(tables):
+        for name, table in tables.items():
+            tables[name] = table[table["t_ns"] > 150_000_000]
+
+    run = read_run(doctored(tmp_path, begin_late))
+    verdict = judge_run(run)
+    assert verdict.before is not None
+    assert verdict.before.seconds == pytest.approx(0.25)
+    assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value: float) -> None:
+    def spoil(tables):
+        tables["sensors"]["drive_force_N"][[100, 250], 3] = value
+        tables["trace"]["drive_force_N"][[100, 250]] = value
+
+    (tmp_path / "sound.mcap").write_bytes(short_log())
+    sound, spoilt = read_run(tmp_path / "sound.mcap"), read_run(doctored(tmp_path, spoil))
+    before, was = judge_run(spoilt).before, judge_run(sound).before
+    assert before is not None
+    assert was is not None
+    assert before.slips == was.slips
+    assert before.swing_N == pytest.approx(was.swing_N, rel=0.02)
+    assert before.mean_force_N == pytest.approx(was.mean_force_N, rel=0.02)
+    assert judge_run(spoilt).faults == [
+        "NOT_FINITE: /sensors drive_force_N: 2 blocks hold a sample that is no number, first 100; they were left out"
+    ]
+    assert outcome(spoilt).drive_work_J == pytest.approx(outcome(sound).drive_work_J, rel=0.02)
+
+
+def test_what_was_not_measured_is_no_velocity_ratio(tmp_path: Path) -> None:
+    def spoil(tables):
+        trace = tables["trace"]
+        trace["mode"], trace["drive_velocity_mps"], trace["vibration_velocity_mps"] = wire.EXCITE, 5e-4, 6e-4
+        trace["limit"] = wire.NO_LIMIT
+        tables["sensors"]["base_accel_mps2"][250:300, 3] = np.nan
+        trace["limit"][250:300] = wire.NOT_FINITE
+        trace["vibration_velocity_mps"][300:] = 4e-4
+
+    run = read_run(doctored(tmp_path, spoil))
+    from_the_start = json.dumps({"block_s": 0.001, "policy": {"enabled_from_s": 0.0}})
+    verdict = judge_run(run._replace(headers=run.headers | {"controller": {"configuration": from_the_start}}))
+    assert verdict.faults == [
+        "NOT_FINITE: /sensors base_accel_mps2: 50 blocks hold a sample that is no number, first 250; they were left out"
+    ]
+    assert (verdict.velocity_ratio_min, verdict.velocity_ratio_max) == (pytest.approx(1.2), pytest.approx(1.2))
+
+
+def test_a_slip_of_a_heavy_slide_is_slow_and_counts(tmp_path: Path) -> None:
+    log = tmp_path / "heavy.mcap"
+    settings = ["duration_s=12.0", "rig.slide.mass_kg=60.0", "controller.policy.enabled_from_s=100.0"]
+    run_onboard(load_scenario("paper-c45-c45", settings), log, {})
+    before = judge_run(read_run(log)).before
+    assert before is not None
+    assert before.slips >= 4
+    assert before.swing_N > 3.0
+
+
+@pytest.mark.parametrize(("code", "good"), [("STALE", True), ("DROPPED", False)])
+def test_a_pause_that_lost_nothing_is_told_and_no_fault(tmp_path: Path, code: str, good: bool) -> None:
+    log = tmp_path / "run.mcap"
+    run_onboard(load_scenario("from-the-start", ["duration_s=1.0"]), log, {})
+    run = read_run(log)
+    event = wire.Event(sequence=1, t_ns=5, source="controller", code=code, text="for 24 ms")
+    verdict = judge_run(run._replace(events=[*run.events, event]))
+    assert verdict.good is good
+    assert f"warning  {code}: for 24 ms" in in_words(verdict)
+
+
+def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
+    """Here by a transducer that ends after 2 mm; 16 s at 0.5 mm/s are 8 mm."""
+    log = tmp_path / "short-range.mcap"
+    scenario = load_scenario("from-the-start", [])
+    rig = scenario.rig.model_copy(
+        update={"sensors": scenario.rig.sensors.model_copy(update={"position_range_m": 2e-3})}
+    )
+    run_onboard(scenario.model_copy(update={"rig": rig}), log, {})
+    verdict = judge_run(read_run(log))
+    assert not verdict.good
+    assert re.search(
+        r"DRIVE_UNSEEN: \d+ slips while the drive position stood, first at [4-6]\.", "\n".join(verdict.faults)
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        (["rig.drive.profile=[[0.0, 0.0]]"], "the drive never moved: nothing was tested"),
+        (["controller.policy.enabled_from_s=100.0"], "the controller was not in charge in this run"),
+    ],
+)
+def test_where_nothing_was_tested_the_headline_says_so(tmp_path: Path, settings: list[str], expected: str) -> None:
+    log = tmp_path / "still.mcap"
+    run_onboard(load_scenario("from-the-start", ["duration_s=0.5", *settings]), log, {})
+    assert headline(judge_run(read_run(log))) == expected
+
+
+def test_export_takes_times_as_replay_does(log: Path, tmp_path: Path) -> None:
+    cut = ["log", "export", str(log), "--to", str(tmp_path / "a.csv"), "--topic", "trace", "--json"]
+    result = call(*cut, "--from", "0.1s", "--until", "0.2")
+    assert json.loads(result.stdout)["rows"] == {"trace": 100}
+    assert "--from soon: 'soon' is no time" in call(*cut, "--from", "soon").stdout
+
+
+def test_a_log_that_is_being_recorded_is_not_renamed(tmp_path: Path) -> None:
+    log = RunLog(tmp_path / "run.mcap", lockstep=True)
+    with pytest.raises(Fault, match=r"LOG_WRITE: .*run.mcap: is being recorded: .*or give another --log"):
+        keep_aside(log.path)
+    log.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["run", "--scenario", "deploy/rigs/paper-c45-c45.toml"], "is a rig, not a scenario; give it with --rig"),
+        (["run", "--rig", "deploy/scenarios/stop-and-go.toml"], "is a scenario, not a rig; give the rig that it names"),
+    ],
+)
+def test_a_rig_in_the_place_of_a_scenario_is_told(arguments: list[str], expected: str) -> None:
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert expected in result.stderr
+
+
+def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_path: Path) -> None:
+    run = read_run(doctored(tmp_path, lambda _tables: None))
+    bare = run._replace(headers=run.headers | {"controller": {"configuration": '{"block_s": 0.001}'}})
+    with pytest.raises(
+        Fault, match=r"BAD_LOG: .*configuration of the controller: must hold block_s and policy.enabled_from_s"
+    ):
+        judge_run(bare)
+
+
+def test_a_log_that_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "run.mcap"
+    keep_aside(log)
+    for what in (b"first", b"second"):
+        log.write_bytes(what)
+        os.utime(log, (1.7e9, 1.7e9))
+        keep_aside(log)
+        assert not log.exists()
+    kept = {path.read_bytes(): str(path) for path in tmp_path.iterdir()}
+    said = capsys.readouterr().err
+    assert kept.keys() == {b"first", b"second"}
+    assert all(path in said for path in kept.values())
+
+
+@pytest.mark.parametrize("from_block", [0, 100])
+def test_a_force_that_is_no_number_any_more_is_no_error(tmp_path: Path, from_block: int) -> None:
+    def spoil(tables):
+        tables["sensors"]["drive_force_N"][from_block:] = np.nan
+
+    verdict = judge_run(read_run(doctored(tmp_path, spoil)))
+    assert (verdict.before is None) == (from_block == 0)
+    assert verdict.before is None or np.isfinite(verdict.before.swing_N)
+    assert not verdict.good
+
+
+def test_messages_out_of_order_are_not_lost(tmp_path: Path) -> None:
+    def exchange(tables):
+        for table in tables.values():
+            table[[0, 30]] = table[[30, 0]]
+
+    verdict = judge_run(read_run(doctored(tmp_path, exchange)))
+    assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
+
+
+@pytest.mark.parametrize("arguments", [["log", "check", "bad.mcap"], ["explain"], ["explain", "CONFIG"], ["scenarios"]])
+def test_a_reader_that_leaves_is_no_success(tmp_path: Path, arguments: list[str]) -> None:
+    """`stickslip ... | head` with a reader that is gone before the first word."""
+    (tmp_path / "bad.mcap").write_bytes(short_log()[:-2000])
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as closed:
+        command = [sys.executable, "-m", "cockpit", *arguments]
+        result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False)
+    assert result.returncode == 141
+    assert result.stderr == ""

@@ -1,0 +1,331 @@
+"""`stickslip diagnose`: what it prints and writes, for one folder and for many, with a stand-in for the diagnosing."""
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from bridge.faults import FAULTS
+from bridge.files import strict_json, write_whole
+from cockpit.cli import app
+from diagnosis import diagnose_many as many
+from tests import made_up
+
+
+@pytest.fixture(autouse=True)
+def stand_in(monkeypatch):
+    monkeypatch.setattr(many, "real_diagnose", made_up.quick)
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def diagnose(*arguments):
+    return CliRunner().invoke(app, ["diagnose", *map(str, arguments)])
+
+
+def folders(at: Path, *names: str) -> Path:
+    for name in names:
+        made_up.evidence_folder(at / name)
+    return at
+
+
+def files(at: Path) -> set[str]:
+    return {str(path.relative_to(at)) for path in at.rglob("*") if path.is_file()}
+
+
+def test_one_folder_says_the_verdict_first(tmp_path):
+    result = diagnose(folders(tmp_path, "rig") / "rig")
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert lines[0] == "effect: drive-backlash, probability 93 %"
+    assert lines[3].split() == [
+        *["candidates", "drive-backlash", "93", "%", "gap", "81", "µm", "(90", "%:", "76", "to", "86)"]
+    ]
+    assert "drive-hardening" in lines[4]
+    assert "unexplained" in lines[5]
+    assert lines[6].startswith("gap        6.2 as described, 5.9 retuned, 1.08 with drive-backlash; perfect is 1; 98 %")
+    assert lines[7].startswith("next       Reverse the drive")
+    assert lines[8:] == [
+        "data       run-01.parquet: base_accel_mps2: not there: what the piezo delivers cannot be seen",
+        "           run-02.parquet: drive_force_N: 12 samples at 20 N were left out",
+    ]
+    assert "off by 6 noise floors" in result.stderr
+    assert "off by 6 noise floors" not in result.stdout
+
+
+def test_one_folder_writes_json_report_and_rig(tmp_path, monkeypatch):
+    rigs = []
+
+    class Apply:
+        @staticmethod
+        def refuse_force_drive(evidence):
+            assert evidence.rig.drive == "spring"
+
+        @staticmethod
+        def write_rig(diagnosis, evidence, path):
+            rigs.append((diagnosis.effects, evidence.folder.name, path.name))
+
+    monkeypatch.setitem(sys.modules, "diagnosis.report.rig_file", Apply)
+    folders(tmp_path, "rig")
+    out = tmp_path / "new" / "folder"
+    options = ("--json", out / "a.json", "--report", out / "a.html", "--apply", out / "a.toml", "--jobs", 3)
+    result = diagnose(tmp_path / "rig", *options)
+    assert result.exit_code == 0, result.output
+    assert files(out) == {"a.json", "a.html"}
+    written = json.loads((out / "a.json").read_text())
+    assert written["format"] == "diagnosis/1"
+    assert written["elapsed_s"] == 3.0  # the stand-in says the number of jobs here
+    assert rigs == [(("drive-backlash",), "rig", "a.toml")]
+    assert "Diagnosis of rig" in (out / "a.html").read_text()
+
+
+def test_json_on_stdout_is_nothing_but_json(tmp_path):
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--json", "-")
+    assert json.loads(result.stdout, parse_constant=pytest.fail)["effects"] == ["drive-backlash"]
+    interval = json.loads(result.stdout)["candidates"][3]["parameters"]["damping_Ns_per_m"]["interval_90"]
+    assert interval == [None, None]
+
+
+def test_json_has_no_numbers_that_json_does_not_know():
+    assert strict_json({"a": (float("nan"), 1), "b": [float("-inf"), None, "x", True]}) == {
+        "a": [None, 1],
+        "b": [None, None, "x", True],
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("rig/" + "x" * 300, "cannot be read: File name too long; "),
+        ("in its place", "in its place/manifest.toml: is a folder, must be a file; "),
+        ("run in its place", "run-01.csv: is a folder, must be a file; "),
+        ("long run", "cannot be read: File name too long; "),
+    ],
+)
+def test_evidence_that_cannot_be_looked_at_is_bad_and_ends_no_other(name, why, tmp_path):
+    folders(tmp_path, "rig")
+    (tmp_path / "in its place" / "manifest.toml").mkdir(parents=True)
+    (tmp_path / "run in its place" / "run-01.csv").mkdir(parents=True)
+    (tmp_path / "run in its place" / "manifest.toml").write_text(made_up.MANIFEST)
+    (tmp_path / "long run").mkdir()
+    (tmp_path / "long run" / "manifest.toml").write_text(made_up.MANIFEST.replace("run-01", "x" * 300))
+    result = diagnose(tmp_path / name)
+    assert result.exit_code == 2
+    assert why in result.stderr
+    assert result.stderr.startswith("stickslip: BAD_EVIDENCE: ")
+    result = diagnose(tmp_path / name, tmp_path / "rig", "--jobs", 1)
+    assert result.exit_code == 2
+    assert "rig: effect: drive-backlash" in result.stdout
+    assert why in result.stdout
+
+
+def test_an_option_that_would_be_the_name_of_a_file_is_refused_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.chdir(folders(tmp_path, "rig"))
+    result = diagnose("rig", "--json", "--jobs", "1")
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert "--json --jobs: takes a file, and --jobs is an option" in result.stderr
+    assert diagnose("rig", "--json", tmp_path / "--jobs").exit_code == 0
+    assert "--jobs" in files(tmp_path)
+
+
+@pytest.mark.parametrize("option", ["--json", "--report", "--apply"])
+def test_a_name_too_long_to_be_written_is_said_before_the_work(option, tmp_path, monkeypatch):
+    monkeypatch.setattr(many, "real_diagnose", made_up.endless)
+    result = diagnose(folders(tmp_path, "rig") / "rig", option, tmp_path / ("x" * 252))
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert result.stderr.startswith(
+        f"stickslip: LOG_WRITE: {tmp_path / ('x' * 252)}: cannot be written: File name too long"
+    )
+
+
+@pytest.mark.parametrize("where", ["absent", "refused"])
+def test_bad_evidence_writes_nothing(where, tmp_path):
+    folders(tmp_path, "refused")
+    before = files(tmp_path)
+    options = ("--json", tmp_path / "out" / "a.json", "--report", tmp_path / "out" / "a.html")
+    result = diagnose(tmp_path / where, *options)
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1].startswith("stickslip: BAD_EVIDENCE: ")
+    assert files(tmp_path) == before
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_evidence_as_json_on_stdout(tmp_path):
+    result = diagnose(tmp_path / "absent", "--json", "-")
+    assert result.exit_code == 2
+    assert json.loads(result.stdout)["fault"] == "BAD_EVIDENCE"
+
+
+def test_a_folder_of_folders_gives_every_result_in_order(tmp_path):
+    folders(tmp_path / "all", "c", "a", "refused", "b-broken")
+    (tmp_path / "all" / "no evidence").mkdir()
+    out = tmp_path / "out"
+    result = diagnose(tmp_path / "all", "--json", out / "a.json", "--report", out / "reports", "--jobs", 1)
+    assert result.exit_code == 2
+    assert [line.split(":")[0] for line in result.stdout.splitlines()] == [
+        "a",
+        "b-broken",
+        "c",
+        "refused",
+        f"reports    {out}/reports",
+    ]
+    assert "b-broken: DIAGNOSIS_BROKE: ZeroDivisionError: nothing to divide by (made_up.py, line" in result.stdout
+    assert "4 of 4: refused: BAD_EVIDENCE: run-01.csv: too short" in result.stderr
+    assert files(out) == {"a.json", "reports/a.html", "reports/c.html"}
+    written = json.loads((out / "a.json").read_text())
+    assert written["format"] == "diagnoses/1"
+    results = {one["evidence"]: one for one in written["results"]}
+    assert results["a"]["diagnosis"]["verdict"] == "effect"
+    assert results["refused"]["fault"] == {"fault": "BAD_EVIDENCE", "line": "run-01.csv: too short"}
+
+
+def test_a_broken_program_is_no_bad_evidence(tmp_path):
+    folders(tmp_path, "a", "broken")
+    assert diagnose(tmp_path, "--jobs", 1).exit_code == FAULTS["DIAGNOSIS_BROKE"].exit_status
+
+
+def test_folders_of_the_same_name_keep_apart(tmp_path):
+    folders(tmp_path, "one/rig", "two/rig", "two/other")
+    sources = many.find_sources([tmp_path / "one", tmp_path / "two", tmp_path / "two" / "rig"])
+    assert [source.name for source in sources] == [str(tmp_path / "one/rig"), "other", str(tmp_path / "two/rig")]
+    result = diagnose(tmp_path / "one", tmp_path / "two", "--report", tmp_path / "out", "--jobs", 1)
+    assert result.exit_code == 0
+    assert len(files(tmp_path / "out")) == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["--json", "."], "CONFIG"),
+        (["--report", "rig/run-01.csv/report.html"], "LOG_WRITE"),
+        (["rig2", "--apply", "rig.toml"], "CONFIG"),
+        (["rig2", "--report", "rig/run-01.csv"], "CONFIG"),
+        (["--json", "rig/run-01.csv"], "CONFIG"),
+        (["--apply", "rig/manifest.toml"], "CONFIG"),
+        (["--json", "a", "--report", "./a"], "CONFIG"),
+        (["--report", "-"], "CONFIG"),
+        (["--apply", "-"], "CONFIG"),
+    ],
+)
+def test_what_cannot_be_written_is_said_before_the_work(options, code, tmp_path, monkeypatch):
+    folders(tmp_path, "rig", "rig2")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(many, "real_diagnose", made_up.endless)
+    result = diagnose("rig", *options)
+    assert result.exit_code == FAULTS[code].exit_status
+    assert f"stickslip: {code}: {options[-2]}" in result.stderr
+
+
+def test_a_cluster_address_of_another_form_is_one_line(tmp_path):
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--cluster", "foo")
+    assert result.exit_code == 2
+    assert "CONFIG: --cluster foo: must be tcp://HOST:PORT; write for example tcp://127.0.0.1:8786" in result.stderr
+
+
+def test_a_cluster_without_the_package_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--cluster", "tcp://127.0.0.1:1")
+    assert result.exit_code == 2
+    assert "CONFIG: --cluster: needs the package distributed" in result.stderr
+
+
+def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
+    def interrupted(evidence, progress, jobs):
+        os.kill(os.getpid(), signal.SIGTERM)
+        raise AssertionError("not interrupted")
+
+    monkeypatch.setattr(many, "real_diagnose", interrupted)
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--json", tmp_path / "a.json")
+    assert result.exit_code == 130
+    assert not (tmp_path / "a.json").exists()
+
+
+def test_the_answer_is_said_whatever_cannot_be_written(tmp_path):
+    """A folder appears where the JSON goes, while the diagnosis works: report and words are there all the same."""
+
+    def in_the_way(evidence, progress, jobs):
+        (tmp_path / "a.json").mkdir()
+        return made_up.quick(evidence, progress, jobs)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(many, "real_diagnose", in_the_way)
+        result = diagnose(
+            folders(tmp_path, "rig") / "rig", "--json", tmp_path / "a.json", "--report", tmp_path / "a.html"
+        )
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert f"LOG_WRITE: {tmp_path / 'a.json'}: cannot be written" in result.stderr
+    assert result.stdout.startswith("effect: drive-backlash")
+    assert f"report     {tmp_path / 'a.html'}" in result.stdout
+    assert (tmp_path / "a.html").stat().st_size > 1000
+
+
+def test_a_link_stays_one_and_a_device_is_written_into(tmp_path):
+    (tmp_path / "link.json").symlink_to(tmp_path / "there.json")
+    assert diagnose(folders(tmp_path, "rig") / "rig", "--json", tmp_path / "link.json").exit_code == 0
+    assert (tmp_path / "link.json").is_symlink()
+    assert json.loads((tmp_path / "there.json").read_text())["verdict"] == "effect"
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(tmp_path / "pipe", "all of it")
+    assert os.read(reader, 100) == b"all of it"
+    os.close(reader)
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_folder_whose_name_is_not_utf_8_is_told_and_ends_no_other(tmp_path):
+    """As an old archive of Windows leaves them: neither the reader of CSV nor a report takes such a name."""
+    odd = tmp_path / os.fsdecode(b"m\xe4rz")
+    made_up.evidence_folder(odd)
+    folders(tmp_path, "rig")
+    result = diagnose(odd)
+    assert result.exit_code == 2
+    assert "m\\xe4rz: its name is not UTF-8; rename it" in result.stderr
+    result = diagnose(odd, tmp_path / "rig", "--report", tmp_path / "out", "--jobs", 1)
+    assert result.exit_code == 2
+    assert "rig: effect: drive-backlash" in result.stdout
+    assert "m\\xe4rz: BAD_EVIDENCE: " in result.stdout
+
+
+def test_one_folder_given_twice_is_one(tmp_path):
+    rig = folders(tmp_path, "rig") / "rig"
+    assert diagnose(rig, rig, "--apply", tmp_path / "found.toml").exit_code == 0
+    assert (tmp_path / "found.toml").is_file()
+
+
+def test_a_report_that_cannot_be_written_ends_no_other(tmp_path):
+    """A folder is where one report goes: the others, the JSON and the words are there, and the exit status tells."""
+    folders(tmp_path / "all", "a", "b", "c")
+    out = tmp_path / "out"
+    (out / "b.html").mkdir(parents=True)
+    (out / "b.html" / "full").touch()
+    result = diagnose(tmp_path / "all", "--json", "-", "--report", out, "--jobs", 1)
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert f"LOG_WRITE: {out / 'b.html'}: cannot be written" in result.stderr
+    assert files(out) == {"a.html", "b.html/full", "c.html"}
+    assert [one["evidence"] for one in json.loads(result.stdout)["results"]] == ["a", "b", "c"]
+
+
+def test_json_on_stdout_stays_one_whatever_else_cannot_be_written(tmp_path, monkeypatch):
+    def in_the_way(evidence, progress, jobs):
+        (tmp_path / "a.html").mkdir()
+        return made_up.quick(evidence, progress, jobs)
+
+    monkeypatch.setattr(many, "real_diagnose", in_the_way)
+    result = diagnose(folders(tmp_path, "rig") / "rig", "--json", "-", "--report", tmp_path / "a.html")
+    assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert json.loads(result.stdout)["effects"] == ["drive-backlash"]
+    assert "LOG_WRITE" in result.stderr
+
+
+def test_every_report_has_a_name_of_its_own_that_a_disk_takes(tmp_path):
+    long = "ä" * 120
+    folders(tmp_path, "a_b/rig", "a/b/rig", f"c/{long}", f"d/{long}")
+    given = [tmp_path / "a_b/rig", tmp_path / "a/b/rig", tmp_path / "c" / long, tmp_path / "d" / long]
+    result = diagnose(*given, "--report", tmp_path / "out", "--jobs", 1)
+    assert result.exit_code == 0
+    assert len(files(tmp_path / "out")) == 4

@@ -1,0 +1,387 @@
+"""Import: every format gives the same evidence, and bad input leaves nothing behind."""
+
+import json
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+from nptdms import ChannelObject, TdmsWriter
+from typer.testing import CliRunner
+
+from bridge.faults import Fault
+from bridge.log.log_check import check_log
+from bridge.log.logfile import read_run
+from bridge.tables.export import export
+from bridge.tables.readers import Dialect, read_table
+from cockpit.commands.log import log_app
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.evidence.import_table import import_file
+from tests.logs import short_log
+
+MAP = """
+[channels]
+t_s = { column = "time", scale = 1e-3 }
+drive_force_N = { column = "F", scale = 0.5, offset = 1.0 }
+mass_accel_mps2 = { column = "acc", scale = 9.80665 }
+[rig]
+drive = "spring"
+mass_kg = 1.5
+drive_stiffness_N_per_m = 11700.0
+coulomb_force_N = 14.49
+static_force_N = 17.38
+stribeck_velocity_mps = 0.0005
+[rig.tolerance]
+mass_kg = 0.005
+[run]
+drive_velocity_mps = 0.0005
+"""
+ROWS = 4010
+
+
+def raw() -> dict[str, Any]:
+    random = np.random.default_rng(3)
+    time_ms = np.arange(ROWS) * 0.5
+    force = 28 + 4 * np.sin(time_ms * 9e-3) + random.normal(0, 0.02, ROWS)
+    return {"time": time_ms, "F": force, "acc": random.normal(0, 0.1, ROWS), "note": np.zeros(ROWS)}
+
+
+def write_raw(path: Path, data: dict[str, Any]) -> None:
+    if path.suffix == ".csv":
+        pyarrow.csv.write_csv(pa.table(data), path)
+    elif path.suffix == ".parquet":
+        pq.write_table(pa.table(data), path)
+    elif path.suffix == ".mat":
+        scipy.io.savemat(path, data | {"gain": 35.15})
+    else:
+        with TdmsWriter(path) as writer:
+            writer.write_segment(
+                [ChannelObject("DAQ", name, values, {"wf_increment": 0.0005}) for name, values in data.items()]
+            )
+
+
+def setup(at: Path, suffix: str, text: str = MAP) -> tuple[Path, Path]:
+    source, channel_map = at / f"measured{suffix}", at / "map.toml"
+    write_raw(source, raw())
+    channel_map.write_text(text)
+    return source, channel_map
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mat", ".tdms"])
+def test_a_file_becomes_evidence(tmp_path: Path, suffix: str) -> None:
+    source, channel_map = setup(tmp_path, suffix)
+    done = import_file(source, channel_map, tmp_path / "evidence")
+    evidence = load_evidence(tmp_path / "evidence")
+    (run,) = evidence.runs
+    data = raw()
+    assert done.rows == ROWS
+    assert run.t_s == pytest.approx(data["time"] * 1e-3)
+    assert run.columns["drive_force_N"] == pytest.approx(0.5 * data["F"] + 1.0)
+    assert run.columns["mass_accel_mps2"] == pytest.approx(9.80665 * data["acc"])
+    assert run.drive_velocity_mps == 0.0005
+    assumed_too = {"contact_stiffness_N_per_m": 0.3, "contact_damping_Ns_per_m": 0.3}
+    assert evidence.rig.tolerance == {"mass_kg": 0.005} | assumed_too
+    # presliding of 0.22 um, critically damped: what the paper's own pair has, 77.5 N/um and 2.15e4 N s/m
+    assert evidence.rig.contact_stiffness_N_per_m == pytest.approx(17.38 / 0.22e-6)
+    assert evidence.rig.contact_damping_Ns_per_m == pytest.approx(2.15e4, rel=0.02)
+    assumed = [finding.where for finding in done.findings if finding.kind == "assumed"]
+    assert "manifest.toml: rig.contact_stiffness_N_per_m" in assumed
+    assert "# assumed, not measured" in (tmp_path / "evidence" / "manifest.toml").read_text()
+
+
+def test_a_drive_speed_in_mm_per_s_is_refused(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    channel_map.write_text(MAP.replace("drive_velocity_mps = 0.0005", "drive_velocity_mps = 20.0"))
+    with pytest.raises(Fault, match=r"CONFIG: .*run.drive_velocity_mps = 20"):
+        import_file(source, channel_map, tmp_path / "evidence")
+    assert not (tmp_path / "evidence").exists()
+
+
+def test_a_second_run_is_added_to_its_rig_only(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    out = tmp_path / "evidence"
+    import_file(source, channel_map, out)
+    with pytest.raises(Fault, match="is already a run of this folder"):
+        import_file(source, channel_map, out)
+    second = source.rename(tmp_path / "second.csv")
+    channel_map.write_text(MAP + "holdout = true\n")
+    import_file(second, channel_map, out)
+    assert [(run.file, run.holdout) for run in load_evidence(out).runs] == [
+        ("measured.parquet", False),
+        ("second.parquet", True),
+    ]
+    before = (out / "manifest.toml").read_text()
+    channel_map.write_text(MAP.replace("mass_kg = 1.5", "mass_kg = 1.6"))
+    with pytest.raises(Fault, match="describes another rig"):
+        import_file(second.rename(tmp_path / "third.csv"), channel_map, out)
+    assert (out / "manifest.toml").read_text() == before
+    assert sorted(path.name for path in out.iterdir()) == ["manifest.toml", "measured.parquet", "second.parquet"]
+
+
+def test_the_first_run_of_a_folder_is_none_that_is_kept_aside(tmp_path: Path) -> None:
+    """Such a folder could not be diagnosed, nor a run be added to it."""
+    source, channel_map = setup(tmp_path, ".csv", MAP + "holdout = true\n")
+    with pytest.raises(
+        Fault, match=r"map.toml: run.holdout = true: must be false for the first run .* import .* first"
+    ):
+        import_file(source, channel_map, tmp_path / "evidence")
+    assert not (tmp_path / "evidence").exists()
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".tdms"])
+def test_a_file_becomes_a_log(tmp_path: Path, suffix: str) -> None:
+    source, channel_map = setup(tmp_path, suffix)
+    done = import_file(source, channel_map, tmp_path / "made.mcap")
+    run = read_run(tmp_path / "made.mcap")
+    assert len(run.sensors) == 200
+    assert done.rows == 4000
+    assert run.sensors["t_ns"][0] == 10_000_000
+    assert run.sensors["drive_force_N"].ravel() == pytest.approx(0.5 * raw()["F"][:4000] + 1.0, rel=1e-6)
+    assert (run.sensors["mass_position_m"] == 0).all()
+    assert json.loads(run.headers["import"]["missing"]) == ["base_accel_mps2", "mass_position_m", "drive_position_m"]
+    # channels that were never there are not reported as dead
+    assert check_log(tmp_path / "made.mcap").findings == []
+
+
+def test_a_log_of_uneven_time_is_interpolated_and_says_so(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    data = raw()
+    data["time"] += np.random.default_rng(1).uniform(-0.1, 0.1, ROWS)
+    write_raw(source, data)
+    done = import_file(source, channel_map, tmp_path / "made.mcap")
+    assert "uneven" in {finding.kind: finding.text for finding in done.findings}["time"]
+
+
+def test_time_from_the_rate(tmp_path: Path) -> None:
+    text = MAP.replace('t_s = { column = "time", scale = 1e-3 }\n', "")
+    source, channel_map = setup(tmp_path, ".csv", text + "[source]\nsample_rate_Hz = 2000.0\n")
+    import_file(source, channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].t_s == pytest.approx(raw()["time"] * 1e-3)
+    source, channel_map = setup(tmp_path, ".tdms", text)  # says its rate itself
+    import_file(source, channel_map, tmp_path / "other")
+    assert load_evidence(tmp_path / "other").runs[0].t_s == pytest.approx(raw()["time"] * 1e-3)
+
+
+def test_a_csv_file_of_another_country(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv", MAP + '[source]\ndelimiter = ";"\ndecimal = ","\nskip_rows = 2\n')
+    data = raw()
+    lines = [";".join(f"{data[name][row]:.9g}".replace(".", ",") for name in data) for row in range(ROWS)]
+    source.write_text("DAQ 7\n12.05.2024\n" + ";".join(data) + "\n" + "\n".join(lines) + "\n")
+    import_file(source, channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].columns["drive_force_N"] == pytest.approx(0.5 * data["F"] + 1)
+
+
+def test_what_was_exported_can_be_imported(tmp_path: Path) -> None:
+    log, channel_map = tmp_path / "run.mcap", tmp_path / "map.toml"
+    log.write_bytes(short_log())
+    export(log, tmp_path / "run.mat", ["sensors", "trace"])
+    channel_map.write_text(
+        '[channels]\nt_s = { column = "sensors.t_s" }\ndrive_force_N = { column = "sensors.drive_force_N" }\n'
+    )
+    import_file(tmp_path / "run.mat", channel_map, tmp_path / "again.mcap")
+    assert (read_run(tmp_path / "again.mcap").sensors["drive_force_N"] == read_run(log).sensors["drive_force_N"]).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('"F"', '"Force"', "measured.csv: column Force: not in the file; known here: F, acc, note, time"),
+        ("drive_force_N =", "force =", "map.toml: channels.force: unknown key; known here: t_s,"),
+        ("offset = 1.0", "offset = true", "map.toml: channels.drive_force_N.offset = True"),
+        ("scale = 0.5", "scale = 0.0", "map.toml: channels.drive_force_N: scale = 0: must not be 0"),
+        ("mass_kg = 1.5", "", "map.toml: rig: mass_kg: missing"),
+        ("[rig]", "[source]\nsample_rate_Hz = 2000.0\n[rig]", "source.sample_rate_Hz: there is a channel t_s too"),
+        ('"time", scale = 1e-3', '"acc"', "measured.parquet: t_s: "),
+        ("scale = 0.5", "scale = 0.5e6", "drive_force_N"),
+    ],
+)
+def test_a_bad_map_is_one_clear_line_and_leaves_nothing(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    source, channel_map = setup(tmp_path, ".csv", MAP.replace(old, new))
+    if "0.5e6" in new:
+        channel_map.write_text(channel_map.read_text().replace("mass_accel_mps2 =", "base_accel_mps2 ="))
+    with pytest.raises(Fault) as caught:
+        import_file(source, channel_map, tmp_path / "evidence")
+    assert expected in caught.value.line
+    assert caught.value.kind.exit_status == 2
+    assert not (tmp_path / "evidence").exists()
+
+
+def test_a_log_needs_a_clock_that_goes_forward(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    data = raw()
+    data["time"][123] = 0.0
+    write_raw(source, data)
+    with pytest.raises(Fault, match=r"measured\.csv: t_s: row 124"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
+    assert not list(tmp_path.glob("made*"))
+
+
+def test_a_log_needs_a_clock_that_ends(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    data = raw()
+    data["time"][-1] = np.inf
+    write_raw(source, data)
+    with pytest.raises(Fault, match=rf"measured\.csv: t_s: row {ROWS}"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
+
+
+def test_what_was_measured_is_never_overwritten(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".parquet")
+    before = source.read_bytes()
+    with pytest.raises(Fault, match=r"measured\.parquet: is there already"):
+        import_file(source, channel_map, tmp_path)
+    assert source.read_bytes() == before
+    import_file(source, channel_map, tmp_path / "made.mcap")
+    with pytest.raises(Fault, match=r"made\.mcap: is there already"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
+
+
+def test_a_file_may_have_any_name(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    odd = source.rename(tmp_path / "Läufe \U0001f600.csv")
+    import_file(odd, channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].file == "Läufe \U0001f600.parquet"
+
+
+def test_a_time_of_any_clock_is_read(tmp_path: Path) -> None:
+    """Nanoseconds since 1970 need more digits than a float has whole ones."""
+    path = tmp_path / "epoch.parquet"
+    pq.write_table(pa.table({"timestamp_ns": np.int64(1_700_000_000_123_456_789) + np.arange(5) * 500_000}), path)
+    assert np.diff(read_table(path).column("timestamp_ns")) == pytest.approx(500_000, abs=256)
+
+
+@pytest.mark.parametrize(
+    ("byte", "value", "expected"), [(145, 11, "its reader died of signal"), (144, 0, "it is damaged")]
+)
+def test_a_damaged_file_of_matlab_is_told(tmp_path: Path, byte: int, value: int, expected: str) -> None:
+    """The first says of a column of real numbers that it is one of complex ones: SciPy reads on behind the end of the file."""
+    scipy.io.savemat(tmp_path / "run.mat", raw())
+    damaged = bytearray((tmp_path / "run.mat").read_bytes())
+    damaged[byte] = value
+    (tmp_path / "run.mat").write_bytes(damaged)
+    with pytest.raises(Fault, match=rf"BAD_TABLE: run.mat: cannot be read as mat: .*{expected}.*; take another copy"):
+        read_table(tmp_path / "run.mat")
+
+
+def test_a_damaged_compressed_file_of_matlab_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    scipy.io.savemat(path, {"force": np.random.default_rng(1).normal(size=4000)}, do_compression=True)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(data)
+    with pytest.raises(Fault, match=r"run.mat: cannot be read as mat: .*take another copy"):
+        read_table(path).column("force")
+
+
+def test_the_command(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".mat")
+    arguments = ["import", str(source), "--map", str(channel_map), "--out", str(tmp_path / "evidence"), "--json"]
+    result = CliRunner().invoke(log_app, arguments)
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["file"] == "measured.parquet"
+    result = CliRunner().invoke(log_app, arguments)
+    assert result.exit_code == 2
+    assert json.loads(result.stdout)["fault"] == "BAD_EVIDENCE"
+
+
+def test_a_log_tells_what_it_cannot_hold(tmp_path: Path) -> None:
+    vibration = '[channels]\nvibration_frequency_Hz = { column = "acc" }\nvibration_amplitude_m = { column = "acc" }\n'
+    source, channel_map = setup(tmp_path, ".csv", MAP.replace("[channels]\n", vibration))
+    findings = import_file(source, channel_map, tmp_path / "made.mcap").findings
+    told = [one.where for one in findings if "import it into a folder" in one.text]
+    assert told == [f"{source.name}: vibration_frequency_Hz", f"{source.name}: vibration_amplitude_m"]
+
+
+CSV = "Zeit;F\n" + "".join(f"{i * 0.5:.1f};{9.5 + 0.01 * (i % 7):.2f}\n" for i in range(4000)).replace(".", ",")
+GERMAN = MAP.replace('column = "time"', 'column = "Zeit"').replace(
+    'mass_accel_mps2 = { column = "acc", scale = 9.80665 }\n', ""
+)
+SOURCE = '[source]\ndelimiter = ";"\ndecimal = ","\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "channel_map", "expected"),
+    [
+        (CSV.replace("9,56", "OVL", 1), SOURCE + GERMAN, "column F: row 7 = 'OVL': must be a number"),
+        (CSV, GERMAN, "line 1: the names are separated by ';', not by ','"),
+        (CSV.replace("F", "F/µm", 1), SOURCE + GERMAN, "line 1: is not utf-8"),
+        (CSV.replace("1,0;9,52", "1,0", 1), SOURCE + GERMAN, "Row #4: Expected 2 columns, got 1"),
+    ],
+    ids=["text", "delimiter", "encoding", "ragged"],
+)
+def test_a_csv_file_of_another_kind_names_place_and_remedy(tmp_path: Path, text: str, channel_map: str, expected: str):
+    (tmp_path / "a.csv").write_text(text, encoding="latin-1")
+    (tmp_path / "map.toml").write_text(channel_map)
+    with pytest.raises(Fault) as caught:
+        import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out")
+    assert expected in caught.value.line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_cell_in_another_encoding_is_told_with_its_row(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(CSV + "0,1;ü\n", encoding="latin-1")
+    table = read_table(tmp_path / "a.csv", Dialect(";", ","))
+    with pytest.raises(Fault, match=r"a.csv: column F: row 4001 = b'\\xfc': must be a number, and is no UTF-8; remove"):
+        table.column("F")
+
+
+def test_a_name_with_a_control_character_stays_readable(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    import_file(source.rename(tmp_path / "odd\x7f.csv"), channel_map, tmp_path / "evidence")
+    assert load_evidence(tmp_path / "evidence").runs[0].file == "odd\x7f.parquet"
+
+
+@pytest.mark.parametrize("rate_Hz", ["1e-9", "1e300"])
+def test_a_sample_rate_that_no_recorder_has_is_refused(tmp_path: Path, rate_Hz: str) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    channel_map.write_text(f"[source]\nsample_rate_Hz = {rate_Hz}\n" + MAP)
+    with pytest.raises(Fault, match=r"CONFIG: .*source.sample_rate_Hz = .*must be"):
+        import_file(source, channel_map, tmp_path / "made.mcap")
+
+
+def test_a_csv_file_in_another_encoding(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(CSV.replace("F", "F/µN", 1), encoding="latin-1")
+    source = SOURCE + 'encoding = "latin-1"\n'
+    (tmp_path / "map.toml").write_text(source + GERMAN.replace('column = "F"', 'column = "F/µN"'), encoding="utf-8")
+    assert import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out").rows == 4000
+
+
+@pytest.mark.parametrize("start", ["\ufeff", "\ufeffLog of the rig\n"])
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_a_csv_file_of_windows_says_itself_that_it_is_utf_16(tmp_path: Path, start: str, encoding: str) -> None:
+    (tmp_path / "a.csv").write_bytes((start + CSV).encode(encoding))
+    table = read_table(tmp_path / "a.csv", Dialect(";", ",", start.count("\n")))
+    assert list(table.columns) == ["Zeit", "F"]
+    assert table.column("F")[:2].tolist() == [9.5, 9.51]
+
+
+def test_a_csv_file_in_a_wide_encoding_that_does_not_say_so(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(CSV.encode("utf-16-le"))
+    with pytest.raises(Fault, match=r'a.csv: line 1: has zero bytes.* encoding = "utf-16-le"'):
+        read_table(tmp_path / "a.csv", Dialect(";", ","))
+    assert len(read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-16-le")).column("F")) == 4000
+
+
+def test_no_signal_is_lost_while_a_csv_file_is_read(tmp_path):
+    write_raw(tmp_path / "run.csv", raw())
+    got, sent = threading.Event(), 0
+    before = signal.signal(signal.SIGTERM, lambda *_: got.set())
+    try:
+        for _ in range(100):
+            got.clear()
+            sender = threading.Timer(0.001, os.kill, (os.getpid(), signal.SIGTERM))
+            sender.start()
+            while sender.is_alive():
+                read_table(tmp_path / "run.csv")
+            sender.join()
+            assert got.wait(5.0), f"signal {sent} was lost"
+            sent += 1
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,105 @@
+"""Refits: an effect that changes a number of the rig table takes over what that number was moved by."""
+
+import numpy as np
+import pytest
+
+from diagnosis.fits.batch import together
+from diagnosis.fits.fit import step_within
+from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.gap.floor import floor_of, replicates
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.hypothesis import NOTHING
+from diagnosis.hypotheses.nuisances import Nuisances
+from diagnosis.hypotheses.trials import trials
+from diagnosis.model.rig import Roughness
+from tests.prepared import fitter_of, prepared
+
+
+def fitter_of_one_run(folder, effects):
+    evidence, runs = prepared(folder, "ladder", effects)
+    problem, nuisances = Problem(evidence.rig, runs[:1]), Nuisances(evidence.rig)
+    point = nuisances.point(np.zeros(len(nuisances)), {})
+    floor = floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 12, 1))
+    return Fitter(problem, floor, nuisances)
+
+
+@pytest.fixture
+def fitter(tmp_path):
+    return fitter_of_one_run(tmp_path / "one", {"static-level": {"ratio": -0.1}})
+
+
+def start_of(fitter, name):
+    return next(one for one in trials(fitter.problem) if one.form.effects == (name,))
+
+
+def test_a_level_takes_over_what_its_number_was_moved_by(fitter):
+    """From where the rig was retuned for want of the effect: the number at its bound, the effect nothing."""
+    retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(fitter.nuisances)))])[0]
+    static = fitter.nuisances.names.index("static_force_N")
+    assert retuned.deviations[static] == pytest.approx(-3.3)
+    trial = start_of(fitter, "static-level")
+    fit = fitter.refit(trial.form, retuned.deviations, np.zeros(1))
+    # with a derivative for each, -0.066 and -1.3
+    assert fit.form.tables(fit.w)["static-level"]["ratio"] == pytest.approx(-0.1, abs=0.003)
+    assert abs(fit.deviations[static]) < 0.2
+
+
+def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
+    described = np.zeros(len(fitter.nuisances))
+    yielding, sliding = start_of(fitter, "base-compliance"), start_of(fitter, "coulomb-level")
+    weightless = yielding.w + 20.0  # as soft and as quick as the ranges allow
+    rough = np.array([30.0])
+    impossible = fitter.predicted(described, yielding.form.tables(weightless))
+    assert not np.isfinite(impossible).any()
+    even = fitter.far_chi2(sliding.form, (described, rough), fitter.predicted(described, sliding.form.tables(rough)))
+    assert fitter.far_chi2(yielding.form, (described, weightless), impossible) > even > 1e3
+
+
+def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
+    fitter = fitter_of(*prepared(tmp_path / "damped", "ladder", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
+    described = np.zeros(len(fitter.nuisances))
+    base = fitter.refit(NOTHING, described, described[:0]).chi2
+
+    def tried_and_refitted(name):
+        start = start_of(fitter, name)
+        at = (start.form, described, start.w)
+        return [predictions_and_fit(fitter, work) for work in (fitter.trying(*at, base), fitter.refitting(*at))]
+
+    (tried, _), (refitted, _) = tried_and_refitted("accelerometer-gain")
+    assert tried < 0.6 * refitted
+    (_, tried), (_, refitted) = tried_and_refitted("drive-damping")
+    assert tried.chi2 < 0.5 * base
+    assert tried.chi2 < 1.05 * refitted.chi2
+
+
+def test_single_numbers_lead_on_where_derivatives_lead_astray(tmp_path):
+    """Where friction is late by more than a third of a slip, chi2 is jagged in every number of the rig at once."""
+    late = {"frictional-lag": {"form": "dead-time", "delay_s": 5.5e-3, "share": 1.0}}
+    fitter = fitter_of(*prepared(tmp_path / "late", "ladder", late))
+    form = next(one.form for one in trials(fitter.problem) if one.form.forms == {"frictional-lag": "dead-time"})
+    described, w = np.zeros(len(fitter.nuisances)), np.log([5.5e-3, 1.0]) - np.log([axis.scale for axis in form.axes])
+    residual, _ = fitter.whitened(fitter.predicted(described, form.tables(w)))
+    assert fitter.refit(form, described, w).chi2 < 0.7 * (residual @ residual)  # without them, as much as there
+
+
+def predictions_and_fit(fitter, work):
+    """How many predictions a fit takes, and the fit."""
+    asked = []
+
+    def predicted(points, perhaps=()):
+        asked.extend(points)
+        return fitter.predicted_many(points, perhaps)
+
+    (fit,) = together(predicted, [work])
+    return len(asked), fit
+
+
+def test_what_stands_at_its_bound_stays_there_only_if_it_would_go_beyond():
+    normal = np.array([[2.0, 1.0], [1.0, 2.0]])
+    at, most = np.array([3.3, 0.0]), np.array([3.3])
+    outward, free = step_within(normal, np.array([1.0, 0.2]), at, most)
+    assert outward == pytest.approx([0.0, 0.1])  # the other one goes as if the first were not there
+    assert free.tolist() == [False, True]
+    inward, free = step_within(normal, np.array([-1.0, 0.2]), at, most)
+    assert inward == pytest.approx(np.linalg.solve(normal, [-1.0, 0.2]))
+    assert free.all()

@@ -1,0 +1,83 @@
+"""A random load is told by what it scatters, whatever path it takes."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.fits.random_friction import RANDOM_EFFECTS, RandomFriction, in_bursts
+from diagnosis.fits.retuning import retuned_rig
+from diagnosis.gap.floor import replicates
+from diagnosis.gap.prepare import prepare
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.hypothesis import NOTHING
+from diagnosis.verdict.held_out import HeldOut
+from diagnosis.verdict.judge import JITTER
+from tests.blind.generator import Case, draw_effect, make
+from tests.prepared import prepared
+
+RATIO = 0.03
+LOAD = {"normal-load-fluctuation": {"form": "random", "ratio": RATIO, "frequency_Hz": 2.0, "seed": 5}}
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """A rig under a random load: its runs, and the refitted model without a load."""
+    evidence, runs = prepared(tmp_path_factory.mktemp("loaded") / "evidence", "ladder", LOAD)
+    problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
+    unseen = Problem(evidence.rig, [run for run in runs if run.holdout])
+    return retuned_rig(evidence, problem, lambda _said, _share: None), unseen
+
+
+def test_a_random_load_pays_and_its_size_is_found(rig):
+    (fitter, fit, roughness, expected_chi2), unseen = rig
+    found = RandomFriction("normal-load-fluctuation", fitter, fit).on(fit, JITTER)
+    assert found.gained > 30.0
+    assert found.fit.chi2 < 1.5 * expected_chi2 < 0.7 * fit.chi2
+    table = found.fit.effects["normal-load-fluctuation"]
+    assert table["form"] == "random"
+    assert RATIO / 2 < table["ratio"] < RATIO * 2
+    # on other runs the load takes another path: their gap is what such loads scatter
+    held_out = HeldOut(unseen, fitter.nuisances, found.fit, fit, roughness)
+    closed = held_out.closed_by(found.fit)
+    assert closed.shrinkage is not None
+    assert closed.shrinkage > 0.5
+    assert held_out.closed_by(fit).shrinkage == pytest.approx(0.0)
+
+
+def gained_on(rig, effects):
+    """What each random effect is worth on a rough and noisy run of the model with these effects."""
+    (fitter, fit, roughness, _), _ = rig
+    other = copy.copy(fitter.problem)
+    other.measured = replicates(other, fitter.nuisances.point(fit.deviations, effects), roughness, 1, 9)[0]
+    fitter = fitter.for_problem(other)
+    fit = fitter.refit(NOTHING, fit.deviations, np.zeros(0))
+    return {name: RandomFriction(name, fitter, fit).on(fit, JITTER).gained for name in RANDOM_EFFECTS}
+
+
+def test_without_one_each_costs_more_than_it_brings(rig):
+    assert max(gained_on(rig, {}).values()) < 0.0
+
+
+def test_a_random_track_is_not_taken_for_a_random_load(rig):
+    track = {"form": "random", "ratio": RATIO, "wavelength_m": 1.5e-3, "seed": 7}
+    gained = gained_on(rig, {"position-dependent-friction": track})
+    assert gained["position-dependent-friction"] > max(gained["normal-load-fluctuation"], 0.0) + 10.0
+
+
+def rigs_in_bursts(folder, effect, formula, count):
+    """How many of so many made rigs with an effect show bursts."""
+    drawn = (draw_effect(np.random.default_rng(seed), effect) for seed in range(100))
+    found = []
+    for seed, one in enumerate([one for one in drawn if one.formula.name == formula][:count]):
+        make(folder / str(seed), Case((one,)), seed)
+        evidence = load_evidence(folder / str(seed))
+        found.append(in_bursts(Problem(evidence.rig, [run for run in prepare(evidence) if not run.holdout])))
+    return sum(found)
+
+
+def test_bursts_are_not_taken_for_a_load_that_goes_on(tmp_path):
+    """Of 12 each 11 and 3, which takes a minute."""
+    assert rigs_in_bursts(tmp_path / "debris", "debris-bursts", "gaussian", 4) == 4
+    assert rigs_in_bursts(tmp_path / "load", "normal-load-fluctuation", "narrow-band", 4) <= 1

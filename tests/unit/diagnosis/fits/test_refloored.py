@@ -1,0 +1,28 @@
+"""Beside a large effect the floors of the rig without it are those of another rig."""
+
+import numpy as np
+
+from diagnosis.fits.refits import refits
+from diagnosis.fits.refloored import on_floor_of
+from diagnosis.fits.retuning import ROUGHNESS, Retuned, expected_chi2
+from diagnosis.hypotheses.hypothesis import NOTHING
+from diagnosis.hypotheses.trials import trials
+from tests.prepared import fitter_of, prepared
+
+SOFTER = -0.3
+
+
+def test_a_right_effect_leaves_little_on_its_own_floors(tmp_path):
+    effects = {"drive-stiffness": {"form": "", "ratio": SOFTER}}
+    fitter = fitter_of(*prepared(tmp_path / "rig", "ladder", effects))
+    described = np.zeros(len(fitter.nuisances))
+    (trial,) = [one for one in trials(fitter.problem) if one.form.effects == ("drive-stiffness",)]
+    (softer,) = refits(fitter, [(trial.form, described, np.array([SOFTER / trial.form.axes[0].scale]))], 1)
+    without = fitter.refit(NOTHING, described, np.zeros(0))
+    first = Retuned(fitter, without, ROUGHNESS, expected_chi2(fitter, without, ROUGHNESS, 1))
+    again = on_floor_of(softer, first, [softer], [])
+    (on_its_own,) = again.singles
+    assert again.pairs == []
+    assert softer.chi2 > 4.0 * first.expected_chi2  # which would be called unexplained
+    assert on_its_own.chi2 < 2.5 * again.retuned.expected_chi2
+    assert again.retuned.fit.chi2 > 20.0 * on_its_own.chi2

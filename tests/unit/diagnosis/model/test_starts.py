@@ -1,0 +1,99 @@
+"""Where refits start: what the evidence itself shows of a wave or of a ring, and a screw placed by the drive's own sensor."""
+
+import math
+
+import numpy as np
+import pytest
+
+from diagnosis.gap.problem import Problem
+from diagnosis.hypotheses.ringing import ringing_Hz
+from diagnosis.hypotheses.trials import wave_trial
+from diagnosis.hypotheses.waves import Wave, drive_waves, friction_series, friction_waves_beside, two_friction_waves
+from diagnosis.model.predict import predict
+from diagnosis.model.rig import rig_config
+from tests.prepared import prepared
+
+PITCH_M = 1e-3
+
+
+@pytest.fixture(scope="module")
+def screw(tmp_path_factory):
+    ripple = {
+        "form": "screw",
+        "ratio": 0.08,
+        "wavelength_m": PITCH_M,
+        "phase_rad": 1.0,
+        "second_sin": 0.3,
+        "second_cos": -0.4,
+    }
+    return prepared(tmp_path_factory.mktemp("starts") / "screw", "ladder", {"drive-speed-ripple": ripple})
+
+
+def test_a_wave_of_the_drive_is_found_with_its_second_harmonic(screw):
+    _, runs = screw
+    wave = max(drive_waves(runs, "position", 4), key=lambda wave: wave.ratio * (abs(wave.period - PITCH_M) < 3e-5))
+    assert wave.period == pytest.approx(PITCH_M, rel=0.01)
+    assert wave.ratio == pytest.approx(0.08, rel=0.1)
+    assert (wave.second_sin**2 + wave.second_cos**2) ** 0.5 == pytest.approx(0.5, rel=0.15)
+
+
+def test_a_screw_stands_where_the_drives_own_sensor_says(screw):
+    """A quarter of a turn on the sensor is a quarter of a turn of the phase."""
+    evidence, runs = screw
+    run = runs[0]
+    wave = {"form": "screw", "ratio": 0.08, "wavelength_m": PITCH_M, "second_sin": 0.0, "second_cos": 0.0}
+
+    def drive_m(phase_rad: float, zero_m: float):
+        assert run.start.drive_m is not None
+        config = rig_config(evidence.rig, {}, {"drive-speed-ripple": wave | {"phase_rad": phase_rad}}, None)
+        start = run.start._replace(drive_m=run.start.drive_m + zero_m)
+        return predict(config, False, run.commands, start)["drive_position_m"]
+
+    assert drive_m(0.5 + 0.5 * math.pi, 0.0) == pytest.approx(drive_m(0.5, 0.25 * PITCH_M), abs=1e-9)
+    assert np.ptp(drive_m(0.5, 0.0) - drive_m(0.5, 0.25 * PITCH_M)) > 1e-6
+
+
+def test_two_waves_along_the_track_are_found_together(tmp_path):
+    other = {"other_share": 0.6, "other_wavelength_m": 9e-4, "other_phase_rad": -1.1}
+    track = {"form": "two-waves", "ratio": 0.06, "wavelength_m": 4e-3, "phase_rad": 0.7, **other}
+    evidence, runs = prepared(tmp_path / "track", "ladder", {"position-dependent-friction": track})
+    problem = Problem(evidence.rig, runs)
+    pairs = two_friction_waves(runs, problem.scales, 4)
+    assert any(
+        first.period == pytest.approx(4e-3, rel=0.1) and other.period == pytest.approx(9e-4, rel=0.03)
+        for first, other in pairs
+    )
+    assert all(first.ratio >= other.ratio > 0.0 for first, other in pairs)
+
+
+def test_waves_beside_a_wave_have_their_own_phase(tmp_path):
+    """At other periods the phase at the zero of the position differs by turns; where the slide is it must stay."""
+    bumps = {"form": "bumps", "ratio": 0.15, "wavelength_m": 3e-3, "phase_rad": 0.7, "width": 0.12}
+    evidence, runs = prepared(tmp_path / "bumps", "ladder", {"position-dependent-friction": bumps})
+    scales = Problem(evidence.rig, runs).scales
+    own = Wave(3e-3, 0.05, 0.0, spread=0.04)
+    shorter, same, longer = friction_waves_beside(runs, scales, [own], (-0.25, 0.0, 0.25))
+    assert [one.period for one in (shorter, same, longer)] == pytest.approx([2.97e-3, 3e-3, 3.03e-3])
+    at_m = np.concatenate([one.at for one in friction_series(runs, scales, "position")]).mean()
+    turns = [at_m / one.period + one.phase_rad / (2.0 * math.pi) for one in (shorter, same, longer)]
+    for beside in (turns[0], turns[2]):
+        assert math.remainder(beside - turns[1], 1.0) == pytest.approx(0.0, abs=0.15)
+
+
+def test_a_wave_over_time_turns_once_in_a_run():
+    """Slower, in a phase of its own in every run, it would be any trend."""
+    trial = wave_trial("normal-load-fluctuation", "sine", Wave(5.0, 0.02, 0.0), slowest_Hz=0.1)
+    (frequency,) = [axis for axis in trial.form.axes if axis.name == "frequency_Hz"]
+    assert frequency.value(0.0) == pytest.approx(0.2)
+    assert frequency.value(-2.0) == pytest.approx(0.1)
+
+
+def test_a_base_that_rings_shows_its_frequency(tmp_path):
+    """Stuck to the base, the slide lowers it: 1 / (compliance omega^2) is 5 kg, and 1.5 kg more."""
+    ring = {"compliance_m_per_N": 2e-7, "frequency_Hz": 160.0, "damping_ratio": 0.03}
+    evidence, runs = prepared(tmp_path / "ring", "ladder", {"base-compliance": ring})
+    base_kg = 1.0 / (2e-7 * (2.0 * math.pi * 160.0) ** 2)
+    stuck_Hz = 160.0 / math.sqrt(1.0 + evidence.rig.mass_kg / base_kg)
+    found = ringing_Hz(Problem(evidence.rig, runs).runs, "base_accel_mps2", 2)
+    assert any(abs(one - stuck_Hz) < 5.0 for one in found)
+    assert ringing_Hz(runs, "nothing", 2) == []

@@ -1,0 +1,298 @@
+"""The report of a diagnosis: the answer first, nothing from outside, small, and nothing that a diagnosis holds breaks it."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from bridge import units
+from bridge.log.finding import Finding
+from diagnosis.evidence.exciter_harmonics import DISTORTED
+from diagnosis.evidence.force_pickup import PICK_UP
+from diagnosis.report import words as in_words
+from diagnosis.report.page import rig_row, where_map, write_report
+from diagnosis.report.summary import summary
+from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Parameter, Picture, Shrinkage, to_json
+from tests import made_up
+
+NAN = math.nan
+
+
+def page_of(diagnosis: Diagnosis, tmp_path, name: str = "rig-07") -> str:
+    path = tmp_path / "report.html"
+    write_report(diagnosis, name, path)
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+    return path.read_text(encoding="utf-8")
+
+
+def text_of(page: str) -> str:
+    body = re.sub(r"<[^>]*>", " ", page.split("<body>")[1])
+    return re.sub(r"\s+", " ", body)
+
+
+def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
+    text = text_of(page_of(made_up.diagnosis(), tmp_path))
+    assert text.index("drive-backlash, probability 93 %") < 150
+    parts = [
+        "The drive has play",
+        "Which explanation?",
+        "gap 81 µm (90 %: 76 to 86)",
+        "Below 1.5 % each: force-sensor-lag",
+        "Cannot be told apart with these runs: force-sensor-delay, drive-damping",
+        "How far is the model off?",
+        "closes 98 % of the gap that tuning the described numbers leaves open (90 %: 95 % to 100 %)",
+        "flexible residual",
+        "Where does the difference lie?",
+        "drive force stick",
+        "mass acceleration stick",
+        "above 200 Hz",
+        "Pictures",
+        "Third cycle of run-04",
+        "The rig's numbers",
+        "drive stiffness 11.7 kN/m 11.01 kN/m ± 2 % -2.9",
+        "contact stiffness 77.52 MN/m 77.52 MN/m known exactly",
+        "What to measure next",
+        "Reverse the drive",
+        "differ by 4.2 standard deviations",
+        "What is wrong or missing in the data",
+        "12 samples at 20 N were left out",
+        "Words",
+    ]
+    place = 0
+    for part in parts:
+        place = text.index(part, place)
+
+
+def test_twenty_pictures_stay_small_and_nothing_comes_from_outside(tmp_path):
+    pictures = tuple(made_up.picture("residual" if seed % 2 else "cycle", 2000, seed) for seed in range(20))
+    page = page_of(made_up.diagnosis()._replace(pictures=pictures), tmp_path)
+    assert len(page.encode()) < 5e6
+    assert page.count("data:image/png;base64,") == 20
+    assert not re.search(r"https?://|<link|<script|@import|url\(", page)
+    assert all(source.startswith("data:image/png;base64,") for source in re.findall(r'src="([^"]{0,30})', page))
+
+
+def test_too_many_pictures_are_drawn_coarser(tmp_path, monkeypatch):
+    monkeypatch.setattr("diagnosis.report.page_plots._ALL_BYTES", 60_000)
+    pictures = tuple(made_up.picture("residual", 2000, seed) for seed in range(4))
+    page = page_of(made_up.diagnosis()._replace(pictures=pictures), tmp_path)
+    assert page.count("data:image/png;base64,") == 4
+    assert len(page) < 100_000
+
+
+def test_text_is_text(tmp_path):
+    nasty = "<script>alert('&')</script> $x_1$ {{ 1 }}"
+    made = made_up.diagnosis()
+    curve = Curve(nasty, np.array([0.0, 1.0]), np.array([0.0, 1.0]), "effect")
+    made = made._replace(
+        summary=(nasty,),
+        candidates=(Candidate(nasty, 0.5, nasty, {nasty: Estimate(1.0, (0.0, 2.0))}),),
+        not_distinguishable=((nasty, nasty),),
+        where=(Cell(nasty, nasty, (0.0, 1.0), nasty, 1.0),),
+        gap=made.gap._replace(definition=nasty, runs=(nasty,), compared=(Shrinkage(nasty, 1.0, 0.0, None),)),
+        pictures=(Picture("residual", nasty, nasty, nasty, (curve,)),),
+        findings=(made.findings[0]._replace(kind=nasty, where=nasty, text=nasty),),
+    )
+    page = page_of(made, tmp_path, nasty)
+    assert "<script" not in page
+    assert "{{ 1 }}" in page
+
+
+@pytest.mark.parametrize("verdict", ["no-gap", "unexplained"])
+def test_a_diagnosis_with_nothing_in_it(verdict, tmp_path):
+    made = made_up.diagnosis()
+    empty = made._replace(
+        verdict=verdict,
+        effects=(),
+        summary=(),
+        candidates=(),
+        not_distinguishable=(),
+        where=(),
+        gap=made.gap._replace(runs=(), shrinkage=None, interval_90=None, compared=()),
+        next_experiment=made.next_experiment._replace(gain=None),
+        rig=(),
+        findings=(),
+        pictures=(),
+    )
+    page = page_of(empty, tmp_path)
+    assert f'class="verdict {verdict}"' in page
+    assert "with the best explanation" not in page
+    assert "No place stands out." in page
+    assert "base64" not in page
+
+
+def test_numbers_that_are_none(tmp_path):
+    made = made_up.diagnosis()
+    hole = Curve("hole", np.array([0.0, 1.0, 2.0]), np.array([NAN, math.inf, 1.0]), "measured")
+    nothing = Curve("nothing", np.array([]), np.array([]), "points")
+    broken = made._replace(
+        candidates=(
+            Candidate("drive-backlash", NAN, "", {"gap_m": Estimate(NAN, (NAN, math.inf))}),
+            Candidate("none", 0.0),
+        ),
+        where=(Cell("drive_force_N", "slip", (0.0, math.inf), "run-01", NAN), Cell("x", "new", (0.0, 1.0), "r", 0.4)),
+        gap=made.gap._replace(nominal=NAN, retuned=math.inf, with_effect=-1.0, floor=NAN, interval_90=(NAN, NAN)),
+        next_experiment=made.next_experiment._replace(gain=NAN),
+        rig=(Parameter("mass_kg", NAN, math.inf, 0.1), Parameter("drive_damping_Ns_per_m", 0.0, 1.0, 0.1)),
+        pictures=(Picture("cycle", "", "", "", (hole, nothing)), Picture("residual", "", "", "", ())),
+        elapsed_s=NAN,
+    )
+    page = page_of(broken, tmp_path)
+    assert "unknown" in page
+    assert "width: nan" not in page
+
+
+def test_without_a_run_kept_aside_there_is_no_chart_but_what_to_do(tmp_path):
+    made = made_up.diagnosis()
+    alone = made.gap._replace(runs=(), nominal=NAN, retuned=NAN, with_effect=NAN, floor=NAN, compared=())
+    page = page_of(made._replace(gap=alone), tmp_path)
+    assert "Add a second run" in page
+    assert "how much of that drive-backlash closes" in page
+    assert "with the best explanation" not in page
+    assert "unknown" not in page.split("<h2>How far")[1].split("<h2>")[0]
+
+
+def test_the_map_keeps_the_order_of_a_cycle_and_counts_what_it_leaves_out():
+    cells = tuple(
+        Cell("drive_force_N", regime, (0.0, 20.0), run, share)
+        for regime, run, share in (
+            ("steady", "b", 0.5),
+            ("stick", "a", 0.3),
+            ("slip", "b", 0.196),
+            ("restick", "a", 0.004),
+        )
+    )
+    runs, rows, left_out = where_map(cells)
+    assert runs == ["a", "b"]
+    assert [(row.regime, row.shares) for row in rows] == [
+        ("stick", [0.3, None]),
+        ("slip", [None, 0.196]),
+        ("steady", [None, 0.5]),
+    ]
+    assert left_out == pytest.approx(0.004)
+
+
+def test_an_effect_that_cannot_be_told_from_another_says_so_at_once():
+    made = made_up.diagnosis()._replace(not_distinguishable=(("drive-damping", "drive-backlash"),))
+    assert "or drive-damping, which would explain these runs nearly as well" in in_words.headline(made)
+    assert "two and three" in in_words.headline(made._replace(effects=("two", "three")))
+
+
+@pytest.mark.parametrize(("form", "said"), [("random", True), ("sine", False)])
+def test_what_scatters_at_random_says_what_else_would(form, said):
+    nearest = (Candidate("unexplained", 0.6), Candidate("normal-load-fluctuation", 0.3, form))
+    made = made_up.diagnosis()._replace(verdict="unexplained", effects=(), candidates=nearest)
+    told = " ".join(summary(made))
+    assert ("as normal-load-fluctuation at random would (probability 30 %)" in told) is said
+
+
+def test_words_fit_what_the_runs_kept_aside_say():
+    made = made_up.diagnosis()
+    far = made._replace(verdict="no-gap", effects=(), gap=made.gap._replace(retuned=3.4))
+    assert "these runs cannot tell, what was kept aside is 3.4 noise floors off" in in_words.headline(far)
+    worse = made._replace(gap=made.gap._replace(retuned=2.9, with_effect=3.6, shrinkage=-0.37))
+    assert "the gap grows from 2.9 to 3.6 noise floors" in " ".join(summary(worse))
+    two = ("coulomb-level", "drive-backlash")
+    gap = made.gap._replace(refuted=two, compared=(Shrinkage(" and ".join(two), 5.0, 0.1, None),))
+    told = " ".join(summary(made._replace(verdict="unexplained", effects=(), gap=gap)))
+    assert "coulomb-level and drive-backlash explain the runs that were fitted" in told
+    assert "5 noise floors with them" in told
+    assert units.percent(-0.003) == "0 %"
+
+
+@pytest.mark.parametrize(("retuned", "said"), [(0.97, True), (1.3, False)])
+def test_a_gap_that_the_runs_kept_aside_do_not_show_is_said_to_be_in_the_others(retuned, said):
+    made = made_up.diagnosis()
+    gap = made.gap._replace(retuned=retuned)
+    told = " ".join(summary(made._replace(verdict="unexplained", effects=(), gap=gap)))
+    assert f"kept aside, rig and model are {gap.nominal:g} noise floors apart" in told
+    assert ("So the gap shows in the fitted runs alone." in told) is said
+
+
+@pytest.mark.parametrize(
+    ("left", "effects", "said"),
+    [(2.2, ("drive-backlash",), False), (5.54, ("drive-backlash",), True), (5.54, (), False)],
+)
+def test_a_name_that_leaves_more_than_a_right_one_says_so(left, effects, said):
+    made = made_up.diagnosis()
+    verdict = "effect" if effects else "unexplained"
+    gap = made.gap._replace(retuned=6.51, with_effect=left)
+    told = " ".join(summary(made._replace(verdict=verdict, effects=effects, gap=gap)))
+    assert ("leaves about 1 there, not 5.5" in told) is said
+
+
+def test_runs_of_two_folders_keep_their_names_apart():
+    made = made_up.diagnosis()
+    cells = [cell._replace(run=run) for cell, run in zip(made.where, ("a/1.csv", "b/1.csv"), strict=False)]
+    assert [cell["run"] for cell in to_json(made._replace(where=tuple(cells)))["where"]] == ["a/1", "b/1"]
+
+
+def test_runs_in_which_nothing_moves_are_in_the_summary():
+    findings = tuple(Finding("still", f"run-0{i}.csv: drive_position_m", "0 m in all") for i in (1, 3))
+    told = " ".join(summary(made_up.diagnosis()._replace(verdict="no-gap", effects=(), findings=findings)))
+    assert "In run-01.csv, run-03.csv the drive stands still: friction and drive are not tested there." in told
+
+
+def test_what_vibrates_as_no_model_does_is_in_the_summary_with_its_runs():
+    picked_up = tuple(Finding(PICK_UP, f"run-0{i}.csv: drive_force_N", "vibrates with 0.3 N") for i in (1, 2, 4))
+    findings = (*picked_up[:2], Finding(DISTORTED, "run-02.csv: base_accel_mps2", "moves at 5000 Hz"), picked_up[2])
+    told = " ".join(summary(made_up.diagnosis()._replace(findings=findings)))
+    assert "run-01.csv: drive_force_N vibrates with 0.3 N. So in run-02.csv, run-04.csv." in told
+    assert "run-02.csv: base_accel_mps2 moves at 5000 Hz." in told
+
+
+@pytest.mark.parametrize(
+    ("name", "estimate", "words"),
+    [
+        ("gap_m", Estimate(8.1e-5, (7.6e-5, 8.6e-5)), "gap 81 µm (90 %: 76 to 86)"),
+        ("delay_s", Estimate(1.04e-3, (1.01e-3, 1.07e-3)), "delay 1.040 ms (90 %: 1.010 to 1.070)"),
+        ("ratio", Estimate(0.052, (0.048, 0.056)), "relative change 5.20 % (90 %: 4.80 to 5.60)"),
+        ("damping_Ns2_per_m2", Estimate(210.0, (NAN, NAN)), "damping 210 N s²/m²"),
+        ("rate_per_s", Estimate(0.002, (0.001, 0.003)), "rate 0.0020 1/s (90 %: 0.0010 to 0.0030)"),
+        ("compliance_m_per_N", Estimate(1e-6, (NAN, NAN)), "compliance 1 µm/N"),
+        ("exponent", Estimate(0.3, (0.3, 0.3)), "exponent 0.3 (90 %: 0.3 to 0.3)"),
+        ("corner_Hz", Estimate(3000.0, (2900.0, 3100.0)), "corner 3.00 kHz (90 %: 2.90 to 3.10)"),
+    ],
+)
+def test_an_estimate_in_words(name, estimate, words):
+    assert in_words.estimate_in_words(name, estimate) == words
+
+
+def test_every_effect_of_the_library_has_words():
+    from plant.effects.library import EFFECTS
+
+    assert in_words.EFFECT_WORDS.keys() >= EFFECTS.keys()
+
+
+def test_what_is_nearly_sure_is_not_certain():
+    assert [units.percent(share) for share in (0.0, 1e-4, 0.004, 0.93, 0.996, 0.9999, 1.0, NAN, None)] == [
+        "0 %",
+        "< 0.1 %",
+        "0.4 %",
+        "93 %",
+        "99.6 %",
+        "> 99.9 %",
+        "100 %",
+        "unknown",
+        "unknown",
+    ]
+
+
+def test_a_number_known_exactly_has_not_moved():
+    assert rig_row(Parameter("mass_kg", 1.5, 1.5, 0.0)).shift_sd is None
+    assert rig_row(Parameter("mass_kg", 1.5, 1.53, 0.01)).shift_sd == pytest.approx(2.0)
+    tail = rig_row(Parameter("stribeck_tail", 0.0, -0.12, 0.4))
+    assert tail.tolerance == "± 0.4"
+    assert tail.shift_sd == pytest.approx(-0.3)
+
+
+def test_a_name_that_the_runs_kept_aside_do_not_test_says_so(tmp_path):
+    made = made_up.diagnosis()
+    untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
+    assert any(
+        "kept aside, there is no gap to close: new data have not tested the name" in one for one in summary(untested)
+    )
+    page = text_of(page_of(untested, tmp_path))
+    assert "There is no gap to close on these runs: they do not test what is named." in page
+    assert "Nothing is named" not in page

@@ -1,0 +1,157 @@
+"""Evidence made from the plant: readable without a doubt, the same from the same seed, silent about the effect."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.features.cycles import find_cycles
+from diagnosis.synthetic import folder as making
+from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.protocols import FORCE_PROTOCOL, PROTOCOLS, RunPlan
+from plant.effects.library import EFFECTS
+
+SHORT = (RunPlan(((0.0, 5e-4),), duration_s=1.0), RunPlan(((0.0, 5e-4),), duration_s=1.0, holdout=True))
+BACKLASH = {"drive-backlash": {"gap_m": 1e-4}}
+
+
+@pytest.fixture
+def short(monkeypatch) -> str:
+    """A protocol of two short runs."""
+    monkeypatch.setitem(PROTOCOLS, "shortest", SHORT)
+    return "shortest"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("protocol", [*PROTOCOLS, FORCE_PROTOCOL])
+def test_every_protocol_loads_without_a_doubt(tmp_path, protocol):
+    make_evidence(tmp_path, Case(protocol), 1)
+    evidence = load_evidence(tmp_path)
+    wrong = [finding for finding in evidence.findings if finding.kind != "missing"]
+    assert not wrong
+    *fitted, last = (run.holdout for run in evidence.runs)
+    assert (any(fitted), last) == (False, True)
+    assert all(run.t_s[0] == 0.0 for run in evidence.runs)
+
+
+def test_a_seed_gives_the_same_bytes(tmp_path, short):
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        make_evidence(tmp_path / name, Case(short), seed)
+    first = contents(tmp_path / "a")
+    assert first == contents(tmp_path / "b")
+    other = contents(tmp_path / "c")
+    assert all(first[name] != other[name] for name in first if name.endswith(".parquet"))
+
+
+def test_the_folder_says_nothing_about_the_effect(tmp_path):
+    make_evidence(tmp_path / "plain", Case(), 1)
+    make_evidence(tmp_path / "with", Case(effects=BACKLASH), 1)
+    plain, disturbed = contents(tmp_path / "plain"), contents(tmp_path / "with")
+    assert plain.keys() == disturbed.keys()
+    assert plain["manifest.toml"] == disturbed["manifest.toml"]
+    for name, data in disturbed.items():
+        assert not [effect for effect in EFFECTS if effect.encode() in data.lower()]
+        if name.endswith(".parquet"):
+            schemas = [pq.read_schema(tmp_path / folder / name) for folder in ("plain", "with")]
+            assert schemas[0].equals(schemas[1], check_metadata=True)
+            assert plain[name] != data
+
+
+def test_a_rig_as_described_has_its_period_and_its_forces(tmp_path):
+    make_evidence(tmp_path, Case("constant", drawn=False), 3)
+    run = load_evidence(tmp_path).runs[0]
+    cycles = find_cycles(run.t_s, run.columns["drive_force_N"])
+    # the paper's pair: 17.38 N, 1.03 s; a rough surface of 0.6 % moves the period by 6 x that at most
+    assert cycles.force_max_N == pytest.approx(17.38, rel=0.01)
+    assert cycles.period_s == pytest.approx(1.03, rel=0.04)
+
+
+def test_the_true_parameters_are_drawn_within_the_tolerances(tmp_path):
+    case = Case("constant", tolerances={"static_force_N": 0.1})
+    described = making.paper_rig()
+    table = making._rig_table(described, "spring", case.tolerances)
+    ratios = []
+    for seed in range(200):
+        contact = making._draw_rig(np.random.default_rng(seed), described, table, case).config.contact
+        assert contact.coulomb_force_N == described.contact.coulomb_force_N
+        assert contact.static_force_N >= 1.02 * contact.coulomb_force_N
+        ratios.append(contact.static_force_N / described.contact.static_force_N)
+    assert np.std(ratios) == pytest.approx(0.1, rel=0.2)
+    make_evidence(tmp_path, case, 5)
+    random = np.random.default_rng(np.random.SeedSequence(5).spawn(2)[0])
+    true_N = making._draw_rig(random, described, table, case).config.contact.static_force_N
+    assert abs(true_N / 17.38 - 1.0) > 0.02
+    run = load_evidence(tmp_path).runs[0]
+    assert find_cycles(run.t_s, run.columns["drive_force_N"]).force_max_N == pytest.approx(true_N, rel=0.01)
+
+
+def test_the_ladder_holds_both_directions_and_the_vibration(tmp_path):
+    make_evidence(tmp_path, Case(), 1)
+    runs = load_evidence(tmp_path).runs
+    assert [run.drive_velocity_mps for run in runs] == [0.0005, None, 0.0005, None]
+    assert ["vibration_amplitude_m" in run.columns for run in runs] == [False, False, True, True]
+    turned = runs[1].columns["drive_force_N"]
+    assert turned.max() > 15.0
+    assert turned.min() < -15.0
+    rows = (runs[2].t_s > 8.5) & (runs[2].t_s < 9.9)
+    base_mps2 = runs[2].columns["base_accel_mps2"][rows]
+    assert set(runs[2].columns["vibration_frequency_Hz"][rows]) == {2000.0}
+    # u0 omega^2 = 3.16 m/s^2; a sensor of 10 kHz takes 2 % of it
+    assert base_mps2.std() * math.sqrt(2.0) == pytest.approx(2e-8 * (2 * math.pi * 2000.0) ** 2, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        BACKLASH,
+        {"drive-hardening": {"ratio": 1.0}},
+        {"drive-hardening": {"form": "bilinear", "ratio": -0.5}},
+        {"frame-compliance": {"ratio": 0.5}},
+        {"base-compliance": {}},
+        {"force-sensor-delay": {"delay_s": 0.01}},
+    ],
+)
+def test_a_run_starts_at_rest_whatever_the_rig(tmp_path, short, effects):
+    make_evidence(tmp_path, Case(short, effects), 1)
+    run = load_evidence(tmp_path).runs[0]
+    force_N = run.columns["drive_force_N"][run.t_s < 0.05]
+    assert 4.0 < force_N.mean() < 16.0
+    # 0.05 s at 0.5 mm/s are 0.3 N; noise 0.04 N rms at most
+    assert np.ptp(force_N) < 0.9
+
+
+@pytest.mark.parametrize("rate_Hz", [1000.0, 50_000.0])
+def test_other_rates_and_fewer_channels(tmp_path, short, rate_Hz):
+    make_evidence(tmp_path, Case(short, rate_Hz=rate_Hz, leave_out=("mass_position_m",)), 1)
+    run = load_evidence(tmp_path).runs[1]
+    assert len(run.t_s) == round(rate_Hz)
+    assert np.diff(run.t_s) == pytest.approx(1.0 / rate_Hz)
+    assert "mass_position_m" not in run.columns
+
+
+@pytest.mark.parametrize("case", [Case("unheard-of"), Case(rate_Hz=777.0)])
+def test_what_cannot_be_made_leaves_nothing(tmp_path, case):
+    with pytest.raises(ValueError, match=r"must|known"):
+        make_evidence(tmp_path / "new", case, 1)
+    assert not (tmp_path / "new").exists()
+
+
+def test_the_axis_obeys_its_equation_of_motion(tmp_path):
+    make_evidence(tmp_path, Case(FORCE_PROTOCOL, drawn=False), 1)
+    evidence = load_evidence(tmp_path)
+    assert evidence.rig.drive == "force"
+    run = evidence.runs[1]
+    assert set(run.columns) == {"drive_force_N", "mass_position_m"}
+    speed_mps = np.gradient(np.convolve(run.columns["mass_position_m"], np.ones(41) / 41, "same"), 1e-3)
+    accel_mps2 = np.gradient(np.convolve(speed_mps, np.ones(41) / 41, "same"), 1e-3)
+    sliding = np.abs(speed_mps) > 0.05
+    sliding[:2000] = sliding[-100:] = False
+    friction_N = 20.0 * np.sign(speed_mps) + 200.0 * speed_mps
+    left_N = run.columns["drive_force_N"] - 95.0 * accel_mps2 - friction_N
+    assert np.abs(left_N[sliding]).mean() < 1.5  # of 110 N; smoothing the acceleration costs 1 %

@@ -1,0 +1,39 @@
+"""Linear algebra has one thread, or a diagnosis depends on how many cores there are."""
+
+import numpy as np  # noqa: F401  # what threadpoolctl finds is what is loaded
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from diagnosis import diagnose
+from diagnosis.processes import each
+
+
+class _SeenError(Exception):
+    pass
+
+
+def threads() -> set[int]:
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+
+def seen(_shared: None, wanted: int) -> set[int]:
+    assert wanted == 0
+    return threads()
+
+
+def test_a_diagnosis_has_one_thread_wherever_it_works(monkeypatch):
+    def stop(_evidence):
+        raise _SeenError(threads())
+
+    monkeypatch.setattr(diagnose, "prepare", stop)
+    with threadpool_limits(limits=2):
+        assert threads() == {2}
+        with pytest.raises(_SeenError, match=r"\{1\}"):
+            diagnose.diagnose(None, lambda _text, _share: None)  # pyright: ignore[reportArgumentType]
+        assert threads() == {2}
+
+
+def test_so_have_its_workers(monkeypatch):
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.setenv(name, "2")
+    assert each(2, seen, None, [0, 0]) == [{1}, {1}]

@@ -1,0 +1,158 @@
+"""Which names a run kept aside may refute: those that say what it will show."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.gap.floor import Floor
+from diagnosis.hypotheses.hypothesis import Axis, Form
+from diagnosis.verdict import held_out as heldout
+from diagnosis.verdict.held_out import HeldOut, foretells
+
+
+def form(name: str, form: str, *parameters: str) -> Form:
+    return Form({name: form}, tuple(Axis(name, one, 0.1, False, 1.0, -1.0, 1.0) for one in parameters))
+
+
+WAVE = ("ratio", "phase_rad", "second_sin", "second_cos")
+FORETELLS = [
+    (form("static-level", "", "ratio"), True),
+    (form("position-dependent-friction", "wave", "wavelength_m", *WAVE), True),  # the track is the same
+    (form("drive-speed-ripple", "screw", "wavelength_m", *WAVE), True),
+    (form("base-compliance", "", "compliance_m_per_N", "frequency_Hz"), True),
+    (form("normal-load-fluctuation", "sine", "frequency_Hz", *WAVE), False),
+    (form("drive-speed-ripple", "time", "frequency_Hz", *WAVE), False),
+    (form("position-dependent-friction", "random", "ratio", "wavelength_m"), False),
+]
+
+
+def stand_in(
+    retuned: float,
+    left: float,
+    gap: float = 1.0,
+    scattered: float = 1.0,
+    shows: bool = True,
+    left_open: float | None = None,
+) -> Any:
+    """Held-out runs of 100 features, in chi2 by their course; gap and what is left of it in floors, by their scatter."""
+    runs = SimpleNamespace(
+        _too_much=lambda left, expected: HeldOut._too_much(runs, left, expected),
+        _left_open=lambda _fit, _residual: left if left_open is None else left_open,
+        _left_retuned=np.array([retuned**0.5, 0.0]),
+        _left=lambda _fit: np.array([0.0, left**0.5]) if shows else np.array([retuned**0.5, 0.0]),
+        floor=SimpleNamespace(whitening=range(100)),
+        retuned=gap,
+        left_by=lambda _fit: scattered,
+    )
+    return runs
+
+
+def fit_of(form: Form) -> Any:
+    return SimpleNamespace(form=form, deviations=None, w=None)
+
+
+def both(first: Form, second: Form) -> Form:
+    return Form(first.forms | second.forms, (*first.axes, *second.axes))
+
+
+def test_the_axes_of_two_effects_are_not_one_wave():
+    """A wave along the track has a phase and a base a frequency: neither turns over time."""
+    track, base, load = FORETELLS[1][0], FORETELLS[3][0], FORETELLS[4][0]
+    assert foretells(both(track, base))
+    assert not foretells(both(load, base))
+
+
+def test_what_goes_by_a_wider_floor_is_measured_by_that_floor():
+    """A cell as its own replicates are, at a level of 2 there and 1 here, is 1 floor off with either."""
+    ones = np.ones(1)
+    narrow = Floor(0 * ones, ones < 0, ones, ones > 0, np.eye(1), (("force", "stick", (0.0, 20.0), "a"),), 1.0)
+    held_out = HeldOut.__new__(HeldOut)
+    held_out.floor, held_out._wider = narrow, narrow._replace(level=2.0)
+    held_out._differences = lambda floor, _form, at: [np.array([floor.level])] * len(at)  # pyright: ignore[reportAttributeAccessIssue]
+    plain, random = FORETELLS[0][0], FORETELLS[6][0]
+    (exactly,) = held_out._squares(plain, [(ones, np.zeros(1))])
+    assert held_out._squares(random, [(ones, np.zeros(2))])[0] == pytest.approx(exactly, rel=0.1)
+
+
+@pytest.mark.parametrize(("effect", "does"), FORETELLS)
+def test_what_says_nothing_of_another_run_is_not_asked_to_follow_it(effect, does):
+    """Held-out runs of which the fit leaves all that there was by its course, and nothing by its scatter."""
+    held_out = stand_in(500.0, 500.0, gap=5.0, scattered=1.0)
+    assert foretells(effect) is does
+    assert HeldOut.refutes(held_out, fit_of(effect), 0.4) is does
+
+
+@pytest.mark.parametrize(
+    ("gap", "left", "refuted"),
+    [
+        (8.8, 5.3, True),  # a tilted track taken for a load
+        (9.5, 1.9, False),
+        (1.5, 1.4, False),  # nothing is left that a right one would not leave
+        (8.8, 3.5, False),  # much is left, and most is closed
+    ],
+)
+def test_what_another_run_scatters_far_more_than_it_should_is_refuted(gap, left, refuted):
+    load = FORETELLS[4][0]
+    assert HeldOut.refutes(stand_in(500.0, 500.0, gap, left), fit_of(load), 0.4) is refuted
+
+
+@pytest.mark.parametrize(
+    ("retuned", "left", "refuted"),
+    [
+        (100.0, 95.0, True),  # of little to be seen hardly anything
+        (100.0, 75.0, False),  # two fifths of it are enough
+        (2000.0, 1000.0, True),  # half of it, and 25 times what a right model leaves
+        (2000.0, 500.0, False),  # much is left, and most is closed
+        (340.0, 172.0, False),  # little is left
+    ],
+)
+def test_what_another_run_does_not_bear_out_is_refuted(retuned, left, refuted):
+    assert HeldOut.refutes(stand_in(retuned, left), fit_of(FORETELLS[0][0]), 0.4) is refuted
+
+
+def test_what_would_not_show_in_another_run_is_not_refuted_by_it():
+    hidden = stand_in(2000.0, 0.0, shows=False)  # backlash, where nothing reverses
+    assert not HeldOut.refutes(hidden, fit_of(FORETELLS[0][0]), 0.4)
+
+
+def test_where_nothing_can_be_compared_there_is_no_shrinkage():
+    held_out = HeldOut.__new__(HeldOut)
+    held_out.retuned = HeldOut._gap(np.zeros(0))
+    closed = held_out._closed(np.zeros(0), [np.zeros(0)])
+    assert math.isnan(closed.gap)
+    assert closed.shrinkage is closed.interval_90 is None
+
+
+@pytest.mark.parametrize(
+    ("left", "left_open", "refuted"), [(298.0, 84.0, False), (255.0, 250.0, True), (100.0, 300.0, False)]
+)
+def test_what_a_fit_leaves_open_may_be_otherwise_elsewhere(left, left_open, refuted):
+    """An ageing whose scale the fitted runs do not tell; a seal named as a static level; a name that needs no such help."""
+    held_out = stand_in(255.0, left, left_open=left_open)
+    assert HeldOut.refutes(held_out, fit_of(FORETELLS[0][0]), 0.4) is refuted
+
+
+def test_what_is_left_open_is_the_least_that_moved_parameters_leave(monkeypatch):
+    """A straight problem: the same as by least squares with the parameters' own covariance as a prior."""
+    random = np.random.default_rng(1)
+    rates, residual = random.normal(size=(30, 4)), random.normal(size=30)
+    covariance = np.cov(random.normal(size=(4, 9)))
+    at = random.normal(size=4)
+    monkeypatch.setattr(heldout, "whitened", lambda _floor, _problem, predicted: (predicted,))
+    held_out: Any = HeldOut.__new__(HeldOut)
+    held_out.floor = None
+    held_out._nuisances = SimpleNamespace(point=lambda deviations, tables: np.concatenate([deviations, tables]))
+    held_out.problem = SimpleNamespace(
+        predicted_many=lambda points: [residual + rates @ (point - at) for point in points]
+    )
+    fit = SimpleNamespace(
+        deviations=at[:3], w=at[3:], form=SimpleNamespace(tables=lambda w: w), covariance=lambda: covariance
+    )
+    spread = np.linalg.cholesky(covariance)
+    whole = np.vstack([rates @ spread, np.eye(4)])
+    least = np.linalg.lstsq(whole, np.concatenate([residual, np.zeros(4)]))[1][0]
+    assert held_out._left_open(fit, residual) == pytest.approx(least, rel=1e-6)
+    assert least < residual @ residual
