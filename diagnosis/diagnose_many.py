@@ -27,22 +27,22 @@ Diagnose = Callable[[Evidence, Progress, int], Diagnosis]
 _CLUSTER_WAIT_S = 5  # for the scheduler to answer, and again for a first worker
 
 
-class Source(NamedTuple):
+class EvidenceFolder(NamedTuple):
     """An evidence folder and the name it goes by in results; no two have the same name."""
 
     name: str
     folder: Path
 
 
-class Outcome(NamedTuple):
+class FolderResult(NamedTuple):
     """What became of one folder: a diagnosis, or the code and the line of a fault."""
 
-    source: Source
+    source: EvidenceFolder
     diagnosis: Diagnosis | None
     fault: tuple[str, str] | None
 
 
-def find_sources(folders: list[Path]) -> list[Source]:
+def find_sources(folders: list[Path]) -> list[EvidenceFolder]:
     """The evidence folders among `folders` and, where one has no manifest, right below it; each once, in order."""
     found: dict[Path, None] = {}
     for folder in folders:
@@ -56,7 +56,7 @@ def find_sources(folders: list[Path]) -> list[Source]:
         found.update(dict.fromkeys(given))
     names = [folder.name for folder in found]
     unique = [folder if names.count(folder.name) > 1 else Path(folder.name) for folder in found]
-    return [Source(shown(name), folder) for name, folder in zip(unique, found, strict=True)]
+    return [EvidenceFolder(shown(name), folder) for name, folder in zip(unique, found, strict=True)]
 
 
 def real_diagnose(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
@@ -67,8 +67,8 @@ def real_diagnose(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosi
 
 
 def diagnose_many(
-    sources: Iterable[Source], jobs: int, cluster: str = "", diagnose: Diagnose = real_diagnose
-) -> Generator[Outcome]:
+    sources: Iterable[EvidenceFolder], jobs: int, cluster: str = "", diagnose: Diagnose = real_diagnose
+) -> Generator[FolderResult]:
     """Yield the outcome of every source, as they come.
 
     With `cluster`, the address of a Dask scheduler, its workers do it and `jobs` does not matter. `diagnose` must be a
@@ -92,25 +92,25 @@ def diagnose_many(
                     del waiting[source.name]
 
 
-def _alone(source: Source, diagnose: Diagnose, workers: "_Workers") -> Outcome:
+def _alone(source: EvidenceFolder, diagnose: Diagnose, workers: "_Workers") -> FolderResult:
     try:
         return next(iter(workers.pool(1)([delayed(_one)(source, diagnose)])))
     except workers.breakdowns as error:
         line = f"{source.folder}: its worker process died ({type(error).__name__}); out of memory? Try fewer or shorter runs"
-        return Outcome(source, None, ("PEER_DIED", line))
+        return FolderResult(source, None, ("PEER_DIED", line))
 
 
-def _one(source: Source, diagnose: Diagnose) -> Outcome:
+def _one(source: EvidenceFolder, diagnose: Diagnose) -> FolderResult:
     try:
         # a worker of the one level is no dispatcher of another: Dask would spread what is inside once more
         with parallel_config("sequential"):
-            return Outcome(source, diagnose(load_evidence(source.folder), lambda _text, _share: None, 1), None)
+            return FolderResult(source, diagnose(load_evidence(source.folder), lambda _text, _share: None, 1), None)
     except Fault as fault:
-        return Outcome(source, None, (fault.kind.code, fault.line))
+        return FolderResult(source, None, (fault.kind.code, fault.line))
     except Exception as error:  # hours of other folders must not end with this one
         at = traceback.extract_tb(error.__traceback__)[-1]
         line = f"{type(error).__name__}: {error} ({Path(at.filename).name}, line {at.lineno})"
-        return Outcome(source, None, ("DIAGNOSIS_BROKE", line))
+        return FolderResult(source, None, ("DIAGNOSIS_BROKE", line))
 
 
 class _Workers(NamedTuple):

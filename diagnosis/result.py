@@ -63,7 +63,7 @@ class Gap(NamedTuple):
     refuted: tuple[str, ...] = ()  # what the fitted runs would have named, and these do not bear out
 
 
-class Parameter(NamedTuple):
+class RigNumber(NamedTuple):
     """A number of the rig table: as described, and as refitted inside its tolerance."""
 
     name: str
@@ -110,7 +110,7 @@ class Diagnosis(NamedTuple):
     where: tuple[Cell, ...]  # largest share first
     gap: Gap
     next_experiment: Experiment
-    rig: tuple[Parameter, ...]
+    rig: tuple[RigNumber, ...]
     findings: tuple[Finding, ...]
     pictures: tuple[Picture, ...]
     compared_features: int  # of the fitted runs: what every chi2 is a sum over

@@ -19,8 +19,8 @@ from diagnosis.result import (
     Estimate,
     Experiment,
     Gap,
-    Parameter,
     Picture,
+    RigNumber,
     Shrinkage,
 )
 
@@ -127,12 +127,12 @@ def diagnosis() -> Diagnosis:
             4.2,
         ),
         rig=(
-            Parameter("mass_kg", 1.5, 1.4968, 0.005),
-            Parameter("drive_stiffness_N_per_m", 11700.0, 11012.0, 0.02),
-            Parameter("contact_stiffness_N_per_m", 77.52e6, 77.52e6, 0.0),
-            Parameter("static_force_N", 17.38, 17.61, 0.03),
-            Parameter("stribeck_velocity_mps", 0.0005, 0.00052, 0.1),
-            Parameter("stribeck_tail", 0.0, -0.12, 0.4),
+            RigNumber("mass_kg", 1.5, 1.4968, 0.005),
+            RigNumber("drive_stiffness_N_per_m", 11700.0, 11012.0, 0.02),
+            RigNumber("contact_stiffness_N_per_m", 77.52e6, 77.52e6, 0.0),
+            RigNumber("static_force_N", 17.38, 17.61, 0.03),
+            RigNumber("stribeck_velocity_mps", 0.0005, 0.00052, 0.1),
+            RigNumber("stribeck_tail", 0.0, -0.12, 0.4),
         ),
         findings=(
             Finding("missing", "run-01.parquet: base_accel_mps2", "not there: what the piezo delivers cannot be seen"),

@@ -34,7 +34,7 @@ AsJson = Annotated[
 Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one HTML file.")]
 
 
-class Source(StrEnum):
+class GeneratorName(StrEnum):
     """Where the rigs come from."""
 
     independent = "independent"
@@ -51,8 +51,8 @@ def blind_make(
     out: Annotated[Path, typer.Option(metavar="DIR", help="The set: a new folder.")],
     key: Key,
     generator: Annotated[
-        Source, typer.Option(help="Formulas of their own, or those that the diagnosis itself tries.")
-    ] = Source.independent,
+        GeneratorName, typer.Option(help="Formulas of their own, or those that the diagnosis itself tries.")
+    ] = GeneratorName.independent,
     jobs: Jobs = None,
 ) -> None:
     """Make evidence folders whose names tell nothing, and a key with the answers.

@@ -18,7 +18,7 @@ from cockpit.run.child_process import guarded, report
 from cockpit.run.writable import check_writable, writing
 
 if TYPE_CHECKING:
-    from diagnosis.diagnose_many import Outcome, Source
+    from diagnosis.diagnose_many import EvidenceFolder, FolderResult
     from diagnosis.evidence.folder import Evidence
     from diagnosis.result import Diagnosis
 
@@ -70,7 +70,7 @@ def diagnose(
     sys.exit(guarded(work, as_json == _STDOUT))
 
 
-def _check_destinations(wishes: _Wishes, one: bool, sources: list["Source"]) -> None:
+def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolder"]) -> None:
     """Refuse now what could not be written after minutes of work. Raises Fault CONFIG or LOG_WRITE."""
     if wishes.apply is not None and not one:
         raise Fault(
@@ -100,7 +100,7 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["Source"]) -> 
             raise Fault("CONFIG", f"{option} {path}: {rule}; choose another")
 
 
-def _diagnose_one(source: "Source", wishes: _Wishes) -> int:
+def _diagnose_one(source: "EvidenceFolder", wishes: _Wishes) -> int:
     from cockpit.commands.diagnose_output import in_words, watched
     from diagnosis.evidence.folder import load_evidence
     from diagnosis.report.page import write_report
@@ -153,7 +153,7 @@ def _tell(wishes: _Wishes, line: str) -> None:
 
 
 def _result(
-    source: "Source", evidence: "Evidence", wishes: _Wishes, progress: Callable[[str, float], None]
+    source: "EvidenceFolder", evidence: "Evidence", wishes: _Wishes, progress: Callable[[str, float], None]
 ) -> "Diagnosis":
     from diagnosis import diagnose_many as many
 
@@ -166,12 +166,12 @@ def _result(
     return outcome.diagnosis
 
 
-def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
+def _diagnose_many(sources: list["EvidenceFolder"], wishes: _Wishes) -> int:
     from cockpit.commands.diagnose_output import in_a_line, many_as_json, watched
     from diagnosis import diagnose_many as many
     from diagnosis.report.page import write_report
 
-    found: dict[str, Outcome] = {}
+    found: dict[str, FolderResult] = {}
     refused: list[Fault] = []
     reports = _report_names([source.name for source in sources])
     with (
@@ -197,7 +197,7 @@ def _diagnose_many(sources: list["Source"], wishes: _Wishes) -> int:
     return min((status for status in (*statuses, _told(refused)) if status), default=0)
 
 
-def _without_pictures(outcome: "Outcome") -> "Outcome":
+def _without_pictures(outcome: "FolderResult") -> "FolderResult":
     """Pictures are by far the largest part, and hundreds of folders are meant to fit into memory."""
     return outcome._replace(diagnosis=outcome.diagnosis and outcome.diagnosis._replace(pictures=()))
 

@@ -10,7 +10,7 @@ from diagnosis.report import words
 from diagnosis.result import to_json
 
 if TYPE_CHECKING:
-    from diagnosis.diagnose_many import Outcome
+    from diagnosis.diagnose_many import FolderResult
     from diagnosis.result import Diagnosis
 
 MANY_FORMAT = "diagnoses/1"
@@ -39,7 +39,7 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
     return [*lines, *(f"{'' if i else 'data':<10} {line}" for i, line in enumerate(data))]
 
 
-def in_a_line(outcome: "Outcome") -> str:
+def in_a_line(outcome: "FolderResult") -> str:
     """What became of one folder among many."""
     if outcome.diagnosis is not None:
         # the run that was kept aside unasked is no fault of the data
@@ -50,12 +50,12 @@ def in_a_line(outcome: "Outcome") -> str:
     return f"{outcome.source.name}: {code}: {line}"
 
 
-def many_as_json(outcomes: "list[Outcome]") -> dict[str, Any]:
+def many_as_json(outcomes: "list[FolderResult]") -> dict[str, Any]:
     """The JSON object for many folders, in the order given."""
     return {"format": MANY_FORMAT, "results": [_as_json(outcome) for outcome in outcomes]}
 
 
-def _as_json(outcome: "Outcome") -> dict[str, Any]:
+def _as_json(outcome: "FolderResult") -> dict[str, Any]:
     if outcome.diagnosis is not None:
         return {"evidence": outcome.source.name, "diagnosis": to_json(outcome.diagnosis)}
     code, line = outcome.fault or ("", "")

@@ -39,7 +39,7 @@ class Latency(NamedTuple):
     within_1_ms: float  # share
 
 
-class Verdict(NamedTuple):
+class RunVerdict(NamedTuple):
     """A run's figures."""
 
     log: str
@@ -74,12 +74,12 @@ class Verdict(NamedTuple):
         return table
 
 
-def judge(path: Path) -> Verdict:
+def judge(path: Path) -> RunVerdict:
     """Read a log and judge its run. Raises Fault BAD_LOG."""
     return judge_run(read_run(path))
 
 
-def judge_run(run: RunData) -> Verdict:
+def judge_run(run: RunData) -> RunVerdict:
     """Judge a run that was read."""
     controller = run.configuration("controller")
     try:
@@ -122,7 +122,7 @@ def judge_run(run: RunData) -> Verdict:
             f"DRIVE_UNSEEN: {np.count_nonzero(unmoved)} slips while the drive position stood, first at {first_s:.3f} s: is its "
             "transducer at the end of its range, or loose?"
         )
-    return Verdict(
+    return RunVerdict(
         log=str(run.path),
         seconds=seconds,
         blocks=blocks,
@@ -204,7 +204,7 @@ def _latency(run: RunData) -> Latency | None:
     return Latency(p50, p99, p999, min(in_time / max(len(run.applied) - 1, 1), 1.0))
 
 
-def in_words(verdict: Verdict) -> list[str]:
+def in_words(verdict: RunVerdict) -> list[str]:
     """The verdict as lines for a person."""
     v = verdict
     lines: list[str] = []
@@ -235,7 +235,7 @@ def in_words(verdict: Verdict) -> list[str]:
     return lines
 
 
-def headline(verdict: Verdict) -> str:
+def headline(verdict: RunVerdict) -> str:
     """The answer in one line."""
     v = verdict
     if v.blocks == 0:

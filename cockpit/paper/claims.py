@@ -10,7 +10,7 @@ from cockpit.paper.runs import (
     PTFE_PAIRS,
     STEEL_PAIRS,
     Key,
-    Run,
+    PairRun,
     Slip,
     paper_rig,
     vibration_velocity_mps,
@@ -42,7 +42,7 @@ REFERENCE: Final[dict[Key, tuple[float, float, float] | tuple[float]]] = {
 }
 
 
-class Row(NamedTuple):
+class PaperRow(NamedTuple):
     """One line of the report. `deviation_percent` is None where a claim is not a number."""
 
     group: str
@@ -53,12 +53,12 @@ class Row(NamedTuple):
     deviation_percent: float | None = None
 
 
-def paper_claims(runs: Mapping[Key, Run]) -> list[Row]:
+def paper_claims(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
     """The statements of the paper's text and conclusions."""
     velocities = [vibration_velocity_mps(f) * 1e3 for f in (1000, 2000, 3000, 4000, 5000)]
     expected = (0.126, 0.251, 0.377, 0.503, 0.628)
     rows = [
-        Row(
+        PaperRow(
             PAPER_CLAIMS,
             "v_a at 1, 2, 3, 4, 5 kHz and u0 = 0.02 µm is 0.126, 0.251, 0.377, 0.503, 0.628 mm/s (2π f u0, no run)",
             ", ".join(f"{velocity:.3f}" for velocity in velocities) + " mm/s",
@@ -71,7 +71,7 @@ def paper_claims(runs: Mapping[Key, Run]) -> list[Row]:
     for pair in PTFE_PAIRS:
         ours = runs[pair, 0]
         rows.append(
-            Row(
+            PaperRow(
                 PAPER_CLAIMS,
                 f"{pair}: no stick-slip without vibration (it follows from friction values that are assumed, see below)",
                 f"{ours.mean.late_slips:.0f} slips; F_d {ours.mean.settled_force_N:.2f} N",
@@ -82,14 +82,14 @@ def paper_claims(runs: Mapping[Key, Run]) -> list[Row]:
     return rows
 
 
-def _claims_of_a_pair(pair: str, runs: Mapping[Key, Run]) -> list[Row]:
+def _claims_of_a_pair(pair: str, runs: Mapping[Key, PairRun]) -> list[PaperRow]:
     at = {f: runs[pair, f].mean for f in (0, 1000, 2000, 3000, 4000, 5000)}
     sliding = (0, 1000, 2000, 3000)
     swings = [at[f].swing_N for f in sliding]
     sticks = [at[f].stick_s for f in sliding]
     swing_text = " → ".join(f"{swing:.2f}" for swing in swings) + " N"
     return [
-        Row(
+        PaperRow(
             PAPER_CLAIMS,
             f"{pair}: v_a below v_d (1, 2, 3 kHz) reduces the stick-slip only in part",
             f"{', '.join(f'{at[f].late_slips:.0f}' for f in sliding[1:])} slips remain; "
@@ -97,14 +97,14 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, Run]) -> list[Row]:
             "slips remain at each; swing smaller than without",
             all(at[f].late_slips > 0 and 0 < at[f].swing_N < swings[0] for f in sliding[1:]),
         ),
-        Row(
+        PaperRow(
             PAPER_CLAIMS,
             f"{pair}: the reduction grows with v_a (swing F_d max - F_d min at 0 → 1 → 2 → 3 kHz)",
             swing_text,
             "smaller at each step",
             _falling(swings),
         ),
-        Row(
+        PaperRow(
             PAPER_CLAIMS,
             f"{pair}: complete elimination once v_a reaches v_d (4 kHz: v_a/v_d = "
             f"{vibration_velocity_mps(4000) / DRIVE_VELOCITY_MPS:.3f}; 5 kHz)",
@@ -112,7 +112,7 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, Run]) -> list[Row]:
             "no slip from t = 8.1 s on",
             at[4000].late_slips == at[5000].late_slips == 0,
         ),
-        Row(
+        PaperRow(
             PAPER_CLAIMS,
             f"{pair}: the drive force falls further from 4 to 5 kHz",
             f"{at[4000].settled_force_N:.2f} → {at[5000].settled_force_N:.2f} N",
@@ -123,7 +123,7 @@ def _claims_of_a_pair(pair: str, runs: Mapping[Key, Run]) -> list[Row]:
     ]
 
 
-def _stick_row(pair: str, sticks_s: list[float]) -> Row:
+def _stick_row(pair: str, sticks_s: list[float]) -> PaperRow:
     found = " → ".join(f"{stick_s:.3f}" for stick_s in sticks_s) + " s"
     claim, criterion, passed = (
         f"{pair}: the stick phases shorten with f (re-stick to next breakaway at 0 → 1 → 2 → 3 kHz)",
@@ -136,16 +136,16 @@ def _stick_row(pair: str, sticks_s: list[float]) -> Row:
         claim = f"{pair}: the stick phases are shorter at 3 kHz than at 0 (the paper says so of steel only)"
         criterion = "shorter at 3 kHz than at 0; not asked of each step"
         passed = sticks_s[3] < sticks_s[0]
-    return Row(PAPER_CLAIMS, claim, found, criterion, passed)
+    return PaperRow(PAPER_CLAIMS, claim, found, criterion, passed)
 
 
 def _falling(values: list[float]) -> bool:
     return all(later < earlier for earlier, later in pairwise(values))
 
 
-def reference_rows(runs: Mapping[Key, Run]) -> list[Row]:
+def reference_rows(runs: Mapping[Key, PairRun]) -> list[PaperRow]:
     """Every number of the independent solution against ours."""
-    rows: list[Row] = []
+    rows: list[PaperRow] = []
     group = "Numbers against an independent solution"
     for (pair, frequency_Hz), reference in REFERENCE.items():
         run = runs[pair, frequency_Hz]
@@ -153,7 +153,7 @@ def reference_rows(runs: Mapping[Key, Run]) -> list[Row]:
         if len(reference) == 1:
             settled_N, slips = run.mean.settled_force_N, run.mean.late_slips
             rows.append(_number(group, f"{where}: drive force", settled_N, reference[0], "N", _FORCE_PERCENT))
-            rows.append(Row(group, f"{where}: period = none", f"{slips:.0f} slips", "no slip", slips == 0))
+            rows.append(PaperRow(group, f"{where}: period = none", f"{slips:.0f} slips", "no slip", slips == 0))
             continue
         for name, ours, scatter, theirs, unit, percent in zip(
             ("F_d max", "F_d min", "period"),
@@ -168,7 +168,7 @@ def reference_rows(runs: Mapping[Key, Run]) -> list[Row]:
     return rows
 
 
-def slip_rows(slip: Slip) -> list[Row]:
+def slip_rows(slip: Slip) -> list[PaperRow]:
     """The undisturbed slip of steel on steel in detail."""
     group = "One slip of C45-C45 @ 0.063 without vibration"
     return [
@@ -180,9 +180,9 @@ def slip_rows(slip: Slip) -> list[Row]:
     ]
 
 
-def parameter_rows() -> list[Row]:
+def parameter_rows() -> list[PaperRow]:
     """Tables 1 and 2: do the printed values agree with the laws that the paper gives for them?"""
-    rows: list[Row] = []
+    rows: list[PaperRow] = []
     group = "Tables 1 and 2 agree with themselves"
     for pair in STEEL_PAIRS:
         rig = paper_rig(pair)
@@ -205,11 +205,11 @@ def _number(
     unit: str,
     percent: float,
     scatter: float | None = None,
-) -> Row:
+) -> PaperRow:
     deviation_percent = 100.0 * (ours / theirs - 1.0)
     digits = max(0, 4 - len(str(int(abs(theirs)))))
     spread = f" ± {scatter:.3f}" if scatter is not None else ""
-    return Row(
+    return PaperRow(
         group,
         f"{claim} {theirs:.{min(digits, 3)}f} {unit}",
         f"{ours:.{digits}f}{spread} {unit}",

@@ -4,13 +4,13 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cockpit.paper.claims import PAPER_CLAIMS, Row, paper_claims, parameter_rows, reference_rows, slip_rows
+from cockpit.paper.claims import PAPER_CLAIMS, PaperRow, paper_claims, parameter_rows, reference_rows, slip_rows
 from cockpit.paper.runs import (
     CYCLES_FROM_S,
     PTFE_PAIRS,
     STEEL_PAIRS,
     Key,
-    Run,
+    PairRun,
     one_slip,
     paper_rig,
     plan,
@@ -22,7 +22,7 @@ from cockpit.paper.runs import (
 class ReproduceResult(NamedTuple):
     """Every check of the report in its order, and how long the whole took."""
 
-    rows: list[Row]
+    rows: list[PaperRow]
     elapsed_s: float
 
     @property
@@ -62,7 +62,7 @@ def reproduce(out: Path, progress: bool) -> ReproduceResult:
     return result._replace(elapsed_s=time.perf_counter() - started_s)
 
 
-def _simulate(progress: bool) -> dict[Key, Run]:
+def _simulate(progress: bool) -> dict[Key, PairRun]:
     from rich.console import Console
     from rich.progress import Progress
 
@@ -70,19 +70,19 @@ def _simulate(progress: bool) -> dict[Key, Run]:
     with Progress(console=console, transient=True, disable=not (progress and console.is_terminal)) as bar:
         keys = plan()
         task = bar.add_task("", total=sum(len(starts_s(f)) for _, f in keys))
-        runs: dict[Key, Run] = {}
+        runs: dict[Key, PairRun] = {}
         for pair, frequency_Hz in keys:
             bar.update(task, description=f"{pair} N/mm², {frequency_Hz} Hz")
             runs[pair, frequency_Hz] = run(pair, frequency_Hz, lambda: bar.advance(task))
     return runs
 
 
-def _page(result: ReproduceResult, runs: dict[Key, Run]) -> str:
+def _page(result: ReproduceResult, runs: dict[Key, PairRun]) -> str:
     from jinja2 import Environment, StrictUndefined
 
     from cockpit.paper.plots import figures
 
-    groups: dict[str, list[Row]] = {}
+    groups: dict[str, list[PaperRow]] = {}
     for row in result.rows:
         groups.setdefault(row.group, []).append(row)
     template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")

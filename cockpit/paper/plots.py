@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cockpit.paper.runs import DRIVE_VELOCITY_MPS, FREQUENCIES_HZ, Key, Run, vibration_velocity_mps
+from cockpit.paper.runs import DRIVE_VELOCITY_MPS, FREQUENCIES_HZ, Key, PairRun, vibration_velocity_mps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _FORCE, _SLIDE, _DRIVE = "#1b4f72", "#b03a2e", "#808b96"
 
 
-class Picture(NamedTuple):
+class PageFigure(NamedTuple):
     """One figure of the page: `png` is base64."""
 
     title: str
@@ -23,7 +23,7 @@ class Picture(NamedTuple):
     png: str
 
 
-def figures(runs: Mapping[Key, Run]) -> list[Picture]:
+def figures(runs: Mapping[Key, PairRun]) -> list[PageFigure]:
     """Every figure of the page, in the paper's order."""
     pictures = [_without_vibration(runs)]
     for number, pair in (("3", "C45-C45 @ 0.063"), ("4", "C45-C45 @ 0.104")):
@@ -35,13 +35,13 @@ def figures(runs: Mapping[Key, Run]) -> list[Picture]:
     return pictures
 
 
-def _without_vibration(runs: Mapping[Key, Run]) -> Picture:
+def _without_vibration(runs: Mapping[Key, PairRun]) -> PageFigure:
     pairs = ("C45-C45 @ 0.063", "C45-GGG40 @ 0.063", "C45-PTFE @ 0.063")
     figure, axes = _grid(2, len(pairs), 4.6)
     for column, pair in enumerate(pairs):
         _courses(axes[:, column], runs[pair, 0], 0.0, 16.0, pair.split(" @ ")[0])
     _labels(axes)
-    return Picture(
+    return PageFigure(
         "Figure 2: without vibration",
         "Drive force F_d, position of the slide x and of the drive s_d at 0.063 N/mm². "
         "Steel and cast iron stick and slip; PTFE slides evenly.",
@@ -49,12 +49,12 @@ def _without_vibration(runs: Mapping[Key, Run]) -> Picture:
     )
 
 
-def _sweep(runs: Mapping[Key, Run], number: str, pair: str) -> Picture:
+def _sweep(runs: Mapping[Key, PairRun], number: str, pair: str) -> PageFigure:
     figure, axes = _grid(2, len(FREQUENCIES_HZ), 5.0)
     for column, frequency_Hz in enumerate(FREQUENCIES_HZ):
         _courses(axes[:, column], runs[pair, frequency_Hz], 8.0, 12.0, _at(frequency_Hz, "\n"))
     _labels(axes)
-    return Picture(
+    return PageFigure(
         f"Figure {number}: {pair} N/mm², 0 to 5 kHz",
         "The four seconds after the vibration comes on at t = 8 s, with the same seconds without it on the "
         "left. The swing of F_d and the steps of x shrink from left to right; from 4 kHz on there are none.",
@@ -62,21 +62,21 @@ def _sweep(runs: Mapping[Key, Run], number: str, pair: str) -> Picture:
     )
 
 
-def _one_and_three_kHz(runs: Mapping[Key, Run], number: str, pair: str) -> Picture:
+def _one_and_three_kHz(runs: Mapping[Key, PairRun], number: str, pair: str) -> PageFigure:
     figure, axes = _grid(2, 2, 4.8)
     for column, frequency_Hz in enumerate((1000, 3000)):
         _courses(axes[:, column], runs[pair, frequency_Hz], 0.0, 16.0, _at(frequency_Hz, ", "))
         for axis in axes[:, column]:
             axis.axvline(8.0, color="black", linewidth=0.8, linestyle=":")
     _labels(axes)
-    return Picture(
+    return PageFigure(
         f"Figure {number}: {pair} N/mm² at 1 and 3 kHz",
         "The whole course. The vibration comes on at the dotted line.",
         _png(figure),
     )
 
 
-def _against_frequency(runs: Mapping[Key, Run], number: str, material: str) -> Picture:
+def _against_frequency(runs: Mapping[Key, PairRun], number: str, material: str) -> PageFigure:
     figure, axes = _grid(1, 2, 3.2, share_y=False)
     f_kHz = np.array(FREQUENCIES_HZ) / 1000.0
     for axis, pressure in zip(axes[0], ("0.063", "0.104"), strict=True):
@@ -93,7 +93,7 @@ def _against_frequency(runs: Mapping[Key, Run], number: str, material: str) -> P
         axis.set_xlabel("vibration frequency f [kHz]")
         axis.set_ylabel("drive force F_d [N]")
         axis.legend(frameon=False)
-    return Picture(
+    return PageFigure(
         f"Figure {number}: {material}, largest and smallest drive force against frequency",
         "Means over the cycles of t = 10.5-20 s. To the right of the dotted line v_a exceeds v_d: the two "
         "curves meet, and the force falls on.",
@@ -115,7 +115,7 @@ def _grid(rows: int, columns: int, height_in: float, share_y: bool = True) -> tu
     return figure, axes
 
 
-def _courses(axes: Any, run: Run, from_s: float, to_s: float, title: str) -> None:
+def _courses(axes: Any, run: PairRun, from_s: float, to_s: float, title: str) -> None:
     course = run.course
     part = slice(*np.searchsorted(course.t_s, (from_s, to_s)))
     t_s = course.t_s[part]

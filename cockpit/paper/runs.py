@@ -58,7 +58,7 @@ class Measured(NamedTuple):
     late_slips: float
 
 
-class Run(NamedTuple):
+class PairRun(NamedTuple):
     """One pair at one frequency: course of the run that starts at 8 s, mean and scatter over all starts."""
 
     course: Course
@@ -98,7 +98,7 @@ def plan() -> list[Key]:
     return [(pair, f) for pair in STEEL_PAIRS for f in FREQUENCIES_HZ] + [(pair, 0) for pair in PTFE_PAIRS]
 
 
-def run(pair: str, frequency_Hz: int, done: Callable[[], None]) -> Run:
+def run(pair: str, frequency_Hz: int, done: Callable[[], None]) -> PairRun:
     """Simulate one pair at one frequency from all its starts; `done` is called after each."""
     rig = paper_rig(pair)
     measured: list[Measured] = []
@@ -110,7 +110,9 @@ def run(pair: str, frequency_Hz: int, done: Callable[[], None]) -> Run:
         done()
     assert course is not None  # noqa: S101 - every frequency has a start
     values = np.array(measured)
-    return Run(course, len(measured), Measured(*values.mean(axis=0).tolist()), Measured(*values.std(axis=0).tolist()))
+    return PairRun(
+        course, len(measured), Measured(*values.mean(axis=0).tolist()), Measured(*values.std(axis=0).tolist())
+    )
 
 
 def measure(simulation: Simulation) -> Measured:

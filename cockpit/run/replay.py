@@ -145,7 +145,7 @@ def likely_reason(run: RunData, settings: list[str]) -> str:
     return "same versions and configuration: the controller's code was changed since, or the log was"
 
 
-class Outcome(NamedTuple):
+class RunFigures(NamedTuple):
     """What a run came to, for comparing two."""
 
     slips: int
@@ -155,7 +155,7 @@ class Outcome(NamedTuple):
     vibration_dose_mm2_per_s: float  # integral of v_a squared
 
 
-def outcome(run: RunData) -> Outcome:
+def outcome(run: RunData) -> RunFigures:
     """The figures of a run from its log."""
     verdict = judge_run(run)
     trace = run.trace
@@ -165,7 +165,7 @@ def outcome(run: RunData) -> Outcome:
     dose = float((trace["vibration_velocity_mps"] ** 2).sum()) * block_s * 1e6
     slips = int(trace["slips"][-1])
     swing_N = verdict.after.swing_N if verdict.after else 0.0
-    return Outcome(slips, swing_N, verdict.velocity_ratio_min, work_J, dose)
+    return RunFigures(slips, swing_N, verdict.velocity_ratio_min, work_J, dose)
 
 
 def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> int:
@@ -193,7 +193,7 @@ def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> in
         print(json.dumps({"was": was._asdict(), "now": now._asdict(), "log": str(log)}))
         return 0
     print(f"{'':<28}{'as recorded':>14}{'changed':>14}")
-    for field in Outcome._fields:
+    for field in RunFigures._fields:
         print(f"{field:<28}{getattr(was, field):>14.4g}{getattr(now, field):>14.4g}")
     print(f"log  {log}")
     return 0

@@ -72,7 +72,7 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     tried = trials(problem)
     best: Fit = retuned
     for effect in effects:  # one after the other, each on top of those before it
-        own = [trial for trial in tried if trial.form.effects == (effect,)]
+        own = [trial for trial in tried if trial.hypothesis.effects == (effect,)]
         origins = [Origin(best, KNEE)]
         if best is retuned:
             origins.append(Origin(fitter.described(np.zeros(len(fitter.nuisances))), FAR_KNEE))

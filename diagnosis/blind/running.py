@@ -11,7 +11,7 @@ from bridge.files import write_json
 from diagnosis import diagnose_many as many
 from diagnosis.blind.sealing import RESULTS, read_set
 from diagnosis.blind.version import tool_version
-from diagnosis.diagnose_many import Outcome, Source
+from diagnosis.diagnose_many import EvidenceFolder, FolderResult
 from diagnosis.result import to_json
 
 FAULT_FORMAT = "fault/1"
@@ -27,7 +27,7 @@ def result_file(folder: Path, case: str) -> Path:
     return folder / RESULTS / f"{case}.json"
 
 
-def run(folder: Path, jobs: int) -> Generator[Outcome]:
+def run(folder: Path, jobs: int) -> Generator[FolderResult]:
     """Diagnose what has no result yet, one core a case and `jobs` at a time; yield each when its result is written.
 
     A case that ends in a fault has that as its result. Closing the generator ends the workers; what is written stays.
@@ -40,14 +40,14 @@ def run(folder: Path, jobs: int) -> Generator[Outcome]:
                 f"{result_file(folder, name)}: was made by version {before}, this is {tool}: a score is of one version;"
             )
             raise Fault("BAD_SET", f"{line} go on with that one, or delete {folder / RESULTS} and begin anew")
-    sources = [Source(name, folder / name) for name in missing(folder)]
+    sources = [EvidenceFolder(name, folder / name) for name in missing(folder)]
     with closing(many.diagnose_many(sources, jobs, "", many.real_diagnose)) as outcomes:
         for outcome in outcomes:
             write_json(result_file(folder, outcome.source.name), _as_json(outcome) | {"tool": tool})
             yield outcome
 
 
-def _as_json(outcome: Outcome) -> dict[str, Any]:
+def _as_json(outcome: FolderResult) -> dict[str, Any]:
     if outcome.diagnosis is not None:
         return to_json(outcome.diagnosis)
     code, line = outcome.fault or ("", "")

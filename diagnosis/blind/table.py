@@ -9,7 +9,7 @@ TOOL = "diagnosis"
 _CONFUSIONS = 30
 
 
-class Row(NamedTuple):
+class ScoreRow(NamedTuple):
     """One score: of what, the bar it should pass, and of each method."""
 
     name: str
@@ -42,12 +42,12 @@ def headline(scores: Scores, sealed: bool) -> str:
     )
 
 
-def rows(methods: dict[str, Scores]) -> list[Row]:
+def rows(methods: dict[str, Scores]) -> list[ScoreRow]:
     """All scores, one row each."""
     every = tuple(methods.values())
 
-    def row(name: str, bar: str, of: list[Score | None]) -> Row:
-        return Row(name, bar, tuple(of))
+    def row(name: str, bar: str, of: list[Score | None]) -> ScoreRow:
+        return ScoreRow(name, bar, tuple(of))
 
     return [
         row("top-1, 2 limits or more", ">= 0.85", [one.visible.top_1 for one in every]),

@@ -100,7 +100,7 @@ def _training(folder: Path, number: int) -> tuple[list[Row], list[str]]:
     random = np.random.default_rng([4, number])
     by_name: dict[str, list[Trial]] = {}
     for trial in trials(bench.problem):
-        by_name.setdefault(trial.form.effects[0], []).append(trial)
+        by_name.setdefault(trial.hypothesis.effects[0], []).append(trial)
     rows: list[Row] = []
     labels: list[str] = []
     for name in [*by_name, *[_NONE] * 4]:
@@ -120,6 +120,6 @@ def _training(folder: Path, number: int) -> tuple[list[Row], list[str]]:
 
 def _drawn(random: np.random.Generator, trial: Trial) -> Effects:
     """Sizes around the library's scales; coordinates with a sign get either one."""
-    axes = trial.form.axes
+    axes = trial.hypothesis.coordinates
     w = trial.w + np.array([axis.prior for axis in axes]) * random.standard_normal(len(axes))
-    return trial.form.tables(w)
+    return trial.hypothesis.tables(w)

@@ -43,11 +43,11 @@ class _Look(NamedTuple):
 
 def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) -> Experiment:
     """The best next run for the first two leaders; a check by hand where no run separates them."""
-    if len(leaders) < 2 or leaders[0].form.effects == leaders[1].form.effects:
+    if len(leaders) < 2 or leaders[0].hypothesis.effects == leaders[1].hypothesis.effects:
         text = "Only one explanation is left: a run under conditions that were not measured yet would test it hardest."
         return Experiment("Repeat a run at another drive speed, from another start.", text, None)
     first, second = leaders[0], leaders[1]
-    names = tuple(dict.fromkeys((*first.form.effects, *second.form.effects)))
+    names = tuple(dict.fromkeys((*first.hypothesis.effects, *second.hypothesis.effects)))
     both = f"{_name(first)} and {_name(second)}"
     if problem.rig.drive == "force":
         return Experiment(advice(names, "force"), f"Of what was tried, {both} explain these runs best.", None)
@@ -81,7 +81,7 @@ def _best(problem: Problem, nuisances: Nuisances, first: Fit, second: Fit) -> _L
     left: list[_Look] = []
     judged: list[_Look] = []
     possible = sorted(plans(problem), key=lambda plan: plan.effort_s)
-    if any(EFFECTS[name].acts_on == "piezo" for fit in (first, second) for name in fit.form.effects):
+    if any(EFFECTS[name].acts_on == "piezo" for fit in (first, second) for name in fit.hypothesis.effects):
         # without vibration the two differ only in what one of them had to put into other numbers
         possible = [plan for plan in possible if any(step.frequency_Hz > 0.0 for step in plan.steps)]
     for plan in possible:
@@ -100,7 +100,7 @@ def _best(problem: Problem, nuisances: Nuisances, first: Fit, second: Fit) -> _L
 
 
 def _name(fit: Fit) -> str:
-    return " + ".join(fit.form.effects) or "the rig as described"
+    return " + ".join(fit.hypothesis.effects) or "the rig as described"
 
 
 class _Imagined:
@@ -132,7 +132,9 @@ class _Imagined:
         at = np.concatenate([fit.deviations, fit.w])
         steps = [(_STEP if i < own else _STEP_OF_EFFECT) * (-1.0 if at[i] > 0.0 else 1.0) for i in which.tolist()]
         ahead = [at, *(at + step * (np.arange(len(at)) == i) for i, step in zip(which.tolist(), steps, strict=True))]
-        here, *there = self._expected([self._nuisances.point(one[:own], fit.form.tables(one[own:])) for one in ahead])
+        here, *there = self._expected(
+            [self._nuisances.point(one[:own], fit.hypothesis.tables(one[own:])) for one in ahead]
+        )
         columns = [(one - here) / step for one, step in zip(there, steps, strict=True)]
         columns = [np.where(np.isfinite(column), column, 0.0) for column in columns]
         return np.column_stack(columns) if columns else np.zeros((len(here), 0))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.hypotheses.hypothesis import Form
+from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.model.rig import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -14,7 +14,7 @@ Floats = npt.NDArray[np.floating[Any]]
 class Fit(NamedTuple):
     """A model fitted to the measured features of a problem."""
 
-    form: Form
+    hypothesis: Hypothesis
     deviations: Floats  # of the nuisances, in tolerances [nuisances]
     w: Floats  # [axes]
     chi2: float  # with the priors' terms
@@ -25,18 +25,20 @@ class Fit(NamedTuple):
     @property
     def effects(self) -> Effects:
         """The effects of the model as tables of a rig file."""
-        return self.form.tables(self.w)
+        return self.hypothesis.tables(self.w)
 
     def covariance(self) -> Floats:
         """Of nuisances and axes together, from the columns and the priors."""
-        prior = np.concatenate([np.ones(len(self.deviations)), [axis.prior**-2 for axis in self.form.axes]])
+        prior = np.concatenate(
+            [np.ones(len(self.deviations)), [axis.prior**-2 for axis in self.hypothesis.coordinates]]
+        )
         result: Floats = np.linalg.inv(self.columns.T @ self.columns + np.diag(prior))
         return result
 
 
-def prior_of(form: Form, deviations: Floats) -> Floats:
+def prior_of(hypothesis: Hypothesis, deviations: Floats) -> Floats:
     """Inverse standard deviations of nuisances and axes."""
-    return np.concatenate([np.ones(len(deviations)), [1.0 / axis.prior for axis in form.axes]])
+    return np.concatenate([np.ones(len(deviations)), [1.0 / axis.prior for axis in hypothesis.coordinates]])
 
 
 def step_within(normal: Floats, gradient: Floats, at: Floats, most: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:

@@ -15,7 +15,7 @@ from diagnosis.fits.fit import Fit, prior_of, step_within
 from diagnosis.gap.floor import KNEE, Floor
 from diagnosis.gap.measure import differences, whitened
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Form
+from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Effects
 
@@ -54,19 +54,19 @@ _NO_LESS, _ASTRAY = 0.97, 1.5
 _STEPS = (0.5, -1.0, 0.25)
 
 
-def _axis_steps(form: Form, w: Floats) -> Floats:
+def _axis_steps(hypothesis: Hypothesis, w: Floats) -> Floats:
     """By how much each axis is moved for its derivative."""
     steps = np.zeros(len(w))
-    for i, axis in enumerate(form.axes):
+    for i, axis in enumerate(hypothesis.coordinates):
         steps[i] = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
         if axis.prior < _NARROW:  # the period of a wave that passes many times
             steps[i] = 0.02 * axis.prior
     return steps
 
 
-def _beside(form: Form, deviations: Floats, w: Floats) -> list[At]:
+def _beside(hypothesis: Hypothesis, deviations: Floats, w: Floats) -> list[At]:
     """Where the derivatives of all axes are taken."""
-    return [(deviations, form.tables(ahead)) for ahead in w + np.diag(_axis_steps(form, w))]
+    return [(deviations, hypothesis.tables(ahead)) for ahead in w + np.diag(_axis_steps(hypothesis, w))]
 
 
 class _Place(NamedTuple):
@@ -143,15 +143,15 @@ class Fitter:
         chi2 = self._chi2(np.ones(len(deviations)), residual, deviations)
         return Fit(NOTHING, deviations, np.zeros(0), chi2, residual, self.floor.whitening @ (rates * slope[:, None]))
 
-    def refit(self, form: Form, deviations: Floats, w: Floats) -> Fit:
-        """Fit a form to the end, from a starting point that may be far off."""
-        return together(self.predicted_many, [self.refitting(form, deviations, w)])[0]
+    def refit(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Fit:
+        """Fit a hypothesis to the end, from a starting point that may be far off."""
+        return together(self.predicted_many, [self.refitting(hypothesis, deviations, w)])[0]
 
-    def quick(self, form: Form, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
-        """A form fitted a little, from the best of some starts, with the chi2 of the gap's own compression."""
-        there = yield Question([(deviations, form.tables(w)) for deviations, w in starts])
-        far = [self.far_chi2(form, *one) for one in zip(starts, there, strict=True)]
-        fit = yield from self.fitting(form, *starts[far.index(min(far))], _QUICK)
+    def quick(self, hypothesis: Hypothesis, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
+        """A hypothesis fitted a little, from the best of some starts, with the chi2 of the gap's own compression."""
+        there = yield Question([(deviations, hypothesis.tables(w)) for deviations, w in starts])
+        far = [self.far_chi2(hypothesis, *one) for one in zip(starts, there, strict=True)]
+        fit = yield from self.fitting(hypothesis, *starts[far.index(min(far))], _QUICK)
         return (yield from self._judging(fit))
 
     def judged(self, fit: Fit) -> Fit:
@@ -161,29 +161,29 @@ class Fitter:
     def _judging(self, fit: Fit) -> Work[Fit]:
         (predicted,) = yield Question([(fit.deviations, fit.effects)])
         residual, _ = self.whitened(predicted)
-        chi2 = self._chi2(prior_of(fit.form, fit.deviations), residual, np.concatenate([fit.deviations, fit.w]))
+        chi2 = self._chi2(prior_of(fit.hypothesis, fit.deviations), residual, np.concatenate([fit.deviations, fit.w]))
         return fit._replace(chi2=chi2, residual=residual)
 
-    def far_chi2(self, form: Form, at: tuple[Floats, Floats], predicted: Floats) -> float:
+    def far_chi2(self, hypothesis: Hypothesis, at: tuple[Floats, Floats], predicted: Floats) -> float:
         """chi2 of a prediction [features] for nuisances and axes, under the wide compression of a far start."""
         residual, _ = self.whitened(predicted, FAR_KNEE)
-        return self._chi2(prior_of(form, at[0]), residual, np.concatenate(at))
+        return self._chi2(prior_of(hypothesis, at[0]), residual, np.concatenate(at))
 
-    def refitting(self, form: Form, deviations: Floats, w: Floats) -> Work[Fit]:
+    def refitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Work[Fit]:
         """As `refit`, beside others."""
-        (predicted,) = yield Question([(deviations, form.tables(w))])
+        (predicted,) = yield Question([(deviations, hypothesis.tables(w))])
         if np.abs(differences(self.floor, self.problem, predicted)).max() > _FAR_OFF:
-            fit = yield from self.fitting(form, deviations, w, _FAR)
+            fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
             deviations, w = fit.deviations, fit.w
-        return (yield from self.fitting(form, deviations, w, _NEAR))
+        return (yield from self.fitting(hypothesis, deviations, w, _NEAR))
 
-    def trying(self, form: Form, deviations: Floats, w: Floats, base_chi2: float) -> Work[Fit]:
+    def trying(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, base_chi2: float) -> Work[Fit]:
         """As `refitting`, but not to the end where the first steps lead to what the rig without effects leaves, `base_chi2`."""
-        fit = yield from self.fitting(form, deviations, w, _FAR)
+        fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
         fit = yield from self._judging(fit)
         if _NO_LESS * base_chi2 < fit.chi2 < _ASTRAY * base_chi2:
             return fit
-        return (yield from self.fitting(form, fit.deviations, fit.w, _NEAR))
+        return (yield from self.fitting(hypothesis, fit.deviations, fit.w, _NEAR))
 
     def further(self, fit: Fit) -> Fit:
         """A fit refitted again as long as that gains."""
@@ -197,20 +197,20 @@ class Fitter:
         for _ in range(_MORE_REFITS):
             if fit.finished:
                 break
-            again = yield from self.refitting(fit.form, fit.deviations, fit.w)
+            again = yield from self.refitting(fit.hypothesis, fit.deviations, fit.w)
             gains = again.chi2 < _GAINED * fit.chi2
             fit = min(fit, again, key=lambda one: one.chi2)
             if not gains:
                 break
         return fit._replace(finished=True)
 
-    def fitting(self, form: Form, deviations: Floats, w: Floats, stage: Stage) -> Work[Fit]:
-        """Fit a form from a starting point, in the way of one stage."""
+    def fitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, stage: Stage) -> Work[Fit]:
+        """Fit a hypothesis from a starting point, in the way of one stage."""
         own = len(deviations)
-        prior = prior_of(form, deviations)
+        prior = prior_of(hypothesis, deviations)
         most = np.concatenate([self.most, np.full(len(w), np.inf)])
-        (predicted,) = yield Question([(deviations, form.tables(w))], _beside(form, deviations, w))
-        here = self._placed(form, np.concatenate([deviations, w]), predicted, stage.knee)
+        (predicted,) = yield Question([(deviations, hypothesis.tables(w))], _beside(hypothesis, deviations, w))
+        here = self._placed(hypothesis, np.concatenate([deviations, w]), predicted, stage.knee)
         nuisance_rates = self._rates
         renewed = without_gain = 0
         finished = False
@@ -218,21 +218,21 @@ class Fitter:
         for step in range(stage.steps + 1):
             if step == stage.steps and not stage.columns:
                 break
-            axis_rates = yield from self._axis_rates(form, here.at[:own], here.at[own:], here.predicted)
-            rates = np.column_stack([self._with_levels(nuisance_rates, axis_rates, form, here.at), axis_rates])
+            axis_rates = yield from self._axis_rates(hypothesis, here.at[:own], here.at[own:], here.predicted)
+            rates = np.column_stack([self._with_levels(nuisance_rates, axis_rates, hypothesis, here.at), axis_rates])
             columns = self.floor.whitening @ (rates * here.slope[:, None])
             if step == stage.steps:
                 break
             normal = columns.T @ columns + np.diag(prior**2)
             change, _ = step_within(normal, columns.T @ here.residual - prior**2 * here.at, here.at, self.most)
             tried = [np.clip(here.at + share * change, -most, most) for share in _SHARES]
-            points = [(ahead[:own], form.tables(ahead[own:])) for ahead in tried]
+            points = [(ahead[:own], hypothesis.tables(ahead[own:])) for ahead in tried]
             gain = 0.0
             for number, ahead in enumerate(tried):
                 (predicted,) = yield Question(
-                    [points[number]], [*_beside(form, ahead[:own], ahead[own:]), *points[number + 1 :]]
+                    [points[number]], [*_beside(hypothesis, ahead[:own], ahead[own:]), *points[number + 1 :]]
                 )
-                there = self._placed(form, ahead, predicted, stage.knee)
+                there = self._placed(hypothesis, ahead, predicted, stage.knee)
                 if there.chi2 < here.chi2:
                     gain = here.chi2 - there.chi2
                     here = there
@@ -242,21 +242,21 @@ class Fitter:
                     finished = without_gain > 0  # no step gains any more, with renewed derivatives
                     break
                 size = _STEPS[renewed % len(_STEPS)]
-                nuisance_rates, there = yield from self._renewed(form, here, stage.knee, size)
+                nuisance_rates, there = yield from self._renewed(hypothesis, here, stage.knee, size)
                 renewed += 1
                 if there.chi2 < here.chi2 - _WORTH_A_STEP:
                     here = there
                 else:
                     without_gain += 1
-        return Fit(form, here.at[:own], here.at[own:], here.chi2, here.residual, columns, finished)
+        return Fit(hypothesis, here.at[:own], here.at[own:], here.chi2, here.residual, columns, finished)
 
-    def _placed(self, form: Form, at: Floats, predicted: Floats, knee: float) -> _Place:
+    def _placed(self, hypothesis: Hypothesis, at: Floats, predicted: Floats, knee: float) -> _Place:
         """A point, nuisances and axes, with what the model predicts there [features]."""
         residual, slope = self.whitened(predicted, knee)
-        prior = prior_of(form, at[: len(self.nuisances)])
+        prior = prior_of(hypothesis, at[: len(self.nuisances)])
         return _Place(at, predicted, residual, slope, self._chi2(prior, residual, at))
 
-    def _renewed(self, form: Form, here: _Place, knee: float, size: float) -> Work[tuple[Floats, _Place]]:
+    def _renewed(self, hypothesis: Hypothesis, here: _Place, knee: float, size: float) -> Work[tuple[Floats, _Place]]:
         """The nuisances' derivatives anew, and the best place that single nuisances moved by as much lead to, or `here`.
 
         Where slips come and go derivatives lead astray, all numbers at once, and a single number does not. From the true numbers
@@ -264,10 +264,10 @@ class Fitter:
         """
         own = len(self.nuisances)
         aside = self._aside(here.at[:own], size)
-        predicted = yield Question([(one, form.tables(here.at[own:])) for one in aside])
+        predicted = yield Question([(one, hypothesis.tables(here.at[own:])) for one in aside])
         rates = self._nuisance_rates(here.at[:own], here.predicted, aside, predicted)
         alone = [
-            self._placed(form, np.concatenate([one, here.at[own:]]), there, knee)
+            self._placed(hypothesis, np.concatenate([one, here.at[own:]]), there, knee)
             for one, there in zip(aside, predicted, strict=True)
             if (np.abs(one) <= self.most).all()
         ]
@@ -275,13 +275,15 @@ class Fitter:
         if not better:
             return rates, here
         all_at_once = here.at + sum(one.at - here.at for one in better)
-        (there,) = yield Question([(all_at_once[:own], form.tables(all_at_once[own:]))])
-        return rates, min(*better, self._placed(form, all_at_once, there, knee), key=lambda one: one.chi2)
+        (there,) = yield Question([(all_at_once[:own], hypothesis.tables(all_at_once[own:]))])
+        return rates, min(*better, self._placed(hypothesis, all_at_once, there, knee), key=lambda one: one.chi2)
 
-    def _with_levels(self, nuisance_rates: Floats, axis_rates: Floats, form: Form, now: Floats) -> Floats:
+    def _with_levels(self, nuisance_rates: Floats, axis_rates: Floats, hypothesis: Hypothesis, now: Floats) -> Floats:
         """The nuisances' derivatives, of a number that an effect changes that of the effect."""
         rates = nuisance_rates.copy()
-        for column, axis, w in zip(axis_rates.T, form.axes, now[len(self.nuisances) :].tolist(), strict=True):
+        for column, axis, w in zip(
+            axis_rates.T, hypothesis.coordinates, now[len(self.nuisances) :].tolist(), strict=True
+        ):
             name = LEVELS.get(axis.effect)
             if name in self.nuisances.rig_names:
                 i = self.nuisances.rig_names.index(name)
@@ -302,10 +304,10 @@ class Fitter:
         steps = np.diag(aside - deviations)
         return np.column_stack([self._rate(here, *one) for one in zip(there, steps.tolist(), strict=True)])
 
-    def _axis_rates(self, form: Form, deviations: Floats, w: Floats, here: Floats) -> Work[Floats]:
-        steps = _axis_steps(form, w)
+    def _axis_rates(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, here: Floats) -> Work[Floats]:
+        steps = _axis_steps(hypothesis, w)
         columns = np.zeros((int(self.floor.compared.sum()), len(w)))
-        there = yield Question(_beside(form, deviations, w))
+        there = yield Question(_beside(hypothesis, deviations, w))
         for i, one in enumerate(there):
             columns[:, i] = self._rate(here, one, float(steps[i]))
         return columns

@@ -42,10 +42,10 @@ def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Star
     still = {run.file for run in runs if not run.commands.frequency_Hz.any()}
     if len(still) in {0, len(runs)}:
         return []
-    longest = {trial.form.forms[EFFECT]: trial for trial in trials if trial.form.effects == (EFFECT,)}
+    longest = {trial.hypothesis.forms[EFFECT]: trial for trial in trials if trial.hypothesis.effects == (EFFECT,)}
     described = np.zeros(len(fitter.nuisances))
     starts: list[Start] = [
-        (trial.form, described, np.array([trial.w[0] + math.log(later), *trial.w[1:]]))
+        (trial.hypothesis, described, np.array([trial.w[0] + math.log(later), *trial.w[1:]]))
         for trial in longest.values()
         for later in _LATER
     ]
@@ -54,7 +54,7 @@ def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Star
     if not unvibrated.floor.compared.any():  # a climb without a slip, whose force alone is known
         return []
     for fit in _refits(unvibrated, starts, jobs)[:_BEST]:
-        found += _teeth(fitter, fit, jobs) if _is_late_in_time(fit) else [(fit.form, fit.deviations, fit.w)]
+        found += _teeth(fitter, fit, jobs) if _is_late_in_time(fit) else [(fit.hypothesis, fit.deviations, fit.w)]
     return found
 
 
@@ -68,12 +68,12 @@ def _chi2(fit: Fit) -> float:
 
 
 def _is_late_in_time(fit: Fit) -> bool:
-    return fit.form.axes[0].name == "delay_s"
+    return fit.hypothesis.coordinates[0].name == "delay_s"
 
 
 def _teeth(fitter: Fitter, fit: Fit, jobs: int) -> list[Start]:
     """The best dead times about that of a fit, everything else as there."""
-    axis = fit.form.axes[0]
+    axis = fit.hypothesis.coordinates[0]
     delay_s = axis.value(float(fit.w[0]))
     highest_Hz = max(float(run.commands.frequency_Hz.max()) for run in fitter.problem.runs)
     low_s, high_s = (share * delay_s for share in _SPAN)
@@ -84,12 +84,12 @@ def _teeth(fitter: Fitter, fit: Fit, jobs: int) -> list[Start]:
         chi2[1 + i : 1 + count : jobs] = share
     teeth = [i for i in range(count) if chi2[i + 1] <= min(chi2[i], chi2[i + 2])]
     best = sorted(teeth, key=lambda i: chi2[i + 1])[:_TEETH]
-    return [(fit.form, fit.deviations, tried[i]) for i in best]
+    return [(fit.hypothesis, fit.deviations, tried[i]) for i in best]
 
 
 def _chi2s(fitter: Fitter, share: tuple[Fit, list[Floats]]) -> list[float]:
     """Of the differences alone: the priors hardly change along a dead time."""
     fit, tried = share
-    predicted = fitter.predicted_many([(fit.deviations, fit.form.tables(w)) for w in tried])
+    predicted = fitter.predicted_many([(fit.deviations, fit.hypothesis.tables(w)) for w in tried])
     residuals = [fitter.whitened(one)[0] for one in predicted]
     return [float(one @ one) for one in residuals]

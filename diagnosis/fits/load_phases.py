@@ -27,7 +27,7 @@ _RATIOS = (0.007, 0.02, 0.06)  # of the friction: from hardly visible to large
 _MOST = 3  # frequencies that get a refit
 
 
-class _Tried(NamedTuple):
+class _TriedWave(NamedTuple):
     """A wave in its best phases."""
 
     chi2: float  # of the differences, under the wide compression of a far start
@@ -39,22 +39,22 @@ def starts_by_run(fitter: Fitter, origin: Fit, trials: list[Trial], jobs: int = 
     waves: dict[float, Wave] = {}
     slowest_Hz = 0.0
     for trial in trials:
-        if trial.form.forms == {EFFECT: FORM}:
-            axes = {axis.name: axis for axis in trial.form.axes}
+        if trial.hypothesis.forms == {EFFECT: FORM}:
+            axes = {axis.name: axis for axis in trial.hypothesis.coordinates}
             frequency = axes["frequency_Hz"]
             slowest_Hz = frequency.low
             waves[frequency.scale] = Wave(1.0 / frequency.scale, 0.0, 0.0, spread=frequency.prior)
     shares = each(jobs, _in_best_phases, fitter, [(origin, list(waves.values())[i::jobs]) for i in range(jobs)])
     best = sorted(chain.from_iterable(shares), key=lambda one: one.chi2)[:_MOST]
     found = [wave_trial(EFFECT, FORM, one.wave, slowest_Hz) for one in best]
-    return [(trial.form, origin.deviations, trial.w) for trial in found]
+    return [(trial.hypothesis, origin.deviations, trial.w) for trial in found]
 
 
-def _in_best_phases(fitter: Fitter, share: tuple[Fit, list[Wave]]) -> list[_Tried]:
+def _in_best_phases(fitter: Fitter, share: tuple[Fit, list[Wave]]) -> list[_TriedWave]:
     origin, waves = share
     files = [run.file for run in fitter.problem.runs]
     run_of = np.array([files.index(run) for *_, run in fitter.floor.cells])
-    found: list[_Tried] = []
+    found: list[_TriedWave] = []
     for wave in waves:
         tried = [_table(wave, ratio, phase_rad) for ratio in _RATIOS for phase_rad in _PHASES_RAD.tolist()]
         predicted = fitter.predicted_many([(origin.deviations, table) for table in tried])
@@ -66,7 +66,7 @@ def _in_best_phases(fitter: Fitter, share: tuple[Fit, list[Wave]]) -> list[_Trie
         first_rad, *others_rad = _PHASES_RAD[by_run[best].argmin(axis=0)].tolist()
         phases_of = {phase_of(file): phase_rad for file, phase_rad in zip(files[1:], others_rad, strict=True)}
         in_phase = wave._replace(ratio=_RATIOS[best], phase_rad=first_rad, phases_of=phases_of)
-        found.append(_Tried(float(chi2[best]), in_phase))
+        found.append(_TriedWave(float(chi2[best]), in_phase))
     return found
 
 

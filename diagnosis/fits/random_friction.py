@@ -21,7 +21,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.gap.measure import whitened
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.hypothesis import Axis, Form
+from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
 from diagnosis.hypotheses.waves import friction_series
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -58,7 +58,7 @@ class _Paths(NamedTuple):
     covariance: Floats  # [compared, compared]
 
 
-class _Tried(NamedTuple):
+class _TriedLoad(NamedTuple):
     """A size of the paths, and what it is worth."""
 
     likelihood: float
@@ -112,27 +112,29 @@ class RandomFriction:
 
         """
         own = len(fit.deviations)
-        spread = np.concatenate([np.ones(own), [axis.prior for axis in fit.form.axes]])
+        spread = np.concatenate([np.ones(own), [axis.prior for axis in fit.hypothesis.coordinates]])
         # the nuisances are free about their described values, the effects about where they were fitted
         residual = fit.residual + fit.columns[:, :own] @ fit.deviations
         scaled = fit.columns * spread
         without = scaled @ scaled.T + noise * np.eye(len(residual))
-        tried: list[_Tried] = []
+        tried: list[_TriedLoad] = []
         for i, paths in enumerate(self._paths):
             for size in _SIZES:
                 shift = size * min(size, 1.0) * paths.mean  # what adds to powers, which count as logarithms
-                tried.append(_Tried(*_likelihood(without + size**2 * paths.covariance, residual - shift), size, i))
+                tried.append(_TriedLoad(*_likelihood(without + size**2 * paths.covariance, residual - shift), size, i))
         best = max(tried)
         mean = float(np.logaddexp.reduce([one.likelihood for one in tried])) - math.log(len(tried))
         table = dict(self._paths[best.paths].table)
         table["ratio"] *= best.size
         axes = tuple(
-            Axis(self.effect, name, scale, True, _SPREAD.get(name, _SPREAD["length"]), 0.0, math.inf)
+            Coordinate(self.effect, name, scale, True, _SPREAD.get(name, _SPREAD["length"]), 0.0, math.inf)
             for name, scale in table.items()
         )
         return Scattered(
             fit._replace(
-                form=Form(fit.form.forms | {self.effect: RANDOM}, (*fit.form.axes, *axes)),
+                hypothesis=Hypothesis(
+                    fit.hypothesis.forms | {self.effect: RANDOM}, (*fit.hypothesis.coordinates, *axes)
+                ),
                 w=np.concatenate([fit.w, np.zeros(len(axes))]),
                 chi2=noise**2 * best.left,
                 columns=np.column_stack([fit.columns, np.zeros((len(residual), len(axes)))]),
@@ -141,9 +143,9 @@ class RandomFriction:
         )
 
 
-def is_random(form: Form) -> bool:
-    """Whether a form has an effect whose path no prediction knows."""
-    return RANDOM in form.forms.values()
+def is_random(hypothesis: Hypothesis) -> bool:
+    """Whether a hypothesis has an effect whose path no prediction knows."""
+    return RANDOM in hypothesis.forms.values()
 
 
 def in_bursts(problem: Problem) -> bool:

@@ -10,13 +10,13 @@ from diagnosis.fits.batch import Work, together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Screened
-from diagnosis.hypotheses.hypothesis import Form
+from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.trials import Trial
 from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]
 
-Start = tuple[Form, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
+Start = tuple[Hypothesis, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
 
 
 _Formed = TypeVar("_Formed", Fit, Screened, Trial)
@@ -48,7 +48,7 @@ def best_of_each(found: list[_Formed], by_form: bool = False) -> list[_Formed]:
     seen: set[frozenset[tuple[str, str]]] = set()
     result: list[_Formed] = []
     for one in found:
-        key = frozenset((name, form if by_form else "") for name, form in one.form.forms.items())
+        key = frozenset((name, form if by_form else "") for name, form in one.hypothesis.forms.items())
         if key not in seen:
             seen.add(key)
             result.append(one)

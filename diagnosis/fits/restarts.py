@@ -9,7 +9,7 @@ import numpy.typing as npt
 from diagnosis.fits.expected import much_left
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.refits import Start
-from diagnosis.hypotheses.hypothesis import Form
+from diagnosis.hypotheses.hypothesis import Hypothesis
 
 Floats = npt.NDArray[np.floating[Any]]
 _CONTENDERS, _CONTENDS = 3, 0.3  # single effects, if they close this share of what the best one closes,
@@ -23,9 +23,11 @@ def alone(pairs: list[Fit]) -> list[Start]:
         return []
     best = min(pairs, key=lambda fit: fit.chi2)
     starts: list[Start] = []
-    for name, form in best.form.forms.items():
-        own = [i for i, axis in enumerate(best.form.axes) if axis.effect == name]
-        starts.append((Form({name: form}, tuple(best.form.axes[i] for i in own)), best.deviations, best.w[own]))
+    for name, form in best.hypothesis.forms.items():
+        own = [i for i, axis in enumerate(best.hypothesis.coordinates) if axis.effect == name]
+        starts.append(
+            (Hypothesis({name: form}, tuple(best.hypothesis.coordinates[i] for i in own)), best.deviations, best.w[own])
+        )
     return starts
 
 
@@ -34,7 +36,7 @@ def contenders(retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2
     if not pairs or much_left(pairs[0], expected_chi2) or not much_left(singles[0], expected_chi2):
         return singles[:_CONTENDERS]
     rivals = [fit for fit in close(retuned, singles, _RIVALS)[:_CONTENDERS] if fit is not singles[0]]
-    return [fit for fit in singles[:1] if rivals or fit.form.effects[0] in pairs[0].form.effects] + rivals
+    return [fit for fit in singles[:1] if rivals or fit.hypothesis.effects[0] in pairs[0].hypothesis.effects] + rivals
 
 
 def rival_pairs(singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
@@ -63,17 +65,19 @@ def starts_of(contenders: list[Fit], retuned: Fit, sizes: tuple[float, ...]) -> 
     best, *rest = close(retuned, contenders)
     nuisances = (np.zeros_like(retuned.deviations), retuned.deviations)
     starts = [
-        (fit.form, deviations, w)
+        (fit.hypothesis, deviations, w)
         for fit in (best, *rest)
         for deviations in nuisances
         for w in (fit.w, *(_resized(fit, size) for size in sizes))
     ]
-    return starts + [(one.form, other.deviations, one.w) for fit in rest for one, other in ((fit, best), (best, fit))]
+    return starts + [
+        (one.hypothesis, other.deviations, one.w) for fit in rest for one, other in ((fit, best), (best, fit))
+    ]
 
 
 def _resized(fit: Fit, size: float) -> Floats:
     w = fit.w.copy()
-    w[0] = w[0] + math.log(size) if fit.form.axes[0].logarithmic else w[0] * size
+    w[0] = w[0] + math.log(size) if fit.hypothesis.coordinates[0].logarithmic else w[0] * size
     return w
 
 

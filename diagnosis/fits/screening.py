@@ -9,7 +9,7 @@ import numpy.typing as npt
 from diagnosis.fits.fit import Fit, step_within
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.gap.floor import KNEE
-from diagnosis.hypotheses.hypothesis import Form
+from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.trials import Trial
 from diagnosis.processes import each
 
@@ -22,7 +22,7 @@ _FURTHEST_TOLERANCES = 3.0
 class Screened(NamedTuple):
     """A trial with a better start, and the chi2 that its direction would leave if everything were linear."""
 
-    form: Form  # with the effects of the base
+    hypothesis: Hypothesis  # with the effects of the base
     deviations: Floats
     w: Floats
     chi2: float  # infinite where nothing was screened
@@ -53,7 +53,7 @@ class Directions:
     """
 
     def __init__(self, fit: Fit, most: Floats) -> None:
-        held = [1.0] * len(fit.deviations) + [1.0 / axis.prior for axis in fit.form.axes]
+        held = [1.0] * len(fit.deviations) + [1.0 / axis.prior for axis in fit.hypothesis.coordinates]
         self._at = np.concatenate([fit.deviations, fit.w])
         columns = np.vstack([fit.columns, np.diag(held)])
         self.residual = np.concatenate([fit.residual, -np.array(held) * self._at])
@@ -74,9 +74,9 @@ class Directions:
         return self._at + self._inverse @ (self._columns.T @ rest)
 
 
-def added(base: Form, more: Form) -> Form:
+def added(base: Hypothesis, more: Hypothesis) -> Hypothesis:
     """Both effects at once."""
-    return Form(base.forms | more.forms, (*base.axes, *more.axes))
+    return Hypothesis(base.forms | more.forms, (*base.coordinates, *more.coordinates))
 
 
 def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Screened | None:
@@ -90,9 +90,9 @@ def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Scree
     along = float(direction @ directions.left)
     size = along / power
     w = trial.w.copy()
-    if trial.form.axes[0].logarithmic:
+    if trial.hypothesis.coordinates[0].logarithmic:
         size = min(max(size, 1.0 / _FURTHEST), _FURTHEST)
-        rolls_off = trial.form.axes[0].name in {"corner_Hz", "resonance_Hz"}  # larger is less
+        rolls_off = trial.hypothesis.coordinates[0].name in {"corner_Hz", "resonance_Hz"}  # larger is less
         w[0] += (-0.5 if rolls_off else 1.0) * math.log(size)
     else:
         size = min(max(size, -_FURTHEST), _FURTHEST)
@@ -102,7 +102,9 @@ def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Scree
     deviations = np.clip(moved[:own], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
     chi2 = float(directions.left @ directions.left) - 2.0 * size * along + size * size * power
     unmoved = (base.deviations, np.concatenate([base.w, w]))
-    return Screened(added(base.form, trial.form), deviations, np.concatenate([moved[own:], w]), chi2, (unmoved,))
+    return Screened(
+        added(base.hypothesis, trial.hypothesis), deviations, np.concatenate([moved[own:], w]), chi2, (unmoved,)
+    )
 
 
 def screened(fitter: Fitter, origins: list[Origin], trials: list[Trial], jobs: int = 1) -> list[list[Screened]]:
@@ -120,7 +122,7 @@ def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs:
 
 def beside_origin(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int) -> list[Screened]:
     """The trials of other effects beside one that is there."""
-    others = [trial for trial in trials if not set(trial.form.effects) & set(first.form.effects)]
+    others = [trial for trial in trials if not set(trial.hypothesis.effects) & set(first.hypothesis.effects)]
     return _screened(fitter, first, KNEE, others, jobs)
 
 
@@ -128,5 +130,7 @@ def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> lis
     base, knee, trials = work
     predicted = fitter.predicted(base.deviations, base.effects)
     origin = _Base(base, predicted, fitter.whitened(predicted, knee)[1], Directions(base, fitter.most))
-    there = fitter.predicted_many([(base.deviations, base.effects | trial.form.tables(trial.w)) for trial in trials])
+    there = fitter.predicted_many(
+        [(base.deviations, base.effects | trial.hypothesis.tables(trial.w)) for trial in trials]
+    )
     return [_screen(fitter, origin, *one) for one in zip(trials, there, strict=True)]

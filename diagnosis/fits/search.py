@@ -18,7 +18,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import Start, best_of_each, each_beside, refits
 from diagnosis.fits.screening import Origin, Screened, beside_origin
-from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Form
+from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
 from diagnosis.hypotheses.trials import Trial
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -74,10 +74,16 @@ def refitted_rest(
     passed_over = best_of_each(found[-1], by_form=True)[len(seen) :]
     fits = _refitted(fitter, origins[0].fit.chi2, passed_over, [], jobs, _FULL)
     described = origins[-1].fit.deviations
-    others = [trial for trial in trials if _RESONANCE not in trial.form.effects and not _is_wave(trial.form)]
-    as_tried = best_of_each(others, by_form=True) + [trial for trial in trials if _RESONANCE in trial.form.effects]
+    others = [
+        trial for trial in trials if _RESONANCE not in trial.hypothesis.effects and not _is_wave(trial.hypothesis)
+    ]
+    as_tried = best_of_each(others, by_form=True) + [
+        trial for trial in trials if _RESONANCE in trial.hypothesis.effects
+    ]
     base_chi2 = origins[0].fit.chi2
-    fits += each_beside(jobs, _trying, fitter, [((trial.form, described, trial.w), base_chi2) for trial in as_tried])
+    fits += each_beside(
+        jobs, _trying, fitter, [((trial.hypothesis, described, trial.w), base_chi2) for trial in as_tried]
+    )
     return best_of_each(sorted(fits, key=lambda fit: fit.chi2))
 
 
@@ -91,8 +97,8 @@ def pairs_with(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int = 1) -
     return _refitted(fitter, first.chi2, starts, [], jobs, _FULL)
 
 
-def _is_wave(form: Form) -> bool:
-    return any(axis.name == "phase_rad" for axis in form.axes)
+def _is_wave(hypothesis: Hypothesis) -> bool:
+    return any(axis.name == "phase_rad" for axis in hypothesis.coordinates)
 
 
 def pairs_of_effects(
@@ -128,18 +134,18 @@ def middle_fits(fitter: Fitter, none: Fit, singles: list[Fit], named: Fit, jobs:
     """
     starts = [named, none, *(fit for fit in singles if fit is not named)][:_SAME_STARTS]
 
-    def middle(form: Form, w: Floats) -> Fit:
-        fits = refits(fitter, [(form, start.deviations, w) for start in starts], jobs)
+    def middle(hypothesis: Hypothesis, w: Floats) -> Fit:
+        fits = refits(fitter, [(hypothesis, start.deviations, w) for start in starts], jobs)
         return sorted(fits, key=lambda fit: fit.chi2)[len(fits) // 2]
 
-    return middle(NOTHING, np.zeros(0)), middle(named.form, named.w)
+    return middle(NOTHING, np.zeros(0)), middle(named.hypothesis, named.w)
 
 
 def _promising_waves(found: list[Screened], chi2: float) -> list[Screened]:
     """The first start of each of the two effects, or pairs, with a wave that promise most, if they promise much."""
     much = [start for start in found if start.chi2 < chi2 - _PROMISING_MUCH]
-    waves = [start for start in much if _is_wave(start.form)]
-    first = {frozenset(start.form.effects): start for start in reversed(waves)}
+    waves = [start for start in much if _is_wave(start.hypothesis)]
+    first = {frozenset(start.hypothesis.effects): start for start in reversed(waves)}
     return sorted(first.values(), key=lambda start: start.chi2)[:2]
 
 
@@ -147,10 +153,10 @@ def _of_any_size(origins: list[Origin], screened: list[Screened]) -> list[Screen
     """Effects of one number of either sign, to begin at the best of some sizes: screening is linear, and a large one is not."""
     found: list[Screened] = []
     for one in best_of_each(screened, by_form=True):
-        if len(one.form.axes) != 1 or one.form.axes[0].logarithmic:
+        if len(one.hypothesis.coordinates) != 1 or one.hypothesis.coordinates[0].logarithmic:
             continue
         first, *others = [(origin.fit.deviations, np.array([size])) for origin in origins for size in _SIZES]
-        found.append(Screened(one.form, *first, math.inf, tuple(others)))
+        found.append(Screened(one.hypothesis, *first, math.inf, tuple(others)))
     return found
 
 
@@ -159,7 +165,7 @@ def _first(screened: list[Screened]) -> list[Screened]:
     of_form: Counter[str] = Counter()
     found: list[Screened] = []
     for one in screened:
-        key = str(one.form.forms)
+        key = str(one.hypothesis.forms)
         of_form[key] += 1
         if of_form[key] <= _QUICK_OF_FORM:
             found.append(one)
@@ -172,7 +178,7 @@ def _levels(described: Fit, screened: list[Screened]) -> list[Screened]:
     Two steps say little of them: a Coulomb friction of 10 detection limits was 25th at chi2 2800, where a drift had 357 and was
     named; from here it came to 325.
     """
-    own = [one for one in best_of_each(screened) if set(one.form.effects) <= LEVELS.keys()]
+    own = [one for one in best_of_each(screened) if set(one.hypothesis.effects) <= LEVELS.keys()]
     return [one._replace(deviations=described.deviations, w=np.copysign(0.5, one.w), others=()) for one in own]
 
 
@@ -190,21 +196,23 @@ def _refitted(
     best = best_of_each(quickly)
     gain = chi2 - best[0].chi2 if best else 0.0
     worth = [fit for fit in best[:most] if chi2 - fit.chi2 > _WORTH_FULL * gain]
-    names = [set(fit.form.effects) for fit in worth]
+    names = [set(fit.hypothesis.effects) for fit in worth]
     forms: list[Fit] = []
     for effects in names:
-        forms += best_of_each([fit for fit in quickly if set(fit.form.effects) == effects], by_form=True)[:2]
+        forms += best_of_each([fit for fit in quickly if set(fit.hypothesis.effects) == effects], by_form=True)[:2]
     led_on = {id(start) for start, fit in zip(starts, two_steps, strict=True) if any(fit is one for one in forms)}
     again = [*(one for one in promising if id(one) not in led_on), *forms]
-    again.sort(key=lambda one: -len(one.form.axes))  # long refits first: else one process ended with one, alone for 4 s
-    finished = refits(fitter, [(one.form, one.deviations, one.w) for one in again], jobs)
-    finished += [fit for fit in best if set(fit.form.effects) not in names]
+    again.sort(
+        key=lambda one: -len(one.hypothesis.coordinates)
+    )  # long refits first: else one process ended with one, alone for 4 s
+    finished = refits(fitter, [(one.hypothesis, one.deviations, one.w) for one in again], jobs)
+    finished += [fit for fit in best if set(fit.hypothesis.effects) not in names]
     return best_of_each(sorted(finished, key=lambda fit: fit.chi2))
 
 
 def _quick(fitter: Fitter, one: Screened) -> Work[Fit]:
     # where nuisances move far, not all is linear: a slow force sensor went to 5061 from there and to 341 from where they were
-    return fitter.quick(one.form, ((one.deviations, one.w), *one.others))
+    return fitter.quick(one.hypothesis, ((one.deviations, one.w), *one.others))
 
 
 def _trying(fitter: Fitter, work: tuple[Start, float]) -> Work[Fit]:

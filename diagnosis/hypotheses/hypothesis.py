@@ -21,7 +21,7 @@ LEVELS = {
 }
 
 
-class Axis(NamedTuple):
+class Coordinate(NamedTuple):
     """One parameter of an effect as a coordinate: value = scale * w, or scale * exp(w) where it must stay positive."""
 
     effect: str
@@ -40,11 +40,11 @@ class Axis(NamedTuple):
         return min(max(raw, self.low), self.high)
 
 
-class Form(NamedTuple):
+class Hypothesis(NamedTuple):
     """Effects in given formulas with their free parameters; the others are held."""
 
     forms: dict[str, str]  # effect -> form
-    axes: tuple[Axis, ...]
+    coordinates: tuple[Coordinate, ...]
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -54,12 +54,12 @@ class Form(NamedTuple):
     def tables(self, w: Floats) -> Effects:
         """As a rig file would have them."""
         tables: Effects = {name: {"form": form} for name, form in self.forms.items()}
-        for axis, coordinate in zip(self.axes, w.tolist(), strict=True):
-            tables[axis.effect][axis.name] = axis.value(coordinate)
+        for coordinate, value in zip(self.coordinates, w.tolist(), strict=True):
+            tables[coordinate.effect][coordinate.name] = coordinate.value(value)
         for name, form in self.forms.items():
             for parameter in EFFECTS[name].forms[form].parameters:
                 tables[name].setdefault(parameter.name, parameter.default)
         return tables
 
 
-NOTHING = Form({}, ())
+NOTHING = Hypothesis({}, ())

@@ -13,7 +13,7 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.gap.problem import Point
 from diagnosis.model.rig import Effects
 from diagnosis.model.sensor_chain import Chain
-from diagnosis.result import Parameter
+from diagnosis.result import RigNumber
 
 Floats = npt.NDArray[np.floating[Any]]
 # Mean and standard deviation of what no manifest states. A 2 kHz force channel lags by 80 us, an 800 Hz displacement by 200 us,
@@ -56,16 +56,16 @@ class Nuisances:
         """By what share of its value a number of the rig table grows per tolerance, at a deviation."""
         return self._tolerance[name] * self._described[name] / self.value(name, deviation)
 
-    def parameters(self, deviations: Floats) -> tuple[Parameter, ...]:
+    def parameters(self, deviations: Floats) -> tuple[RigNumber, ...]:
         """The rig's numbers at these deviations, as the model has them, the shape of its Stribeck curve included."""
         own = len(self.rig_names)
         values = {name: self.value(name, float(deviations[i])) for i, name in enumerate(self.rig_names)}
         values = self._described | values
         values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
         numbers = [
-            Parameter(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
+            RigNumber(name, self._described[name], values[name], self._tolerance[name]) for name in self.rig_names
         ]
-        return (*numbers, Parameter("stribeck_tail", 0.0, _TAIL * float(deviations[own]), _TAIL))
+        return (*numbers, RigNumber("stribeck_tail", 0.0, _TAIL * float(deviations[own]), _TAIL))
 
     def point(self, deviations: Floats, effects: Effects) -> Point:
         """The model at these deviations, with these effects."""

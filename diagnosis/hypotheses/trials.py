@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from diagnosis.gap.problem import AGE_BEFORE, AGEING, Problem
 from diagnosis.hypotheses.axis_waves import axis_waves
-from diagnosis.hypotheses.hypothesis import Axis, Form
+from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
 from diagnosis.hypotheses.ringing import ringing_Hz
 from diagnosis.hypotheses.scales import Scale, longest_run_s, scales
 from diagnosis.hypotheses.waves import (
@@ -44,7 +44,7 @@ _AXIS_WAVES = 3  # of a force-driven axis, where a line stands out
 class Trial(NamedTuple):
     """A form and where its refit starts."""
 
-    form: Form
+    hypothesis: Hypothesis
     w: Floats
 
 
@@ -111,78 +111,82 @@ def _starts(name: str, form: str, problem: Problem, highest_Hz: float) -> list[T
         starts = [{"corner_Hz": share * highest_Hz} for share in (0.9, 2.0)]
     elif name == "piezo-resonance":
         starts = [{"resonance_Hz": share * highest_Hz} for share in (0.5, 0.75, 0.9, 1.2, 2.0)]
-    of_runs: list[Axis] = []
+    of_runs: list[Coordinate] = []
     if name == AGEING:
         of_runs = [
-            Axis(name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, AGE_SPREAD, *_AGE_LIMITS_S)
+            Coordinate(name, of_run(AGE_BEFORE, run.file), AGE_BEFORE_S, True, AGE_SPREAD, *_AGE_LIMITS_S)
             for run in runs
             if any(entry.from_before for entry in run.entries)
         ]
     return [_trial(name, form, scale, start, of_runs) for start in starts]
 
 
-def _trial(name: str, form: str, scale: dict[str, Scale], start: dict[str, float], of_runs: list[Axis]) -> Trial:
-    axes: list[Axis] = []
+def _trial(name: str, form: str, scale: dict[str, Scale], start: dict[str, float], of_runs: list[Coordinate]) -> Trial:
+    axes: list[Coordinate] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name in scale:
             unit = scale[row.name]
             size = start.get(row.name, unit.scale)
-            axes.append(Axis(name, row.name, size, unit.logarithmic, unit.prior, row.low, row.high))
+            axes.append(Coordinate(name, row.name, size, unit.logarithmic, unit.prior, row.low, row.high))
     axes += of_runs
     # a coordinate that may have either sign starts at half a unit; one that stays positive at its scale
     w = np.array([0.0 if axis.logarithmic else 0.5 for axis in axes])
-    return Trial(Form({name: form}, tuple(axes)), w)
+    return Trial(Hypothesis({name: form}, tuple(axes)), w)
 
 
 def wave_trial(name: str, form: str, wave: Wave, slowest_Hz: float) -> Trial:
     """A form of one wave, from where the wave is. What turns slower than `slowest_Hz` is no wave over time."""
-    axes: list[Axis] = []
+    axes: list[Coordinate] = []
     for row in EFFECTS[name].forms[form].parameters:
         if row.name == PHASE:
-            axes += [Axis(name, one, 1.0, False, 3.0, -20.0, 20.0) for one in (PHASE, *wave.phases_of)]
+            axes += [Coordinate(name, one, 1.0, False, 3.0, -20.0, 20.0) for one in (PHASE, *wave.phases_of)]
         elif row.name == "ratio":
-            axes.append(Axis(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
+            axes.append(Coordinate(name, row.name, max(wave.ratio, 1e-4), True, 1.5, row.low, row.high))
         elif row.name in {"second_sin", "second_cos"}:
-            axes.append(Axis(name, row.name, 0.4, False, 1.0, row.low, row.high))
+            axes.append(Coordinate(name, row.name, 0.4, False, 1.0, row.low, row.high))
         elif row.name == "frequency_Hz":
             # in a phase of its own in every run it would be any trend: a tilted track was named a load of 0.06 Hz in runs of 10 s
-            axes.append(Axis(name, row.name, 1.0 / wave.period, True, wave.spread, max(row.low, slowest_Hz), row.high))
+            axes.append(
+                Coordinate(name, row.name, 1.0 / wave.period, True, wave.spread, max(row.low, slowest_Hz), row.high)
+            )
         else:
-            axes.append(Axis(name, row.name, wave.period, True, wave.spread, row.low, row.high))
+            axes.append(Coordinate(name, row.name, wave.period, True, wave.spread, row.low, row.high))
     start = {PHASE: wave.phase_rad, "second_sin": wave.second_sin, "second_cos": wave.second_cos} | dict(wave.phases_of)
     w = np.array([start.get(axis.name, 0.0) / axis.scale for axis in axes])
-    return Trial(Form({name: form}, tuple(axes)), w)
+    return Trial(Hypothesis({name: form}, tuple(axes)), w)
 
 
 def _two_waves_trial(name: str, first: Wave, other: Wave) -> Trial:
     rows = {row.name: row for row in EFFECTS[name].forms["two-waves"].parameters}
 
-    def positive(parameter: str, size: float, prior: float) -> Axis:
-        return Axis(name, parameter, size, True, prior, rows[parameter].low, rows[parameter].high)
+    def positive(parameter: str, size: float, prior: float) -> Coordinate:
+        return Coordinate(name, parameter, size, True, prior, rows[parameter].low, rows[parameter].high)
 
     ratio = max(first.ratio, 1e-4)
     axes = (
         positive("ratio", ratio, 1.5),
         positive("wavelength_m", first.period, first.spread),
-        Axis(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
+        Coordinate(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
         positive("other_share", max(other.ratio / ratio, 0.05), 1.0),
         positive("other_wavelength_m", other.period, other.spread),
-        Axis(name, OTHER_PHASE, 1.0, False, 3.0, -20.0, 20.0),
+        Coordinate(name, OTHER_PHASE, 1.0, False, 3.0, -20.0, 20.0),
     )
-    return Trial(Form({name: "two-waves"}, axes), np.array([0.0, 0.0, first.phase_rad, 0.0, 0.0, other.phase_rad]))
+    return Trial(
+        Hypothesis({name: "two-waves"}, axes), np.array([0.0, 0.0, first.phase_rad, 0.0, 0.0, other.phase_rad])
+    )
 
 
 def _bumps_trial(name: str, wave: Wave, sign: float) -> Trial:
     """Bumps where a wave is high, or dips where it is low."""
     rows = {row.name: row for row in EFFECTS[name].forms["bumps"].parameters}
 
-    def axis(parameter: str, size: float, logarithmic: bool, prior: float) -> Axis:
-        return Axis(name, parameter, size, logarithmic, prior, rows[parameter].low, rows[parameter].high)
+    def axis(parameter: str, size: float, logarithmic: bool, prior: float) -> Coordinate:
+        return Coordinate(name, parameter, size, logarithmic, prior, rows[parameter].low, rows[parameter].high)
 
     axes = (
         axis("ratio", 2.0 * max(wave.ratio, 1e-4), False, 3.0),
         axis("wavelength_m", wave.period, True, wave.spread),
-        Axis(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
+        Coordinate(name, PHASE, 1.0, False, 3.0, -20.0, 20.0),
         axis("width", 0.12, True, 0.5),
     )
-    return Trial(Form({name: "bumps"}, axes), np.array([sign, 0.0, wave.phase_rad - sign * 0.5 * math.pi, 0.0]))
+    return Trial(Hypothesis({name: "bumps"}, axes), np.array([sign, 0.0, wave.phase_rad - sign * 0.5 * math.pi, 0.0]))

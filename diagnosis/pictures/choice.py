@@ -2,7 +2,7 @@
 
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.pictures.cycles import Told, Version, force_picture, most_telling, slip_picture, slips_apart
-from diagnosis.pictures.residuals import Model, residual_pictures
+from diagnosis.pictures.residuals import Overlay, residual_pictures
 from diagnosis.result import Picture
 
 _MOST_RUNS = 5
@@ -20,12 +20,12 @@ def pictures(
 
     """
     models = [
-        Model("rig as described", "nominal", {run.file: problem.signals(run, nominal) for run in problem.runs}),
-        Model("retuned", "retuned", {run.file: problem.signals(run, retuned) for run in problem.runs}),
+        Overlay("rig as described", "nominal", {run.file: problem.signals(run, nominal) for run in problem.runs}),
+        Overlay("retuned", "retuned", {run.file: problem.signals(run, retuned) for run in problem.runs}),
     ]
     if named is not None:
         label = "with " + " and ".join(effects)
-        models.append(Model(label, "effect", {run.file: problem.signals(run, named) for run in problem.runs}))
+        models.append(Overlay(label, "effect", {run.file: problem.signals(run, named) for run in problem.runs}))
     rig = problem.rig.model_copy(
         update={name: retuned.values[name] for name in problem.rig.tolerance if name in retuned.values}
     )
@@ -33,7 +33,7 @@ def pictures(
     return (*_cycles(problem, models), *residuals)
 
 
-def _cycles(problem: Problem, models: list[Model]) -> list[Picture]:
+def _cycles(problem: Problem, models: list[Overlay]) -> list[Picture]:
     told: list[Told] = []
     for run in problem.runs:
         versions = [Version("measured", "measured", run.signals)]

@@ -22,7 +22,7 @@ _BINS_OF_A_TRACK = 160  # of 15 mm, say: a ripple of 1 mm still shows
 _FEWEST = 3  # points of a bin
 
 
-class Model(NamedTuple):
+class Overlay(NamedTuple):
     """What the measured residual is compared with: predicted signals by file."""
 
     label: str
@@ -37,7 +37,7 @@ class _Series(NamedTuple):
 
 
 def residual_pictures(
-    rig: RigTable, runs: list[Prepared], scales: Scales, models: list[Model], effects: tuple[str, ...]
+    rig: RigTable, runs: list[Prepared], scales: Scales, models: list[Overlay], effects: tuple[str, ...]
 ) -> list[Picture]:
     """One or two pictures for every named effect; without one, the two residuals that stand out most.
 
@@ -95,7 +95,7 @@ def _without_levels(values: Floats, frequency_Hz: Floats) -> Floats:
     return result
 
 
-def _picture(rig: RigTable, runs: list[Prepared], scales: Scales, models: list[Model], over: Over) -> Picture:
+def _picture(rig: RigTable, runs: list[Prepared], scales: Scales, models: list[Overlay], over: Over) -> Picture:
     name, variable = over
     x, y = X[variable], Y[name]
     title = TITLES[name]

@@ -20,14 +20,14 @@ from diagnosis.gap.floor import Floor
 from diagnosis.gap.measure import DEFINITION, cell_names, cell_squares, differences
 from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.hypothesis import Axis
+from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.trials import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.pictures.choice import pictures
 from diagnosis.report.summary import summary
 from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.verdict.blend import flexible_differences
-from diagnosis.verdict.confirmation import Outcome
+from diagnosis.verdict.confirmation import Confirmation
 from diagnosis.verdict.held_out import Closed, HeldOut
 from diagnosis.verdict.judge import Verdict, refittable
 from diagnosis.verdict.lookalikes import imitators
@@ -41,7 +41,7 @@ def assembled(
     evidence: Evidence,
     runs: list[Prepared],
     contest: Contest,
-    outcome: Outcome,
+    outcome: Confirmation,
     tried: list[Trial],
     began: float,
     jobs: int,
@@ -63,24 +63,24 @@ def assembled(
     cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(retuned.deviations, {})))
     judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
     if held_out is not None:
-        cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.form, retuned.w))
+        cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.hypothesis, retuned.w))
         judged = _judged(contest, outcome, held_out, tried, jobs)
     cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
-    by_effect = {fit.form.effects[0]: fit for fit in reversed(contest.singles)}
+    by_effect = {fit.hypothesis.effects[0]: fit for fit in reversed(contest.singles)}
     if verdict.named is not None:
-        by_effect |= dict.fromkeys(verdict.named.form.effects, verdict.named)
-    elif verdict.ranked and is_random(verdict.ranked[0].fit.form):
-        by_effect[verdict.ranked[0].fit.form.effects[0]] = verdict.ranked[0].fit
-    alone = {"none": retuned.chi2} | {fit.form.effects[0]: fit.chi2 for fit in reversed(contest.singles)}
+        by_effect |= dict.fromkeys(verdict.named.hypothesis.effects, verdict.named)
+    elif verdict.ranked and is_random(verdict.ranked[0].fit.hypothesis):
+        by_effect[verdict.ranked[0].fit.hypothesis.effects[0]] = verdict.ranked[0].fit
+    alone = {"none": retuned.chi2} | {fit.hypothesis.effects[0]: fit.chi2 for fit in reversed(contest.singles)}
     candidates = tuple(
         _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
         for name, probability in verdict.probabilities.items()
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
-    effects = best.form.effects if verdict.named else ()
-    followed = [one for one in verdict.ranked if not is_random(one.fit.form)]
+    effects = best.hypothesis.effects if verdict.named else ()
+    followed = [one for one in verdict.ranked if not is_random(one.fit.hypothesis)]
     alike = imitators(fitter, followed, verdict.scale) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
     if verdict.outside:
@@ -119,16 +119,17 @@ def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
     first, second = verdict.named or gone, verdict.runner_up
     if first is None or second is None:
         return [fit for fit in (first, second) if fit is not None]
-    again = first.form.effects == second.form.effects and not is_random(first.form)
+    again = first.hypothesis.effects == second.hypothesis.effects and not is_random(first.hypothesis)
     return [first] if again else [first, second]
 
 
-def _judged(contest: Contest, outcome: Outcome, held_out: HeldOut, tried: list[Trial], jobs: int) -> Gap:
+def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: list[Trial], jobs: int) -> Gap:
     verdict, best, gone, _ = outcome
     fitter, retuned = contest.rig.fitter, contest.rig.fit
     closed = held_out.closed_by(best)
     compared = [
-        _shrinkage(" and ".join(fit.form.effects), held_out.closed_by(fit)) for fit in compared_fits(verdict, gone)
+        _shrinkage(" and ".join(fit.hypothesis.effects), held_out.closed_by(fit))
+        for fit in compared_fits(verdict, gone)
     ]
     compared.append(_shrinkage("parameters alone", held_out.closed_by(retuned)))
     blend = flexible_differences(fitter, retuned, tried, held_out, jobs)
@@ -190,13 +191,13 @@ def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
     deviation = np.sqrt(np.diag(fit.covariance()))[own:]
     parameters = {
         axis.name: estimate_of(axis, float(w), float(spread))
-        for axis, w, spread in zip(fit.form.axes, fit.w, deviation, strict=True)
+        for axis, w, spread in zip(fit.hypothesis.coordinates, fit.w, deviation, strict=True)
         if axis.effect == name
     }
-    return Candidate(name, probability, fit.form.forms[name], parameters)
+    return Candidate(name, probability, fit.hypothesis.forms[name], parameters)
 
 
-def estimate_of(axis: Axis, w: float, deviation: float) -> Estimate:
+def estimate_of(axis: Coordinate, w: float, deviation: float) -> Estimate:
     """A parameter with its 90 % interval, from its coordinate and the standard deviation of that."""
     value, half = axis.value(w), 1.645 * deviation
     if is_phase(axis.name):  # round the value, and not round again where it passes pi

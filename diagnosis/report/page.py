@@ -8,7 +8,7 @@ from bridge import units
 from bridge.files import write_whole
 from diagnosis.report import words
 from diagnosis.report.page_plots import STYLES, draw
-from diagnosis.result import Candidate, Cell, Diagnosis, Gap, Parameter
+from diagnosis.result import Candidate, Cell, Diagnosis, Gap, RigNumber
 
 _REGIMES = ("stick", "breakaway", "slip", "restick", "steady")
 _SMALL = 0.005  # a row of the map that no run brings above this is left out, and counted
@@ -144,7 +144,7 @@ def _place(regime: str) -> tuple[int, str]:
     return (_REGIMES.index(regime) if regime in _REGIMES else len(_REGIMES), regime)
 
 
-def rig_row(parameter: Parameter) -> RigRow:
+def rig_row(parameter: RigNumber) -> RigRow:
     """A number of the rig as the table shows it."""
     name, unit = units.name_and_unit(parameter.name)
     scale = (parameter.described or 1.0) * parameter.tolerance
@@ -158,7 +158,7 @@ def rig_row(parameter: Parameter) -> RigRow:
     )
 
 
-def _tolerance(parameter: Parameter) -> str:
+def _tolerance(parameter: RigNumber) -> str:
     if not parameter.tolerance:
         return "known exactly"
     return f"± {100.0 * parameter.tolerance:g} %" if parameter.described else f"± {parameter.tolerance:g}"

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bridge.wire.messages import CHANNELS
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.synthetic.protocols import AxisPlan, RunPlan
-from diagnosis.synthetic.sensors import Chain, measured
+from diagnosis.synthetic.sensors import MadeChain, measured
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.effects.formulas import even_m, extension_m
@@ -27,7 +27,7 @@ class MadeRig(NamedTuple):
     """The rig that is there."""
 
     config: RigConfig
-    chain: Chain
+    chain: MadeChain
     rate_Hz: float  # of the simulation
     average: int  # samples of it that make one of the record
 

@@ -22,7 +22,7 @@ _STEP = 0.5  # of a nuisance's tolerance
 
 def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
     """Differences on the held-out runs in floors [compared] under the blend that was fitted to the others."""
-    trials = list({trial.form.effects: trial for trial in reversed(trials)}.values())
+    trials = list({trial.hypothesis.effects: trial for trial in reversed(trials)}.values())
     directions = Directions(base, fitter.most)
     here = fitter.predicted(base.deviations, {})
     _, slope = fitter.whitened(here)
@@ -33,7 +33,7 @@ def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_ou
     blended = np.stack(columns, axis=1) @ shares
     moved = directions.moved(blended, 1.0) - base.deviations
     points = [fitter.nuisances.point(base.deviations, {})]
-    points += [fitter.nuisances.point(base.deviations, trial.form.tables(trial.w)) for trial in trials]
+    points += [fitter.nuisances.point(base.deviations, trial.hypothesis.tables(trial.w)) for trial in trials]
     points += [fitter.nuisances.point(ahead, {}) for ahead in base.deviations + _STEP * np.eye(len(moved))]
     unseen, *others = held_out.problem.predicted_many(points)
     total = unseen.copy()
@@ -44,7 +44,7 @@ def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_ou
 
 def _shown(fitter: Fitter, work: tuple[Floats, list[Trial]]) -> list[Floats]:
     deviations, trials = work
-    return fitter.predicted_many([(deviations, trial.form.tables(trial.w)) for trial in trials])
+    return fitter.predicted_many([(deviations, trial.hypothesis.tables(trial.w)) for trial in trials])
 
 
 def _finite(values: Floats) -> Floats:

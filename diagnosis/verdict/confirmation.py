@@ -14,7 +14,7 @@ from diagnosis.verdict.selection import Contest
 _NO_GAP = 1.0
 
 
-class Outcome(NamedTuple):
+class Confirmation(NamedTuple):
     """The last word."""
 
     verdict: Verdict
@@ -23,19 +23,19 @@ class Outcome(NamedTuple):
     held_out: HeldOut | None  # the runs kept aside, if there are any
 
 
-def borne_out(contest: Contest, unseen: Problem | None, jobs: int) -> Outcome:
+def borne_out(contest: Contest, unseen: Problem | None, jobs: int) -> Confirmation:
     """The verdict of a contest if the runs kept aside bear it out; what else is left if they refute it."""
     rig, verdict = contest.rig, contest.verdict
     best = verdict.named or rig.fit
     if unseen is None:
-        return Outcome(verdict, best, None, None)
+        return Confirmation(verdict, best, None, None)
 
     def on(fit: Fit) -> HeldOut:
         return HeldOut(unseen, rig.fitter.nuisances, fit, rig.fit, rig.roughness, jobs)
 
     expected = rig.expected_chi2 / len(rig.fit.residual)
     held_out, gone = on(best), None
-    if is_random(best.form) and held_out.retuned <= _NO_GAP:
+    if is_random(best.hypothesis) and held_out.retuned <= _NO_GAP:
         verdict = contest.without_random()
         best = verdict.named or rig.fit
         held_out = on(best)
@@ -48,4 +48,4 @@ def borne_out(contest: Contest, unseen: Problem | None, jobs: int) -> Outcome:
                 verdict, gone, best, held_out = elsewhere, None, elsewhere.named, there
     if verdict.named is not None and held_out.left_by(best) > MORE_THAN_RIGHT:
         verdict = doubted(verdict)
-    return Outcome(verdict, best, gone, held_out)
+    return Confirmation(verdict, best, gone, held_out)

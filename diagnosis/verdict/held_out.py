@@ -15,7 +15,7 @@ from diagnosis.fits.random_friction import RANDOM, is_random
 from diagnosis.gap.floor import Floor, floor_of, replicates
 from diagnosis.gap.measure import cell_squares, chi2_of, differences, whitened
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.hypothesis import NOTHING, Form
+from diagnosis.hypotheses.hypothesis import NOTHING, Hypothesis
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.per_run import PHASE, Table, has_own_phases
 from diagnosis.model.rig import Effects, Roughness
@@ -69,7 +69,7 @@ class HeldOut:
             self._wider = self.floor._replace(bias=wider.bias, scatter=wider.scatter, level=wider.level)
         described = np.zeros(len(nuisances))
         self.nominal = self._gap(self._squares(NOTHING, [(described, np.zeros(0))])[0])
-        (self._retuned,) = self._squares(retuned.form, [(retuned.deviations, retuned.w)])
+        (self._retuned,) = self._squares(retuned.hypothesis, [(retuned.deviations, retuned.w)])
         self._left_retuned = self._left(retuned)
         self.retuned = self._gap(self._retuned)
 
@@ -85,7 +85,7 @@ class HeldOut:
         at = np.concatenate([fit.deviations, fit.w])
         moved = [at, *(at + spread @ random.normal(size=len(at)) for _ in range(_DRAWS))]
         own = len(fit.deviations)
-        drawn = self._squares(fit.form, [(one[:own], one[own:]) for one in moved])
+        drawn = self._squares(fit.hypothesis, [(one[:own], one[own:]) for one in moved])
         return self._closed(drawn[0], drawn)
 
     def refutes(self, fit: Fit, expected_chi2: float) -> bool:
@@ -94,7 +94,7 @@ class HeldOut:
         What says nothing of their course must scatter as much as they do. `expected_chi2` is what a perfect model leaves of one
         compared feature.
         """
-        if not foretells(fit.form):
+        if not foretells(fit.hypothesis):
             left = self.left_by(fit)
             return left > _SCATTERED and self.retuned - left < _LEAST_OF_MUCH * (self.retuned - 1.0)
         residual = self._left(fit)
@@ -125,7 +125,7 @@ class HeldOut:
 
         def left(steps: list[Floats]) -> list[Floats]:
             moved = [at + spread @ step for step in steps]
-            points = [self._nuisances.point(one[:own], fit.form.tables(one[own:])) for one in moved]
+            points = [self._nuisances.point(one[:own], fit.hypothesis.tables(one[own:])) for one in moved]
             return [whitened(self.floor, self.problem, one)[0] for one in self.problem.predicted_many(points)]
 
         rates = np.stack([one - residual for one in left(list(np.eye(len(at))))], axis=1)
@@ -137,7 +137,7 @@ class HeldOut:
 
     def left_by(self, fit: Fit) -> float:
         """The gap under a fit, in floors."""
-        return self._gap(self._squares(fit.form, [(fit.deviations, fit.w)])[0])
+        return self._gap(self._squares(fit.hypothesis, [(fit.deviations, fit.w)])[0])
 
     def closed_by_differences(self, z: Floats) -> Closed:
         """The same for differences from elsewhere [compared]."""
@@ -168,20 +168,20 @@ class HeldOut:
         predicted = self.problem.predicted(self._nuisances.point(fit.deviations, fit.effects))
         return whitened(self.floor, self.problem, predicted)[0]
 
-    def differences(self, deviations: Floats, form: Form, w: Floats) -> Floats:
+    def differences(self, deviations: Floats, hypothesis: Hypothesis, w: Floats) -> Floats:
         """Measured less predicted in floors [compared]."""
-        return self._differences(self._floor_for(form, w), form, [(deviations, w)])[0]
+        return self._differences(self._floor_for(hypothesis, w), hypothesis, [(deviations, w)])[0]
 
-    def _squares(self, form: Form, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
+    def _squares(self, hypothesis: Hypothesis, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
         """What every cell holds, in floors squared [cells]; 1 on average under a model that is right."""
-        floor = self._floor_for(form, at[0][1])
-        return [self._in_floors(floor, z) for z in self._differences(floor, form, at)]
+        floor = self._floor_for(hypothesis, at[0][1])
+        return [self._in_floors(floor, z) for z in self._differences(floor, hypothesis, at)]
 
-    def _floor_for(self, form: Form, w: Floats) -> Floor:
-        return self.floor if all(_follows(table) for table in form.tables(w).values()) else self._wider
+    def _floor_for(self, hypothesis: Hypothesis, w: Floats) -> Floor:
+        return self.floor if all(_follows(table) for table in hypothesis.tables(w).values()) else self._wider
 
-    def _differences(self, floor: Floor, form: Form, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
-        points = [self._nuisances.point(deviations, form.tables(w)) for deviations, w in at]
+    def _differences(self, floor: Floor, hypothesis: Hypothesis, at: Sequence[tuple[Floats, Floats]]) -> list[Floats]:
+        points = [self._nuisances.point(deviations, hypothesis.tables(w)) for deviations, w in at]
         return [differences(floor, self.problem, predicted) for predicted in self.problem.predicted_many(points)]
 
     def differences_of(self, predicted: Floats) -> Floats:
@@ -202,11 +202,11 @@ def _follows(table: Table) -> bool:
     return table["form"] != RANDOM and not has_own_phases(table)
 
 
-def foretells(form: Form) -> bool:
+def foretells(hypothesis: Hypothesis) -> bool:
     """Whether effects say what another run will show.
 
     What varies at random takes another path there. A wave over time, a load that turns, may be in any phase when a run begins:
     one of 10 detection limits, named, with 0.467 for 0.487 Hz, closed 22 % of chi2.
     """
-    waves = [{axis.name for axis in form.axes if axis.effect == name} for name in form.effects]
-    return not is_random(form) and not any({PHASE, "frequency_Hz"} <= own for own in waves)
+    waves = [{axis.name for axis in hypothesis.coordinates if axis.effect == name} for name in hypothesis.effects]
+    return not is_random(hypothesis) and not any({PHASE, "frequency_Hz"} <= own for own in waves)

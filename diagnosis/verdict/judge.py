@@ -50,7 +50,7 @@ _SECOND_ADDS = 0.025
 _UNDER_RANDOM = 2  # single effects that a random one is tried on top of
 
 
-class Model(NamedTuple):
+class RankedFit(NamedTuple):
     """A fit in the competition."""
 
     fit: Fit
@@ -65,33 +65,33 @@ class Verdict(NamedTuple):
     named: Fit | None
     probabilities: dict[str, float]  # of every effect, none and unexplained; they add up to 1
     runner_up: Fit | None
-    ranked: tuple[Model, ...]  # single effects by evidence, the best first
+    ranked: tuple[RankedFit, ...]  # single effects by evidence, the best first
     scale: float  # the misfit that all evidence is divided by
     refuted: tuple[str, ...] = ()  # effects that won, and that the runs kept aside do not bear out
     outside: bool = False  # something shows that is not compared, and that the library lacks
 
 
-def _left_by_right(base: Fit, best: Model, expected_chi2: float) -> float:
+def _left_by_right(base: Fit, best: RankedFit, expected_chi2: float) -> float:
     """What a right explanation leaves at most; nothing more than the expected where noise hides the slips."""
     if hidden_by_noise(base, expected_chi2):
         return expected_chi2
-    one = len(best.fit.form.effects) == 1 and not best.scatters and not _is_exact(best.fit)
+    one = len(best.fit.hypothesis.effects) == 1 and not best.scatters and not _is_exact(best.fit)
     mismatch = _MISMATCH_OF_ONE if one else _MISMATCH
     return MUCH * expected_chi2 + mismatch * max(base.chi2 - expected_chi2, 0.0)
 
 
 def _is_exact(fit: Fit) -> bool:
     """Whether an effect can have no other formula."""
-    return _EXACT.issuperset(fit.form.effects)
+    return _EXACT.issuperset(fit.hypothesis.effects)
 
 
 def occam(fit: Fit) -> float:
     """Log evidence that the freedom of the effects' parameters costs."""
-    if not fit.form.axes:
+    if not fit.hypothesis.coordinates:
         return 0.0
     own = len(fit.deviations)
     _, volume = np.linalg.slogdet(fit.covariance()[own:, own:])
-    return sum(math.log(axis.prior) for axis in fit.form.axes) - 0.5 * float(volume)
+    return sum(math.log(axis.prior) for axis in fit.hypothesis.coordinates) - 0.5 * float(volume)
 
 
 def judge(
@@ -120,38 +120,40 @@ def judge(
     best = double or (ranked[0] if ranked else None)
     scores = _of_no_effect(base, best, scale, expected_chi2) | _of_effects(ranked, double)
     top = max(scores, key=lambda name: scores[name])
-    a_load = best is not None and best.scatters and best.fit.form.effects == (LOAD,) == (top,)
+    a_load = best is not None and best.scatters and best.fit.hypothesis.effects == (LOAD,) == (top,)
     behind = _REFUTED if refuted else _IN_BURSTS if a_load and any(one.in_bursts for one in random) else 0.0
     if behind > 0.0:
         scores["unexplained"] = scores[top] + behind
         top = "unexplained"
-    leaders = best.fit.form.effects if best is not None and top in best.fit.form.effects else (top,)
+    leaders = best.fit.hypothesis.effects if best is not None and top in best.fit.hypothesis.effects else (top,)
     mistaken = mistaken_of(leaders, best is not None and best.scatters)
     probabilities = with_mistakes(softmax(scores), leaders, mistaken)
     if best is None or top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
-    followed = [one.fit for one in ranked if not is_random(one.fit.form)]  # no run separates a path from a path
+    followed = [one.fit for one in ranked if not is_random(one.fit.hypothesis)]  # no run separates a path from a path
     if top == "unexplained":
-        nearest = followed[0] if followed and is_random(best.fit.form) else best.fit
-        gone = best.fit.form.effects if refuted else ()
+        nearest = followed[0] if followed and is_random(best.fit.hypothesis) else best.fit
+        gone = best.fit.hypothesis.effects if refuted else ()
         return Verdict("unexplained", None, probabilities, nearest, tuple(ranked), scale, gone)
-    others = [fit for fit in followed if fit is not best.fit and fit.form.effects[0] not in best.fit.form.effects]
+    others = [
+        fit for fit in followed if fit is not best.fit and fit.hypothesis.effects[0] not in best.fit.hypothesis.effects
+    ]
     runner_up = others[0] if others else None
     return Verdict("effect", best.fit, probabilities, runner_up, tuple(ranked), scale)
 
 
 def _models(
     base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
-) -> tuple[list[Model], list[Model], float]:
+) -> tuple[list[RankedFit], list[RankedFit], float]:
     """Single effects and pairs with their evidence, and the misfit that it is divided by."""
 
     def scattered(noise: float) -> list[tuple[Fit, str, Scattered]]:
         """What lies under a random effect, the effect, and both."""
         found: list[tuple[Fit, str, Scattered]] = []
         for effect in random:
-            others = [one for one in singles if effect.effect not in one.form.effects][:_UNDER_RANDOM]
+            others = [one for one in singles if effect.effect not in one.hypothesis.effects][:_UNDER_RANDOM]
             # a track is more than the two waves of its form: what they leave was named as a load beside it
-            own = [one for one in singles[:_UNDER_RANDOM] if effect.effect in one.form.effects]
+            own = [one for one in singles[:_UNDER_RANDOM] if effect.effect in one.hypothesis.effects]
             found += [(fit, effect.effect, effect.on(fit, noise)) for fit in (base, *others, *own)]
         return found
 
@@ -159,10 +161,10 @@ def _models(
     fits = [base, *singles, *pairs, *(one.fit for *_, one in closest)]
     scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
-    def model(fit: Fit) -> Model:
+    def model(fit: Fit) -> RankedFit:
         closer = chi2_of(base.residual) - chi2_of(fit.residual)
         likelier = (base.chi2 - fit.chi2) - closer
-        return Model(fit, 0.5 * closer / (scale * JITTER) + 0.5 * likelier - occam(fit))
+        return RankedFit(fit, 0.5 * closer / (scale * JITTER) + 0.5 * likelier - occam(fit))
 
     alone = [model(fit) for fit in singles]
     doubles = [model(fit) for fit in pairs]
@@ -170,18 +172,18 @@ def _models(
         if close.fit.chi2 > NEVER_WITHOUT_GAP * expected_chi2:
             continue  # so free a path leaves no more if it is the cause; a plug that came loose left 4.5 times the expected
         if under is base:
-            alone.append(Model(both.fit, both.gained, scatters=True))
-        elif effect in under.form.effects:
+            alone.append(RankedFit(both.fit, both.gained, scatters=True))
+        elif effect in under.hypothesis.effects:
             if both.gained > 0.0:
                 alone = [one for one in alone if one.fit is not under]
                 wave = under._replace(chi2=both.fit.chi2)
-                alone.append(Model(wave, model(under).evidence + both.gained, scatters=True))
+                alone.append(RankedFit(wave, model(under).evidence + both.gained, scatters=True))
         else:
-            doubles.append(Model(both.fit, model(under).evidence + both.gained, scatters=True))
+            doubles.append(RankedFit(both.fit, model(under).evidence + both.gained, scatters=True))
     return alone, doubles, scale
 
 
-def _pays(double: Model, first: Model, base: Fit, expected_chi2: float) -> bool:
+def _pays(double: RankedFit, first: RankedFit, base: Fit, expected_chi2: float) -> bool:
     """Whether a second effect is worth naming beside the best single one."""
     taken = first.fit.chi2 - double.fit.chi2
     closed = taken / max(first.fit.chi2 - expected_chi2, 1.0)
@@ -194,7 +196,7 @@ def _pays(double: Model, first: Model, base: Fit, expected_chi2: float) -> bool:
     return gained >= _COST_OF_SECOND and closed >= _SECOND_CLOSES and not is_mismatch and not needless
 
 
-def _of_no_effect(base: Fit, best: Model | None, scale: float, expected_chi2: float) -> dict[str, float]:
+def _of_no_effect(base: Fit, best: RankedFit | None, scale: float, expected_chi2: float) -> dict[str, float]:
     """Log evidence of `none` and `unexplained`."""
     certain = max(base.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
     against_none = 0.5 * certain / JITTER
@@ -208,12 +210,14 @@ def _of_no_effect(base: Fit, best: Model | None, scale: float, expected_chi2: fl
     return {"none": none, "unexplained": min(unknown, none - _NO_ALARM)}
 
 
-def _of_effects(ranked: list[Model], double: Model | None) -> dict[str, float]:
+def _of_effects(ranked: list[RankedFit], double: RankedFit | None) -> dict[str, float]:
     """Log evidence of every effect of the library."""
-    alone = {one.fit.form.effects[0]: one.evidence for one in reversed(ranked)}  # the better one of two forms last
+    alone = {
+        one.fit.hypothesis.effects[0]: one.evidence for one in reversed(ranked)
+    }  # the better one of two forms last
     scores: dict[str, float] = {}
     if double is not None:  # both as probable, so the stronger one first
-        for name in sorted(double.fit.form.effects, key=lambda name: -alone.get(name, -math.inf)):
+        for name in sorted(double.fit.hypothesis.effects, key=lambda name: -alone.get(name, -math.inf)):
             scores[name] = double.evidence - math.log(2.0)
     for name in (*alone, *EFFECTS):
         scores.setdefault(name, alone.get(name, -30.0))
@@ -222,7 +226,7 @@ def _of_effects(ranked: list[Model], double: Model | None) -> dict[str, float]:
 
 def is_of_one_place(fit: Fit) -> bool:
     """Whether a fit is waves of the track alone: elsewhere it may have others."""
-    return fit.form.effects == (TRACK,) and not is_random(fit.form)
+    return fit.hypothesis.effects == (TRACK,) and not is_random(fit.hypothesis)
 
 
 def of_another_place(
@@ -233,19 +237,19 @@ def of_another_place(
     A track of three waves, told by two of them, left 3.98 of 5.63 floors of a run elsewhere; what it scatters closes 0.61.
     """
     verdict = judge(base, [fit for fit in singles if not is_of_one_place(fit)], [], expected_chi2, random)
-    return verdict if verdict.named is not None and is_random(verdict.named.form) else None
+    return verdict if verdict.named is not None and is_random(verdict.named.hypothesis) else None
 
 
 def refittable(verdict: Verdict) -> bool:
     """Whether a single effect was named that a prediction can follow."""
     named = verdict.named
-    return named is not None and len(named.form.effects) == 1 and not is_random(named.form)
+    return named is not None and len(named.hypothesis.effects) == 1 and not is_random(named.hypothesis)
 
 
 def doubted(verdict: Verdict) -> Verdict:
     """The same name, less sure of it: it leaves more of the runs kept aside than right ones do."""
     assert verdict.named is not None, "nothing is named"  # noqa: S101
-    leaders = verdict.named.form.effects
+    leaders = verdict.named.hypothesis.effects
     return verdict._replace(probabilities=with_mistakes(verdict.probabilities, leaders, MISTAKEN_DOUBTFUL))
 
 
@@ -257,8 +261,8 @@ def although_outside(verdict: Verdict, imitators: frozenset[str] = frozenset()) 
     named = verdict.named
     if verdict.kind == "no-gap":
         won = "none"
-    elif named is not None and imitators.issuperset(named.form.effects):
-        won = named.form.effects[0]
+    elif named is not None and imitators.issuperset(named.hypothesis.effects):
+        won = named.hypothesis.effects[0]
     else:
         return verdict
     swapped = {won: verdict.probabilities["unexplained"], "unexplained": verdict.probabilities[won]}

@@ -4,7 +4,7 @@ import copy
 
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.verdict.judge import JITTER, Model
+from diagnosis.verdict.judge import JITTER, RankedFit
 
 # Log evidence: what explains the runs, or imitates the named effect, to within this could as well have been named. A delay of the
 # force of 9 limits was 1.4 behind a slow sensor that it could not have imitated: neither formula was quite the rig's.
@@ -12,7 +12,7 @@ _SAME = 6.0
 _TRIED = 4  # candidates behind the named one
 
 
-def imitators(fitter: Fitter, ranked: list[Model], scale: float) -> tuple[str, ...]:
+def imitators(fitter: Fitter, ranked: list[RankedFit], scale: float) -> tuple[str, ...]:
     """The named effect and those that would have explained its runs as well; empty where it stands alone.
 
     Args:
@@ -27,17 +27,17 @@ def imitators(fitter: Fitter, ranked: list[Model], scale: float) -> tuple[str, .
     perfect.measured = fitter.predicted(named.fit.deviations, named.fit.effects) + fitter.floor.bias
     imitated = fitter.for_problem(perfect)
     alike = [
-        one.fit.form.effects[0]
+        one.fit.hypothesis.effects[0]
         for one in ranked[1 : 1 + _TRIED]
         if named.evidence - one.evidence < _SAME
         or (named.evidence - one.evidence < 2.0 * _SAME and _loss(imitated, named.fit, one.fit, scale) < _SAME)
     ]
-    return (named.fit.form.effects[0], *alike) if alike else ()
+    return (named.fit.hypothesis.effects[0], *alike) if alike else ()
 
 
 def _loss(imitated: Fitter, named: Fit, other: Fit, scale: float) -> float:
     """Log evidence that an effect is behind the truth in the truth's own runs."""
     there = imitated.judged(named)
-    best = imitated.refit(other.form, other.deviations, other.w)
+    best = imitated.refit(other.hypothesis, other.deviations, other.w)
     closer = float(best.residual @ best.residual - there.residual @ there.residual)
     return 0.5 * closer / (scale * JITTER) + 0.5 * ((best.chi2 - there.chi2) - closer)

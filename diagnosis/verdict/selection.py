@@ -115,7 +115,7 @@ class Contest:
         fitter, jobs = self.rig.fitter, self._jobs
         self.singles = self._finished(refitted(fitter, self._origins, self._screened, jobs))
         if self._shows_more() and self.singles[0].chi2 > self.rig.expected_chi2:
-            progress(f"best single effect so far: {self.singles[0].form.effects[0]}; looking for a second", 0.6)
+            progress(f"best single effect so far: {self.singles[0].hypothesis.effects[0]}; looking for a second", 0.6)
             expected = self.rig.expected_chi2
             self.pairs = pairs_of_effects(fitter, self.rig.fit, self.singles, self._tried, expected, jobs)
             if self.pairs and self._leaves_much(self.pairs[0]):
@@ -141,7 +141,7 @@ class Contest:
         Of 20 pairs named on opened cases 15 left less: no refit changed a name. It changed two of the other five, for the better.
         """
         named = self.verdict.named
-        if named is not None and len(named.form.effects) > 1 and self._leaves_much(named):
+        if named is not None and len(named.hypothesis.effects) > 1 and self._leaves_much(named):
             starts = starts_of(rival_pairs(self.singles, self.pairs), self.rig.fit, ())
             self.pairs = self._finished(self._again(self.pairs, starts))
             self.verdict = self._judged()
@@ -155,10 +155,10 @@ class Contest:
         if self._varies():
             by_run = starts_by_run(fitter, self.rig.fit, self._tried, jobs)
             self.singles = self._finished(self._again(self.singles, by_run))
-        if any(fit.form.effects == (LAG,) for fit in close(self.rig.fit, self.singles)):
+        if any(fit.hypothesis.effects == (LAG,) for fit in close(self.rig.fit, self.singles)):
             self.singles = self._finished(_with(self.singles, late_fits(fitter, self._tried, jobs)))
         if self.singles and self._leaves_much(self.singles[0]):
-            progress(f"every effect gets a refit beside the best one, {self.singles[0].form.effects[0]}", 0.7)
+            progress(f"every effect gets a refit beside the best one, {self.singles[0].hypothesis.effects[0]}", 0.7)
             best_before = self.pairs[0].chi2 if self.pairs else math.inf
             beside = pairs_with(fitter, self.singles[0], self._tried, jobs)
             self.pairs = self._finished(_with(self.pairs, beside))
@@ -172,7 +172,7 @@ class Contest:
         if named is None or not refittable(self.verdict) or not self._leaves_much(named):
             return
         fitter, jobs = self.rig.fitter, self._jobs
-        own = [trial for trial in self._tried if trial.form.effects == named.form.effects]
+        own = [trial for trial in self._tried if trial.hypothesis.effects == named.hypothesis.effects]
         again = refitted(fitter, self._origins, screened(fitter, self._origins, own, jobs), jobs)
         self.singles = self._finished(_with(self.singles, again))
         self.verdict = self._judged()
@@ -196,14 +196,14 @@ class Contest:
 
     def _varies(self) -> bool:
         """Whether a wave of the friction, over time or along the track, takes a share of the gap."""
-        waves = [fit.chi2 for fit in self.singles if fit.form.effects[0] in RANDOM_EFFECTS]
+        waves = [fit.chi2 for fit in self.singles if fit.hypothesis.effects[0] in RANDOM_EFFECTS]
         return self.rig.fit.chi2 - min(waves, default=math.inf) >= _STRONGEST_WAVE * self._gap()
 
     def _random_frictions(self) -> list[RandomFriction]:
         """The random form of each effect that has one, on the rig that comes nearest without that effect."""
         found: list[RandomFriction] = []
         for effect in RANDOM_EFFECTS:
-            others = [self.rig.fit, *(fit for fit in self.singles if effect not in fit.form.effects)]
+            others = [self.rig.fit, *(fit for fit in self.singles if effect not in fit.hypothesis.effects)]
             found.append(RandomFriction(effect, self.rig.fitter, min(others, key=lambda fit: fit.chi2)))
         return found
 
@@ -254,7 +254,7 @@ def checked(
         without, middle = middle_fits(rig.fitter, rig.fit, singles, verdict.ranked[0].fit, jobs)
         if judge(without, [middle], [], rig.expected_chi2).named is not None:
             break
-        others = [fit for fit in singles if fit.form.effects != middle.form.effects]
+        others = [fit for fit in singles if fit.hypothesis.effects != middle.hypothesis.effects]
         singles = sorted((middle, *others), key=lambda fit: fit.chi2)
         verdict = judge(rig.fit, singles, [], rig.expected_chi2, random)
     return singles, verdict

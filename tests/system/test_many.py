@@ -13,17 +13,17 @@ from pathlib import Path
 import pytest
 
 from bridge.faults import Fault
-from diagnosis.diagnose_many import Outcome, Source, diagnose_many, find_sources
+from diagnosis.diagnose_many import EvidenceFolder, FolderResult, diagnose_many, find_sources
 from tests import made_up
 
 NAMES = ["a", "b", "deadly", "refused", "broken"]
 
 
-def sources(at: Path, names: list[str]) -> list[Source]:
+def sources(at: Path, names: list[str]) -> list[EvidenceFolder]:
     return find_sources([made_up.evidence_folder(at / name) for name in names])
 
 
-def by_name(outcomes: Iterator[Outcome]) -> dict[str, Outcome]:
+def by_name(outcomes: Iterator[FolderResult]) -> dict[str, FolderResult]:
     found = list(outcomes)
     result = {outcome.source.name: outcome for outcome in found}
     assert len(found) == len(result)

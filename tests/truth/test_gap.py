@@ -122,10 +122,10 @@ def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
 
 
 def numbers_of(name: str, sizes: Sizes, size: float) -> dict[str, float | str]:
-    table: dict[str, float | str] = {"form": sizes.form, sizes.parameter: sizes.signs[-1] * size}
+    table: dict[str, float | str] = {"form": sizes.hypothesis, sizes.parameter: sizes.signs[-1] * size}
     for key, (low, high) in {**sizes.log, **sizes.even}.items():
         table[key] = (low * high) ** 0.5 if low > 0.0 else 0.5 * (low + high)
-    for parameter in EFFECTS[name].forms[sizes.form].parameters:
+    for parameter in EFFECTS[name].forms[sizes.hypothesis].parameters:
         table.setdefault(parameter.name, parameter.default)
     return table
 

@@ -38,8 +38,8 @@ def tables(ladder):
     """Every form as the library tries it; a random one as it might be drawn."""
     rig, runs = ladder
     tried = {
-        next(iter(trial.form.forms.items())): {
-            name: as_in_rig_file(table) for name, table in trial.form.tables(trial.w).items()
+        next(iter(trial.hypothesis.forms.items())): {
+            name: as_in_rig_file(table) for name, table in trial.hypothesis.tables(trial.w).items()
         }
         for trial in reversed(trials(Problem(rig, runs)))
     }

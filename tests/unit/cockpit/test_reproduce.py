@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from cockpit.paper.claims import Row
+from cockpit.paper.claims import PaperRow
 from cockpit.paper.page import reproduce
 
 
@@ -40,7 +40,7 @@ def test_the_page_names_every_claim(report):
 
 def test_one_failing_check_is_a_failing_result(report):
     result, _ = report
-    failed = result._replace(rows=[*result.rows, Row("group", "claim", "1 N", "2 N", False)])
+    failed = result._replace(rows=[*result.rows, PaperRow("group", "claim", "1 N", "2 N", False)])
     assert not failed.passed
     assert f"{len(result.rows)} of {len(failed.rows)} checks" in failed.verdict
 

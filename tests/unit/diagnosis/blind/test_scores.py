@@ -12,7 +12,7 @@ from diagnosis.blind.intervals import Score, bootstrapped, mean, rate, ratio
 from diagnosis.blind.locating import f1
 from diagnosis.blind.outcomes import opened
 from diagnosis.blind.scoring import as_json, score
-from diagnosis.blind.table import Row, table
+from diagnosis.blind.table import ScoreRow, table
 from diagnosis.synthetic.folder import paper_rig
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
@@ -86,8 +86,8 @@ def test_scores_by_hand():
     [(">= 0.85", 0.85, 0.8499), ("<= 0.05", 0.05, 0.0501), ("0.85-0.95", 0.9, 0.951), ("0.85-0.95", 0.85, 0.84)],
 )
 def test_a_bar_is_not_reached_by_rounding(bar: str, reached: float, missed: float):
-    def row(value: float) -> Row:
-        return Row("of anything", bar, (Score(value, value, value, 20), None))
+    def row(value: float) -> ScoreRow:
+        return ScoreRow("of anything", bar, (Score(value, value, value, 20), None))
 
     assert not row(reached).missed
     assert row(missed).missed

@@ -30,9 +30,9 @@ def one_speed(tmp_path_factory):
     )
     fits = {}
     for trial in trials(problem):
-        name = trial.form.effects[0]
+        name = trial.hypothesis.effects[0]
         if name in {"static-friction-ageing", "static-level"} and name not in fits:
-            fits[name] = fitter.refit(trial.form, start, trial.w)
+            fits[name] = fitter.refit(trial.hypothesis, start, trial.w)
     return problem, nuisances, fits
 
 
@@ -51,11 +51,11 @@ def test_what_predicts_the_same_everywhere_gets_a_check_by_hand(one_speed):
     problem, nuisances, fits = one_speed
     fit = fits["static-level"]
     # the same model, once more with an effect of no size
-    axis = fit.form.axes[0]
+    axis = fit.hypothesis.coordinates[0]
     nothing = axis._replace(effect="force-sensor-gain", scale=1e-9)
-    form = fit.form._replace(forms=fit.form.forms | {"force-sensor-gain": ""}, axes=(axis, nothing))
+    form = fit.hypothesis._replace(forms=fit.hypothesis.forms | {"force-sensor-gain": ""}, coordinates=(axis, nothing))
     columns = np.column_stack([fit.columns, np.zeros(len(fit.columns))])
-    twin = fit._replace(form=form, w=np.append(fit.w, 0.0), columns=columns)
+    twin = fit._replace(hypothesis=form, w=np.append(fit.w, 0.0), columns=columns)
     found = next_experiment(problem, nuisances, [fit, twin])
     assert found.what == advice(("static-level", "force-sensor-gain"), "spring")
     # what a run would tell is not what the check tells

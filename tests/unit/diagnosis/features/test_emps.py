@@ -35,7 +35,7 @@ def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> Non
     fitter, judge = Fitter(fitted, floor(fitted), nuisances), floor(held_out)
     retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(nuisances)))])[0]
     described = fitter.described(np.zeros(len(nuisances)))
-    offsets = [trial for trial in trials(fitted) if "force-sensor-bias" in trial.form.forms]
+    offsets = [trial for trial in trials(fitted) if "force-sensor-bias" in trial.hypothesis.forms]
     origins = [Origin(retuned, KNEE), Origin(described, FAR_KNEE)]
     with_bias = refitted(fitter, origins, screened(fitter, origins, offsets))[0]
     gaps = [

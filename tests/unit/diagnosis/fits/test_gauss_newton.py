@@ -29,7 +29,7 @@ def fitter(tmp_path):
 
 
 def start_of(fitter, name):
-    return next(one for one in trials(fitter.problem) if one.form.effects == (name,))
+    return next(one for one in trials(fitter.problem) if one.hypothesis.effects == (name,))
 
 
 def test_a_level_takes_over_what_its_number_was_moved_by(fitter):
@@ -38,9 +38,9 @@ def test_a_level_takes_over_what_its_number_was_moved_by(fitter):
     static = fitter.nuisances.names.index("static_force_N")
     assert retuned.deviations[static] == pytest.approx(-3.3)
     trial = start_of(fitter, "static-level")
-    fit = fitter.refit(trial.form, retuned.deviations, np.zeros(1))
+    fit = fitter.refit(trial.hypothesis, retuned.deviations, np.zeros(1))
     # with a derivative for each, -0.066 and -1.3
-    assert fit.form.tables(fit.w)["static-level"]["ratio"] == pytest.approx(-0.1, abs=0.003)
+    assert fit.hypothesis.tables(fit.w)["static-level"]["ratio"] == pytest.approx(-0.1, abs=0.003)
     assert abs(fit.deviations[static]) < 0.2
 
 
@@ -49,10 +49,12 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
     yielding, sliding = start_of(fitter, "base-compliance"), start_of(fitter, "coulomb-level")
     weightless = yielding.w + 20.0  # as soft and as quick as the ranges allow
     rough = np.array([30.0])
-    impossible = fitter.predicted(described, yielding.form.tables(weightless))
+    impossible = fitter.predicted(described, yielding.hypothesis.tables(weightless))
     assert not np.isfinite(impossible).any()
-    even = fitter.far_chi2(sliding.form, (described, rough), fitter.predicted(described, sliding.form.tables(rough)))
-    assert fitter.far_chi2(yielding.form, (described, weightless), impossible) > even > 1e3
+    even = fitter.far_chi2(
+        sliding.hypothesis, (described, rough), fitter.predicted(described, sliding.hypothesis.tables(rough))
+    )
+    assert fitter.far_chi2(yielding.hypothesis, (described, weightless), impossible) > even > 1e3
 
 
 def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
@@ -62,7 +64,7 @@ def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
 
     def tried_and_refitted(name):
         start = start_of(fitter, name)
-        at = (start.form, described, start.w)
+        at = (start.hypothesis, described, start.w)
         return [predictions_and_fit(fitter, work) for work in (fitter.trying(*at, base), fitter.refitting(*at))]
 
     (tried, _), (refitted, _) = tried_and_refitted("accelerometer-gain")
@@ -76,8 +78,13 @@ def test_single_numbers_lead_on_where_derivatives_lead_astray(tmp_path):
     """Where friction is late by more than a third of a slip, chi2 is jagged in every number of the rig at once."""
     late = {"frictional-lag": {"form": "dead-time", "delay_s": 5.5e-3, "share": 1.0}}
     fitter = fitter_of(*prepared(tmp_path / "late", "ladder", late))
-    form = next(one.form for one in trials(fitter.problem) if one.form.forms == {"frictional-lag": "dead-time"})
-    described, w = np.zeros(len(fitter.nuisances)), np.log([5.5e-3, 1.0]) - np.log([axis.scale for axis in form.axes])
+    form = next(
+        one.hypothesis for one in trials(fitter.problem) if one.hypothesis.forms == {"frictional-lag": "dead-time"}
+    )
+    described, w = (
+        np.zeros(len(fitter.nuisances)),
+        np.log([5.5e-3, 1.0]) - np.log([axis.scale for axis in form.coordinates]),
+    )
     residual, _ = fitter.whitened(fitter.predicted(described, form.tables(w)))
     assert fitter.refit(form, described, w).chi2 < 0.7 * (residual @ residual)  # without them, as much as there
 

@@ -21,12 +21,12 @@ def test_every_run_begins_in_the_phase_that_suits_it(tmp_path):
     starts = starts_by_run(fitter, origin, trials(fitter.problem))
     form, deviations, w = starts[0]
     assert deviations is origin.deviations
-    found = {axis.name: axis.value(coordinate) for axis, coordinate in zip(form.axes, w.tolist(), strict=True)}
+    found = {axis.name: axis.value(coordinate) for axis, coordinate in zip(form.coordinates, w.tolist(), strict=True)}
     assert found["frequency_Hz"] == pytest.approx(FREQUENCY_HZ, abs=0.05)  # half a turn in ten seconds
     phases = [value for name, value in found.items() if is_phase(name)]
     assert len(phases) == len(fitter.problem.runs)
     ahead = [math.remainder(one - PHASE_RAD, 2.0 * math.pi) for one in phases]
     assert max(map(abs, ahead)) < math.pi / 2
     best = fitter.refit(form, deviations, w)
-    nothing = fitter.refit(origin.form, described, np.zeros(0))
+    nothing = fitter.refit(origin.hypothesis, described, np.zeros(0))
     assert best.chi2 < 0.5 * nothing.chi2

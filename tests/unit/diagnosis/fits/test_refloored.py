@@ -16,8 +16,10 @@ def test_a_right_effect_leaves_little_on_its_own_floors(tmp_path):
     effects = {"drive-stiffness": {"form": "", "ratio": SOFTER}}
     fitter = fitter_of(*prepared(tmp_path / "rig", "ladder", effects))
     described = np.zeros(len(fitter.nuisances))
-    (trial,) = [one for one in trials(fitter.problem) if one.form.effects == ("drive-stiffness",)]
-    (softer,) = refits(fitter, [(trial.form, described, np.array([SOFTER / trial.form.axes[0].scale]))], 1)
+    (trial,) = [one for one in trials(fitter.problem) if one.hypothesis.effects == ("drive-stiffness",)]
+    (softer,) = refits(
+        fitter, [(trial.hypothesis, described, np.array([SOFTER / trial.hypothesis.coordinates[0].scale]))], 1
+    )
     without = fitter.refit(NOTHING, described, np.zeros(0))
     first = Retuned(fitter, without, ROUGHNESS, expected_chi2(fitter, without, ROUGHNESS, 1))
     again = on_floor_of(softer, first, [softer], [])

@@ -19,11 +19,11 @@ def test_a_second_effect_is_found_beside_one_that_is_there(tmp_path):
     fitter = fitter_of(*prepared(tmp_path / "two", "ladder", EFFECTS))
     described = np.zeros(len(fitter.nuisances))
     names = {"coulomb-level", "stribeck-velocity", "static-level"}
-    tried = [one for one in trials(fitter.problem) if names.intersection(one.form.effects)]
-    coulomb = next(one for one in tried if one.form.effects == ("coulomb-level",))
-    first = fitter.refit(coulomb.form, described, coulomb.w)
+    tried = [one for one in trials(fitter.problem) if names.intersection(one.hypothesis.effects)]
+    coulomb = next(one for one in tried if one.hypothesis.effects == ("coulomb-level",))
+    first = fitter.refit(coulomb.hypothesis, described, coulomb.w)
     pairs = pairs_with(fitter, first, tried)
-    assert set(pairs[0].form.effects) == set(EFFECTS)
+    assert set(pairs[0].hypothesis.effects) == set(EFFECTS)
     assert pairs[0].chi2 < 0.5 * first.chi2
     found = {name: table["ratio"] for name, table in pairs[0].effects.items()}
     assert found == {name: pytest.approx(table["ratio"], rel=0.2) for name, table in EFFECTS.items()}
@@ -49,12 +49,12 @@ def test_a_large_effect_that_screening_puts_last_is_tried_in_several_sizes(tmp_p
         "direction-dependent-friction",
     }
     found = [
-        sorted(some, key=lambda one: one.form.effects == ("static-level",))
-        for some in screened(fitter, origins, [one for one in tried if set(one.form.effects) <= few])
+        sorted(some, key=lambda one: one.hypothesis.effects == ("static-level",))
+        for some in screened(fitter, origins, [one for one in tried if set(one.hypothesis.effects) <= few])
     ]
     assert len(found[0]) > 8
     best = refitted(fitter, origins, found)[0]
-    assert best.form.effects == ("static-level",)
+    assert best.hypothesis.effects == ("static-level",)
     assert best.effects["static-level"]["ratio"] == pytest.approx(0.2, rel=0.2)
 
 

@@ -8,7 +8,7 @@ import pytest
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.gap.floor import floor_of, replicates
 from diagnosis.gap.problem import Problem
-from diagnosis.hypotheses.hypothesis import Axis
+from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.trials import trials, wave_trial
 from diagnosis.hypotheses.waves import Wave
@@ -33,12 +33,12 @@ def problem(tmp_path_factory):
 
 
 def table_of(trial):
-    return trial.form.tables(trial.w)["normal-load-fluctuation"]
+    return trial.hypothesis.tables(trial.w)["normal-load-fluctuation"]
 
 
 def apart(problem):
     """Where refits of a load begin that has a phase in every run."""
-    loads = [trial for trial in trials(problem) if trial.form.effects == ("normal-load-fluctuation",)]
+    loads = [trial for trial in trials(problem) if trial.hypothesis.effects == ("normal-load-fluctuation",)]
     return [trial for trial in loads if has_own_phases(table_of(trial))]
 
 
@@ -60,7 +60,7 @@ def test_a_refit_finds_both_phases(problem):
     )
     near = Wave(1.0 / 0.91, 0.05, 0.6, spread=0.06, phases_of={phase_of(problem.runs[1].file): 2.5})
     trial = wave_trial("normal-load-fluctuation", "sine", near, 0.1)
-    fit = fitter.further(fitter.refit(trial.form, described, trial.w))
+    fit = fitter.further(fitter.refit(trial.hypothesis, described, trial.w))
     table = fit.effects["normal-load-fluctuation"]
     assert table["ratio"] == pytest.approx(0.06, rel=0.1)
     later = float(table[phase_of(problem.runs[1].file)]) - float(table["phase_rad"])
@@ -95,7 +95,7 @@ def test_a_phase_is_named_with_its_run():
 
 
 def test_the_interval_of_a_phase_holds_it_wherever_it_lies():
-    axis = Axis("normal-load-fluctuation", "phase_rad", 1.0, False, 3.0, -math.pi, math.pi)
+    axis = Coordinate("normal-load-fluctuation", "phase_rad", 1.0, False, 3.0, -math.pi, math.pi)
     for w, deviation in ((2.75, 0.5), (-3.1, 0.1), (9.0, 0.2), (0.5, 50.0)):
         value, (low, high) = estimate_of(axis, w, deviation)
         assert low <= value <= high

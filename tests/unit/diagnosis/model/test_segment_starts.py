@@ -57,7 +57,9 @@ def test_a_contact_that_no_slip_has_renewed_is_as_old_as_it_was_before(ladder):
     grown_N = ageing["ratio"] * evidence.rig.static_force_N * np.log((10.1 + old_s) / (1.1 + young_s))
     assert old_N - young_N == pytest.approx(grown_N, rel=0.06)  # the bristle takes some of the age before it breaks
     assert breakaway(1.0, file="another") == (old_N, old_s)
-    axes = [trial.form.axes for trial in trials(problem) if "static-friction-ageing" in trial.form.forms]
+    axes = [
+        trial.hypothesis.coordinates for trial in trials(problem) if "static-friction-ageing" in trial.hypothesis.forms
+    ]
     assert {axis.name for of_form in axes for axis in of_form if is_of_run(axis.name)} == {
         of_run("age_before_s", run.file)
     }

@@ -83,7 +83,7 @@ def test_waves_beside_a_wave_have_their_own_phase(tmp_path):
 def test_a_wave_over_time_turns_once_in_a_run():
     """Slower, in a phase of its own in every run, it would be any trend."""
     trial = wave_trial("normal-load-fluctuation", "sine", Wave(5.0, 0.02, 0.0), slowest_Hz=0.1)
-    (frequency,) = [axis for axis in trial.form.axes if axis.name == "frequency_Hz"]
+    (frequency,) = [axis for axis in trial.hypothesis.coordinates if axis.name == "frequency_Hz"]
     assert frequency.value(0.0) == pytest.approx(0.2)
     assert frequency.value(-2.0) == pytest.approx(0.1)
 

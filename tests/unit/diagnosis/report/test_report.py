@@ -13,7 +13,7 @@ from diagnosis.evidence.force_pickup import PICK_UP
 from diagnosis.report import words as in_words
 from diagnosis.report.page import rig_row, where_map, write_report
 from diagnosis.report.summary import summary
-from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Parameter, Picture, Shrinkage, to_json
+from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Picture, RigNumber, Shrinkage, to_json
 from tests import made_up
 
 NAN = math.nan
@@ -134,7 +134,7 @@ def test_numbers_that_are_none(tmp_path):
         where=(Cell("drive_force_N", "slip", (0.0, math.inf), "run-01", NAN), Cell("x", "new", (0.0, 1.0), "r", 0.4)),
         gap=made.gap._replace(nominal=NAN, retuned=math.inf, with_effect=-1.0, floor=NAN, interval_90=(NAN, NAN)),
         next_experiment=made.next_experiment._replace(gain=NAN),
-        rig=(Parameter("mass_kg", NAN, math.inf, 0.1), Parameter("drive_damping_Ns_per_m", 0.0, 1.0, 0.1)),
+        rig=(RigNumber("mass_kg", NAN, math.inf, 0.1), RigNumber("drive_damping_Ns_per_m", 0.0, 1.0, 0.1)),
         pictures=(Picture("cycle", "", "", "", (hole, nothing)), Picture("residual", "", "", "", ())),
         elapsed_s=NAN,
     )
@@ -280,9 +280,9 @@ def test_what_is_nearly_sure_is_not_certain():
 
 
 def test_a_number_known_exactly_has_not_moved():
-    assert rig_row(Parameter("mass_kg", 1.5, 1.5, 0.0)).shift_sd is None
-    assert rig_row(Parameter("mass_kg", 1.5, 1.53, 0.01)).shift_sd == pytest.approx(2.0)
-    tail = rig_row(Parameter("stribeck_tail", 0.0, -0.12, 0.4))
+    assert rig_row(RigNumber("mass_kg", 1.5, 1.5, 0.0)).shift_sd is None
+    assert rig_row(RigNumber("mass_kg", 1.5, 1.53, 0.01)).shift_sd == pytest.approx(2.0)
+    tail = rig_row(RigNumber("stribeck_tail", 0.0, -0.12, 0.4))
     assert tail.tolerance == "± 0.4"
     assert tail.shift_sd == pytest.approx(-0.3)
 

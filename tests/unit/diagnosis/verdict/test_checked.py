@@ -22,7 +22,7 @@ def checked(monkeypatch, found: list[Fit], middles: dict[str, float]):
     asked: list[str] = []
 
     def middle_fits(_fitter, none, _singles, named, _jobs):
-        (name,) = named.form.effects
+        (name,) = named.hypothesis.effects
         asked.append(name)
         return none, fit(middles[name], name)
 
@@ -35,14 +35,14 @@ def checked(monkeypatch, found: list[Fit], middles: dict[str, float]):
 def test_a_name_that_stands_stays(monkeypatch, found):
     asked, singles, verdict = checked(monkeypatch, found, {"coulomb-level": 82.0})
     assert asked == ["coulomb-level"]
-    assert verdict.named.form.effects == ("coulomb-level",)
+    assert verdict.named.hypothesis.effects == ("coulomb-level",)
     assert singles == found
 
 
 def test_the_next_one_is_named_where_the_first_falls(monkeypatch, found):
     asked, singles, verdict = checked(monkeypatch, found, {"coulomb-level": 158.0, "drive-backlash": 86.0})
     assert asked == ["coulomb-level", "drive-backlash"]
-    assert verdict.named.form.effects == ("drive-backlash",)
+    assert verdict.named.hypothesis.effects == ("drive-backlash",)
     assert [one.chi2 for one in singles] == [84.0, 130.0, 158.0]
     assert verdict.probabilities["static-level"] > 0.0
 
@@ -57,7 +57,9 @@ def test_what_the_runs_kept_aside_refute_is_what_they_were_asked_about(monkeypat
     """Two effects that did not pay beside the name that fell would pay beside the next one."""
     middles = {("coulomb-level",): fit(124.0, "coulomb-level"), ("drive-backlash",): fit(67.0, "drive-backlash")}
     monkeypatch.setattr(
-        selection, "middle_fits", lambda _fitter, none, _singles, named, _jobs: (none, middles[named.form.effects])
+        selection,
+        "middle_fits",
+        lambda _fitter, none, _singles, named, _jobs: (none, middles[named.hypothesis.effects]),
     )
     monkeypatch.setattr(selection, "screened", lambda *_: [])
     monkeypatch.setattr(selection.Contest, "_leaves_much", lambda *_: False)
@@ -65,7 +67,7 @@ def test_what_the_runs_kept_aside_refute_is_what_they_were_asked_about(monkeypat
     made.singles = [fit(60.0, "coulomb-level"), fit(65.0, "drive-backlash")]
     made.pairs = [fit(10.0, "coulomb-level", "static-level")]
     made.verdict = judge(fit(125.0), made.singles, made.pairs, EXPECTED)
-    assert made.verdict.named.form.effects == ("coulomb-level",)
+    assert made.verdict.named.hypothesis.effects == ("coulomb-level",)
     made.check()
-    assert made.verdict.named.form.effects == ("drive-backlash",)
+    assert made.verdict.named.hypothesis.effects == ("drive-backlash",)
     assert made.refuted().refuted == ("drive-backlash",)

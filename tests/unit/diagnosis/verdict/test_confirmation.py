@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from diagnosis.fits.fit import Fit
-from diagnosis.hypotheses.hypothesis import Form
+from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.verdict import confirmation
-from diagnosis.verdict.confirmation import Outcome, borne_out
+from diagnosis.verdict.confirmation import Confirmation, borne_out
 from diagnosis.verdict.judge import judge
 from tests.unit.diagnosis.verdict.test_judge import EXPECTED, TRACK, fit
 
@@ -17,7 +17,7 @@ GAP = 400.0
 
 def random(chi2: float) -> Fit:
     at_random = fit(chi2, TRACK)
-    return at_random._replace(form=Form({TRACK: "random"}, at_random.form.axes))
+    return at_random._replace(hypothesis=Hypothesis({TRACK: "random"}, at_random.hypothesis.coordinates))
 
 
 def outcome(
@@ -27,7 +27,7 @@ def outcome(
     retuned: float = 3.0,
     left: float = 1.0,
     refuted: tuple[Fit, ...] = (),
-) -> Outcome:
+) -> Confirmation:
     """Where `named` wins the contest, in floors of the runs kept aside, which refute some fits."""
     base = fit(GAP)
 
@@ -73,7 +73,7 @@ def test_a_name_that_they_refute_goes(monkeypatch):
     found = outcome(monkeypatch, named, refuted=(named,))
     assert (found.verdict.kind, found.verdict.refuted) == ("unexplained", ("static-level",))
     assert found.gone is named
-    assert found.best.form.effects == ()
+    assert found.best.hypothesis.effects == ()
 
 
 def test_waves_of_a_track_that_another_place_refutes_make_room_for_a_path_at_random(monkeypatch):
@@ -91,7 +91,7 @@ def test_a_path_at_random_that_scatters_nothing_there_is_none(monkeypatch):
     assert outcome(monkeypatch, path, retuned=1.1).best is path
     found = outcome(monkeypatch, path, retuned=0.97)
     assert (found.verdict.kind, found.gone) == ("no-gap", None)
-    assert found.best.form.effects == ()
+    assert found.best.hypothesis.effects == ()
 
 
 def test_another_effect_may_not_show_there(monkeypatch):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from diagnosis.gap.floor import Floor
-from diagnosis.hypotheses.hypothesis import Axis, Form
+from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
 from diagnosis.verdict import held_out as heldout
 from diagnosis.verdict.held_out import HeldOut, foretells
 
 
-def form(name: str, form: str, *parameters: str) -> Form:
-    return Form({name: form}, tuple(Axis(name, one, 0.1, False, 1.0, -1.0, 1.0) for one in parameters))
+def form(name: str, form: str, *parameters: str) -> Hypothesis:
+    return Hypothesis({name: form}, tuple(Coordinate(name, one, 0.1, False, 1.0, -1.0, 1.0) for one in parameters))
 
 
 WAVE = ("ratio", "phase_rad", "second_sin", "second_cos")
@@ -50,12 +50,12 @@ def stand_in(
     return runs
 
 
-def fit_of(form: Form) -> Any:
-    return SimpleNamespace(form=form, deviations=None, w=None)
+def fit_of(hypothesis: Hypothesis) -> Any:
+    return SimpleNamespace(hypothesis=hypothesis, deviations=None, w=None)
 
 
-def both(first: Form, second: Form) -> Form:
-    return Form(first.forms | second.forms, (*first.axes, *second.axes))
+def both(first: Hypothesis, second: Hypothesis) -> Hypothesis:
+    return Hypothesis(first.forms | second.forms, (*first.coordinates, *second.coordinates))
 
 
 def test_the_axes_of_two_effects_are_not_one_wave():
@@ -149,7 +149,7 @@ def test_what_is_left_open_is_the_least_that_moved_parameters_leave(monkeypatch)
         predicted_many=lambda points: [residual + rates @ (point - at) for point in points]
     )
     fit = SimpleNamespace(
-        deviations=at[:3], w=at[3:], form=SimpleNamespace(tables=lambda w: w), covariance=lambda: covariance
+        deviations=at[:3], w=at[3:], hypothesis=SimpleNamespace(tables=lambda w: w), covariance=lambda: covariance
     )
     spread = np.linalg.cholesky(covariance)
     whole = np.vstack([rates @ spread, np.eye(4)])

@@ -9,7 +9,7 @@ from diagnosis.evidence.folder import Run
 from diagnosis.evidence.force_pickup import PickUp
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import Scattered, is_random
-from diagnosis.hypotheses.hypothesis import NOTHING, Axis, Form
+from diagnosis.hypotheses.hypothesis import NOTHING, Coordinate, Hypothesis
 from diagnosis.report.assemble import compared_fits
 from diagnosis.verdict.judge import JITTER, although_outside, doubted, is_of_one_place, judge, of_another_place
 
@@ -20,7 +20,9 @@ TRACK = "position-dependent-friction"
 
 
 def fit(chi2, *effects):
-    form = Form(dict.fromkeys(effects, ""), tuple(Axis(name, "ratio", 0.1, False, 1.0, -1.0, 1.0) for name in effects))
+    form = Hypothesis(
+        dict.fromkeys(effects, ""), tuple(Coordinate(name, "ratio", 0.1, False, 1.0, -1.0, 1.0) for name in effects)
+    )
     columns = np.eye(FEATURES, NUISANCES + len(effects)) * 10.0
     residual = np.full(FEATURES, (chi2 / FEATURES) ** 0.5)
     return Fit(form if effects else NOTHING, np.zeros(NUISANCES), np.zeros(len(effects)), chi2, residual, columns)
@@ -34,7 +36,7 @@ def test_an_effect_that_takes_most_is_named():
     verdict = judge(fit(400.0), [fit(50.0, "coulomb-level"), fit(380.0, "static-level")], [], EXPECTED)
     assert verdict.kind == "effect"
     assert verdict.named is not None
-    assert verdict.named.form.effects == ("coulomb-level",)
+    assert verdict.named.hypothesis.effects == ("coulomb-level",)
     assert sum(verdict.probabilities.values()) == pytest.approx(1.0)
 
 
@@ -131,7 +133,7 @@ def test_a_second_effect_must_pay(base, single, double, named):
     pairs = [fit(double, "coulomb-level", "drive-backlash")]
     verdict = judge(fit(base), [fit(single, "coulomb-level")], pairs, EXPECTED)
     assert verdict.named is not None
-    assert len(verdict.named.form.effects) == named
+    assert len(verdict.named.hypothesis.effects) == named
 
 
 def test_beside_an_effect_that_has_no_other_formula_a_small_second_one_is_no_mismatch():
@@ -141,7 +143,7 @@ def test_beside_an_effect_that_has_no_other_formula_a_small_second_one_is_no_mis
     elsewhere = [fit(80.0, "coulomb-level", "drive-hardening")]
     named = judge(fit(7200.0), [fit(200.0, "coulomb-level")], elsewhere, EXPECTED).named
     assert named is not None
-    assert named.form.effects == ("coulomb-level",)
+    assert named.hypothesis.effects == ("coulomb-level",)
 
 
 def test_no_gap_leaves_room_for_what_is_too_small_to_see():
@@ -174,7 +176,7 @@ def test_a_name_that_leaves_much_of_the_runs_kept_aside_is_less_sure():
         judge(fit(4000.0), [fit(900.0, "coulomb-level")], pairs, EXPECTED),
     ):
         assert verdict.named is not None
-        names, less_sure = verdict.named.form.effects, doubted(verdict)
+        names, less_sure = verdict.named.hypothesis.effects, doubted(verdict)
         assert less_sure.named is verdict.named
         assert tuple(sorted(list(less_sure.probabilities)[: len(names)])) == tuple(sorted(names))
         sure, less = (sum(one.probabilities[name] for name in names) for one in (verdict, less_sure))
@@ -197,9 +199,9 @@ class Scatter:
         self.left, self.gained, self.more, self.effect, self.in_bursts = left, gained, more, effect, in_bursts
 
     def on(self, under, noise):
-        form = Form(under.form.forms | {self.effect: "random"}, under.form.axes)
+        form = Hypothesis(under.hypothesis.forms | {self.effect: "random"}, under.hypothesis.coordinates)
         left = self.left + self.more * (noise - JITTER)  # the more is put down to noise, the shorter is the path
-        return Scattered(under._replace(form=form, chi2=left), self.gained)
+        return Scattered(under._replace(hypothesis=form, chi2=left), self.gained)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +219,7 @@ def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind
     scatter = Scatter(left, gained, effect=TRACK)
     verdict = judge(fit(1000.0), [fit(single, "coulomb-level")], [], EXPECTED, [scatter])
     assert verdict.kind == kind
-    assert sorted(verdict.named.form.effects if verdict.named else []) == effects
+    assert sorted(verdict.named.hypothesis.effects if verdict.named else []) == effects
 
 
 def test_what_was_refuted_is_compared_on_the_runs_kept_aside_also_where_it_scatters():
@@ -225,10 +227,10 @@ def test_what_was_refuted_is_compared_on_the_runs_kept_aside_also_where_it_scatt
     gone = judge(fit(1000.0), singles, [], EXPECTED, scatter).named
     verdict = judge(fit(1000.0), singles, [], EXPECTED, scatter, refuted=True)
     assert verdict.refuted == (TRACK,)
-    assert [one.form.effects for one in compared_fits(verdict, gone)] == [(TRACK,), ("coulomb-level",)]
+    assert [one.hypothesis.effects for one in compared_fits(verdict, gone)] == [(TRACK,), ("coulomb-level",)]
     named = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED).named
     refuted = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED, refuted=True)
-    assert [one.form.effects for one in compared_fits(refuted, named)] == [("coulomb-level",)]
+    assert [one.hypothesis.effects for one in compared_fits(refuted, named)] == [("coulomb-level",)]
 
 
 def test_what_comes_in_bursts_may_be_no_load():
@@ -239,7 +241,7 @@ def test_what_comes_in_bursts_may_be_no_load():
     assert 0.2 < verdict.probabilities[load] < 0.4
     steady = judge(fit(1000.0), singles, [], EXPECTED, [Scatter(50.0, 100.0)])
     assert steady.named is not None
-    assert steady.named.form.effects == (load,)
+    assert steady.named.hypothesis.effects == (load,)
     assert 0.2 < steady.probabilities["unexplained"] < 0.4
 
 
@@ -249,7 +251,7 @@ def test_waves_that_another_place_refutes_may_be_a_track_at_random():
     verdict = of_another_place(base, [waves, other], EXPECTED, scatter)
     assert verdict is not None
     assert verdict.named is not None
-    assert is_random(verdict.named.form)
+    assert is_random(verdict.named.hypothesis)
     assert of_another_place(base, [waves], EXPECTED, [Scatter(500.0, 100.0, effect=TRACK)]) is None
     assert [is_of_one_place(one) for one in (waves, other, verdict.named)] == [True, False, False]
 
@@ -259,7 +261,7 @@ def test_a_path_is_judged_by_what_it_can_explain_not_by_what_noise_takes_from_it
     scatter = Scatter(60.0, 150.0, more=40.0, effect=TRACK)
     verdict = judge(fit(1000.0), [fit(900.0, "coulomb-level")], [], EXPECTED, [scatter])
     assert verdict.named is not None
-    assert verdict.named.form.effects == (TRACK,)
+    assert verdict.named.hypothesis.effects == (TRACK,)
 
 
 def test_what_few_waves_leave_of_a_rough_track_is_no_second_effect():
@@ -267,11 +269,13 @@ def test_what_few_waves_leave_of_a_rough_track_is_no_second_effect():
     waves = fit(400.0, TRACK)
     verdict = judge(fit(1000.0), [waves], [], EXPECTED, scatters)
     assert verdict.named is not None
-    assert verdict.named.form == waves.form  # the waves, not a path of which nobody knows more than its size
+    assert (
+        verdict.named.hypothesis == waves.hypothesis
+    )  # the waves, not a path of which nobody knows more than its size
     assert verdict.probabilities["unexplained"] > 0.2  # as where a path is all
     load = judge(fit(1000.0), [waves], [], EXPECTED, scatters[:1])
     assert load.named is not None
-    assert len(load.named.form.effects) == 2
+    assert len(load.named.hypothesis.effects) == 2
 
 
 def test_of_two_named_effects_the_one_that_does_more_alone_is_first():

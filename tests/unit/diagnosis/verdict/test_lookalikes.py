@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from diagnosis.fits.fit import Fit
-from diagnosis.hypotheses.hypothesis import Axis, Form
-from diagnosis.verdict.judge import Model
+from diagnosis.hypotheses.hypothesis import Coordinate, Hypothesis
+from diagnosis.verdict.judge import RankedFit
 from diagnosis.verdict.lookalikes import imitators
 
 FEATURES = 100
 
 
 def fit(effect, chi2):
-    form = Form({effect: ""}, (Axis(effect, "ratio", 0.1, False, 1.0, -1.0, 1.0),))
+    form = Hypothesis({effect: ""}, (Coordinate(effect, "ratio", 0.1, False, 1.0, -1.0, 1.0),))
     residual = np.full(FEATURES, (chi2 / FEATURES) ** 0.5)
     return Fit(form, np.zeros(2), np.zeros(1), chi2, residual, np.eye(FEATURES, 3))
 
@@ -34,7 +34,7 @@ class Fitter:
         return np.zeros(FEATURES)
 
     def judged(self, named):
-        return fit(named.form.effects[0], 0.0)
+        return fit(named.hypothesis.effects[0], 0.0)
 
     def refit(self, form, *_):
         return fit(form.effects[0], self.left)
@@ -46,6 +46,6 @@ class Fitter:
     ids=["explains the runs as well", "does neither", "imitates it", "the runs tell"],
 )
 def test_a_group_holds_what_explains_the_runs_as_well_or_imitates_what_does(behind, left, alike):
-    ranked = [Model(fit("coulomb-level", 50.0), 100.0), Model(fit("stribeck-velocity", 50.0), 100.0 - behind)]
+    ranked = [RankedFit(fit("coulomb-level", 50.0), 100.0), RankedFit(fit("stribeck-velocity", 50.0), 100.0 - behind)]
     found = imitators(Fitter(left), ranked, 1.0)
     assert found == (("coulomb-level", "stribeck-velocity") if alike else ())
