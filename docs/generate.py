@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import typer.main
-from pydantic import BaseModel
 
 from bridge.config import Strict
 from bridge.faults import FAULTS
@@ -20,22 +19,32 @@ from plant.pairs import PAIRS
 FOLDER = Path(__file__).parent / "reference"
 _MADE = "<!-- Made by `make reference`; change the code instead. -->\n"
 _SYMBOLS = """\
-Symbols: `F_c`, `F_s` Coulomb and static friction; `v_s` Stribeck velocity; `v_r` velocity in the contact; `x` position of the slide; `s_e` where the
-drive would be without ripple; `e` extension of the drive's spring; `k_d`, `h_d` stiffness and damping of the drive; `F_d` drive force; `F_f` friction;
-`age` time at rest; `t` time of the run; `f` frequency of the vibration; `w(a) = sin a + second_sin sin 2a + second_cos cos 2a`, `a` with the phase."""
+Symbols: `F_c`, `F_s` Coulomb and static friction; `v_s` Stribeck velocity; `v_r` velocity in the contact; `x` position of
+the slide; `s_e` where the drive would be without ripple; `e` extension of the drive's spring; `k_d`, `h_d` stiffness and
+damping of the drive; `F_d` drive force; `F_f` friction; `age` time at rest; `t` time of the run; `f` frequency of the
+vibration; `w(a) = sin a + second_sin sin 2a + second_cos cos 2a`, `a` with the phase."""
 _EFFECTS_INTRO = f"""\
-What a real rig does and the ideal rig does not. An effect is a mechanism, a form is one formula for it. Each is off unless a rig file has its table
-`[effects.NAME]`, with `form` (the first one if left out) and the form's parameters; off is bit-identical to the ideal rig. The diagnosis tries every form of
-every effect. `tests/truth/test_effects_*` holds each formula against a closed form or SciPy.
+What a real rig does and the ideal rig does not. An effect is a mechanism, a form is one formula for it. Each is off unless a
+rig file has its table `[effects.NAME]`, with `form` (the first one if left out) and the form's parameters; off is
+bit-identical to the ideal rig. The diagnosis tries every form of every effect. `tests/truth/test_effects_*` holds each
+formula against a closed form or SciPy.
 
 {_SYMBOLS}"""
 _FILES_INTRO = """\
-Keys of the TOML files, with their defaults and ranges. A misspelt key or a value out of range is an error that names file, key, rule and remedy. Units are in
-the names."""
+Keys of the TOML files, with their defaults and ranges. A misspelt key or a value out of range is an error that names file,
+key, rule and remedy. Units are in the names."""
 _FILES: tuple[tuple[str, str, type[Strict]], ...] = (
-    ("Scenario", "`deploy/scenarios/*.toml`, `--scenario FILE`. The keys below `rig` are also those of a rig file.", Scenario),
+    (
+        "Scenario",
+        "`deploy/scenarios/*.toml`, `--scenario FILE`. The keys below `rig` are also those of a rig file.",
+        Scenario,
+    ),
     ("Evidence manifest", "`manifest.toml` of an evidence folder; rules are in [evidence/1](evidence-1.md).", Manifest),
-    ("Import map", "`stickslip log import --map FILE`; an example is in [import data](../guides/import-data.md).", ImportMap),
+    (
+        "Import map",
+        "`stickslip log import --map FILE`; an example is in [import data](../guides/import-data.md).",
+        ImportMap,
+    ),
 )
 _VALUES = {"str": "TEXT", "int": "N", "float": "NUMBER", "Path": "PATH"}
 
@@ -97,7 +106,9 @@ def _spelt(one: Any) -> str:
         name = (one.metavar or one.opts[0]).upper()
         return f"`{name.rstrip('.')}{'...' if one.nargs == -1 else ''}`"
     annotation = one.type_descriptor.annotation
-    kind = next((word for known, word in _VALUES.items() if known in str(getattr(annotation, "__args__", annotation))), "")
+    kind = next(
+        (word for known, word in _VALUES.items() if known in str(getattr(annotation, "__args__", annotation))), ""
+    )
     value = "" if one.is_flag else f" {one.metavar or kind or 'VALUE'}"
     return f"`{', '.join((*one.opts, *one.secondary_opts))}{value}`"
 
@@ -127,7 +138,10 @@ def _effects() -> list[str]:
         lines += [f"## {name}", "", f"Acts on: {effect.acts_on}.{drives}", ""]
         lines += _table(
             ("form", "what it does", "parameters: default, range"),
-            ((f"`{form}`" if form else "", _code_safe(told.formula), _parameters(told)) for form, told in effect.forms.items()),
+            (
+                (f"`{form}`" if form else "", _code_safe(told.formula), _parameters(told))
+                for form, told in effect.forms.items()
+            ),
         )
     return lines
 
@@ -169,7 +183,12 @@ def _files() -> list[str]:
             name = f"`[{path}]`" if path and not path.startswith("[") else f"`{path}`" if path else "top of the file"
             lines += [f"### {name}" if path else f"**{name}**", "", *([_paragraph(told), ""] if told else [])]
             lines += _table(("key", "type and range", "default"), rows)
-    lines += ["## Friction pairs", "", "Values of `pair` in `[rig.contact]`; each fills in the numbers of the table.", ""]
+    lines += [
+        "## Friction pairs",
+        "",
+        "Values of `pair` in `[rig.contact]`; each fills in the numbers of the table.",
+        "",
+    ]
     keys = list(dict.fromkeys(key for pair in PAIRS.values() for key in pair))
     lines += _table(
         ("pair", *(f"`{key}`" for key in keys)),
@@ -195,7 +214,9 @@ def _sections(schema: dict[str, Any], known: dict[str, Any], path: str) -> Itera
         elif "properties" in value:
             inner.append((f"{here}.NAME", value))
         else:
-            default = "needed" if key in needed else f"`{one['default']}`" if one.get("default") not in (None, "", {}) else ""
+            default = (
+                "needed" if key in needed else f"`{one['default']}`" if one.get("default") not in (None, "", {}) else ""
+            )
             rows.append([f"`{key}`", _kind(table, known), default])
     if rows:
         yield path, schema.get("description", ""), rows
@@ -217,7 +238,11 @@ def _kind(one: dict[str, Any], known: dict[str, Any]) -> str:
     if "const" in one or "enum" in one:
         return " or ".join(f"`{value}`" for value in one.get("enum", [one.get("const")]))
     if one.get("type") == "array":
-        return "list" if "prefixItems" in one or "items" not in one else f"list of {_kind(_resolved(one['items'], known), known)}"
+        return (
+            "list"
+            if "prefixItems" in one or "items" not in one
+            else f"list of {_kind(_resolved(one['items'], known), known)}"
+        )
     if one.get("type") == "object":
         return "table"
     low = [f"above {_number(one['exclusiveMinimum'])}"] if "exclusiveMinimum" in one else []

@@ -9,10 +9,8 @@ import pytest
 from docs import generate
 
 ROOT = Path(__file__).parent.parent.parent
-PAGES = sorted(
-    (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", ROOT / "bridge/wire/PROTOCOL.md")
-    + tuple((ROOT / "docs").rglob("*.md"))
-)
+_OUTSIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "bridge/wire/PROTOCOL.md")
+PAGES = sorted((*(ROOT / name for name in _OUTSIDE), *(ROOT / "docs").rglob("*.md")))
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
 _CODE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
 # of folders of the repository; `deploy/rigs/*.toml` is one, `runs/demo.mcap` is not
@@ -53,9 +51,7 @@ def test_named_files_exist(page: Path) -> None:
 
 def test_made_pages_are_those_of_the_code() -> None:
     stale = [
-        name
-        for name, text in generate.pages().items()
-        if (generate.FOLDER / name).read_text(encoding="utf-8") != text
+        name for name, text in generate.pages().items() if (generate.FOLDER / name).read_text(encoding="utf-8") != text
     ]
     assert not stale, "make reference"
 
