@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import typer.main
+from typer.testing import CliRunner
 
 from bridge.config import Strict
 from bridge.faults import FAULTS
@@ -134,7 +135,7 @@ def _effects() -> list[str]:
         rows.append((place, ", ".join(named)))
     lines += _table(("acts on", f"effects, {len(EFFECTS)} in all"), rows)
     for name, effect in EFFECTS.items():
-        drives = "" if len(effect.drives) > 1 else f" With a {effect.drives[0]} drive only."
+        drives = "" if {*effect.drives} == {"spring", "force"} else f" With a {' or '.join(effect.drives)} drive only."
         lines += [f"## {name}", "", f"Acts on: {effect.acts_on}.{drives}", ""]
         lines += _table(
             ("form", "what it does", "parameters: default, range"),
@@ -162,10 +163,11 @@ def _code_safe(formula: str) -> str:
 
 
 def _faults() -> list[str]:
-    rows = [(str(kind.exit_status), f"[`{kind.code}`](#{kind.code.lower()})") for kind in FAULTS.values()]
-    rows += [(status, meaning) for status, meaning in cli.NO_FAULTS.items()]
+    told = CliRunner().invoke(cli.app, ["explain"]).stdout
+    rows = [line.strip().partition("  ")[::2] for line in told.splitlines()]
+    linked = [(status, f"[`{said}`](#{said.lower()})" if said in FAULTS else said) for status, said in rows]
     lines = ["# Faults and exit statuses", "`stickslip explain CODE` prints the same.", ""]
-    lines += _table(("exit status", "fault or meaning"), sorted(rows, key=lambda row: int(row[0])))
+    lines += _table(("exit status", "fault or meaning"), linked)
     for kind in FAULTS.values():
         lines += [f"## {kind.code}", "", f"Exit status {kind.exit_status}. {kind.help}", ""]
     return lines

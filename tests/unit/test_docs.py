@@ -49,6 +49,16 @@ def test_named_files_exist(page: Path) -> None:
     assert not [one for one in sorted(named) if not any(ROOT.glob(one.rstrip("/")))]
 
 
+def test_pages_that_the_code_names_exist() -> None:
+    sources = [
+        path
+        for name in ("bridge", "controller", "plant", "diagnosis", "cockpit", "tests")
+        for path in (ROOT / name).rglob("*.py")
+    ]
+    named = {one for path in sources for one in re.findall(r"\bdocs/[\w/-]+\.md", path.read_text(encoding="utf-8"))}
+    assert not [one for one in sorted(named) if not (ROOT / one).is_file()]
+
+
 def test_made_pages_are_those_of_the_code() -> None:
     stale = [
         name for name, text in generate.pages().items() if (generate.FOLDER / name).read_text(encoding="utf-8") != text
