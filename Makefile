@@ -25,7 +25,7 @@ check: $(READY)
 	@$(MAKE) --no-print-directory docs
 
 docs: $(READY) ## the pages as a site in site/, which works from a disk; a dead link is an error
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 reference: $(READY) ## after a change of commands, effects, faults or file formats
 	@$(BIN)/python -m docs.generate
