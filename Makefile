@@ -8,7 +8,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo test check bench blind real bless lock proto clean
+.PHONY: demo test check docs reference bench blind real bless lock proto clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -22,6 +22,13 @@ check: $(READY)
 	@$(BIN)/ruff format --check
 	@$(BIN)/pyright
 	@$(BIN)/lint-imports --no-logo
+	@$(MAKE) --no-print-directory docs
+
+docs: $(READY) ## the pages as a site in site/, which works from a disk; a dead link is an error
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+reference: $(READY) ## after a change of commands, effects, faults or file formats
+	@$(BIN)/python -m docs.generate
 
 bench: $(VENV)/.ready-bench
 	@$(BIN)/python -m tests.bench

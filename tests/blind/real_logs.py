@@ -1,7 +1,7 @@
 """Faults of a force sensor put into real logs: the rest of the evidence is as it was measured, with all that is odd about it.
 
 The rig tables describe what the clean logs show, so a fault stands against them. Clean, these rigs have gaps of their own to any
-simple model (docs/real-evidence.md): the fault is the largest new one, not the only one.
+simple model (docs/quality/real-evidence.md): the fault is the largest new one, not the only one.
 """
 
 from collections.abc import Callable, Iterator

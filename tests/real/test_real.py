@@ -1,4 +1,4 @@
-"""What the diagnosis makes of measured logs, where that is robust; the rest, with its errors, is in docs/real-evidence.md."""
+"""What the diagnosis makes of measured logs, where that is robust; its errors are in docs/quality/real-evidence.md."""
 
 from pathlib import Path
 

@@ -1,0 +1,78 @@
+"""Pages keep what they promise: links lead somewhere, files that they name exist, made pages are those of the code."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from docs import generate
+
+ROOT = Path(__file__).parent.parent.parent
+_OUTSIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "bridge/wire/PROTOCOL.md")
+PAGES = sorted((*(ROOT / name for name in _OUTSIDE), *(ROOT / "docs").rglob("*.md")))
+_LINK = re.compile(r"\]\(([^)\s]+)\)")
+_CODE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
+# of folders of the repository; `deploy/rigs/*.toml` is one, `runs/demo.mcap` is not
+_FILE = re.compile(r"`((?:bridge|controller|plant|diagnosis|cockpit|deploy|docs|tests)/[\w./*-]+)`")
+
+
+def _name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def _anchors(page: Path) -> Iterator[str]:
+    """Anchors of a page's headings, as the host and mkdocs make them, and those that are written out."""
+    text = _CODE.sub("", page.read_text(encoding="utf-8"))
+    for heading in re.findall(r"^#+ (.+)$", text, re.MULTILINE):
+        plain = re.sub(r"\[([^]]*)]\([^)]*\)", r"\1", heading).lower()
+        yield re.sub(r"\s+", "-", re.sub(r"[^\w\s-]", "", plain).strip())
+    yield from re.findall(r'id="([^"]+)"', text)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_links_lead_somewhere(page: Path) -> None:
+    dead: list[str] = []
+    for link in _LINK.findall(_CODE.sub("", page.read_text(encoding="utf-8"))):
+        if re.match(r"[a-z]+:", link):
+            continue
+        file, _, anchor = link.partition("#")
+        target = (page.parent / file).resolve() if file else page
+        if not target.is_file() or (anchor and anchor not in _anchors(target)):
+            dead.append(link)
+    assert not dead
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_named_files_exist(page: Path) -> None:
+    named = set(_FILE.findall(page.read_text(encoding="utf-8")))
+    assert not [one for one in sorted(named) if not any(ROOT.glob(one.rstrip("/")))]
+
+
+def test_pages_that_the_code_names_exist() -> None:
+    sources = [
+        path
+        for name in ("bridge", "controller", "plant", "diagnosis", "cockpit", "tests")
+        for path in (ROOT / name).rglob("*.py")
+    ]
+    named = {one for path in sources for one in re.findall(r"\bdocs/[\w/-]+\.md", path.read_text(encoding="utf-8"))}
+    assert not [one for one in sorted(named) if not (ROOT / one).is_file()]
+
+
+def test_made_pages_are_those_of_the_code() -> None:
+    stale = [
+        name for name, text in generate.pages().items() if (generate.FOLDER / name).read_text(encoding="utf-8") != text
+    ]
+    assert not stale, "make reference"
+
+
+def test_readme_is_a_landing_page() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 60
+    assert len(text.split()) <= 600
+
+
+def test_every_decision_has_its_four_headings() -> None:
+    for page in (ROOT / "docs/decisions").glob("[0-9]*.md"):
+        headings = re.findall(r"^## (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        assert headings == ["Status", "Context", "Decision", "Consequences"], page.name
