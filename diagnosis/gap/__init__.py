@@ -1,7 +1,7 @@
-"""Measured against predicted.
+"""Measured features against predicted features.
 
-prepare   measured runs made ready, once
-problem   their predicted features at any point in nuisances and parameters
-floor     the noise floor: what a perfect model would still show
-measure   the gap in floors, by cell
+prepare   measured runs are reduced and cut into segments, once
+problem   measured features, and predicted features for any rig numbers, sensor chain and effects
+floor     the noise floor: the difference that a perfect model would still show
+measure   the gap in noise floors, by cell (signal x regime x band x run)
 """

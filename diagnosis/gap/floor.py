@@ -1,4 +1,4 @@
-"""The noise floor: what a perfect model would still show."""
+"""The noise floor: the difference that a perfect model would still show."""
 
 from collections.abc import Sequence
 from itertools import chain
@@ -14,33 +14,47 @@ from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]
 
+# Noise floors up to which a difference counts in full; beyond, it counts as its logarithm.
+# Too small: large differences, which name the effect, hardly count. Too large: one signal that is far off hides all others.
 KNEE = 6.0
-_LEAST_POWER = 1e-30
-# Of the force over the extension, as T^2 of a delay: of 20 rigs without a gap a run shows 0.16 ms2 (rms), 1.5 floors so, where
-# replicates with their noise promise 0.07; displacement channels that lag by 0.28 ms, of any order, are good for 0.04.
+_LEAST_POWER = 1e-30  # squared unit of the signal: keeps the logarithm of a power finite; far below any sensor's noise
+# Smallest scatter of "spring bend" [s2 x stiffness]: what sensors alone bend the force over the extension.
+# Too small: rigs without a gap show a bend. Too large: a slow force sensor is not told from a late one.
+# Counted on 20 rigs without a gap (docs/method/gap.md).
 _SENSORS_BEND_S2 = 1e-7
-_SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))
-_FEWEST_FINITE = 0.75  # of the replicates, or a feature is not compared
+_SHORT_WAVES = frozenset(f"wave {number}" for number in range(5, DRIVE_WAVES + 1))  # shorter than a sensor's bow
+# Share of the replicates in which a feature must be finite to be compared.
+# Too small: its scatter comes from few replicates. Too large: features of segments with few slips are lost.
+_FEWEST_FINITE = 0.75
 CellKey = tuple[str, str, tuple[float, float], str]
 
 
 class Floor(NamedTuple):
-    """What a perfect model would still show, feature by feature. [features] each, of the problem it was made for."""
+    """The difference that a perfect model would still show, by feature.
 
-    bias: Floats  # mean of the replicates less the noise-free prediction; of powers never below 0
+    The features are those of one `Problem`. Arrays are [features], in the unit of each feature, where nothing else is said.
+    """
+
+    bias: Floats  # mean of the replicates less the noise-free prediction; 0 or more for powers
     powers: npt.NDArray[np.bool_]  # features that are powers: noise adds to them, and they are compared as logarithms
-    scatter: Floats
+    scatter: Floats  # one noise floor; of the logarithm for powers
     compared: npt.NDArray[np.bool_]
     whitening: Floats  # [compared, compared]: makes differences of replicates independent
-    cells: tuple[CellKey, ...]  # of every compared feature
-    level: float  # gap of the replicates themselves
+    cells: tuple[CellKey, ...]  # [compared]: the cell of every compared feature
+    level: float  # root mean square of the replicates themselves over the cells, in noise floors
 
     def expected(self, predicted: Floats) -> Floats:
-        """A noise-free prediction [features] as a rough and noisy rig would show it on average."""
+        """The mean [features] that a rough and noisy rig shows where the noise-free prediction is `predicted` [features].
+
+        Powers come as half their logarithm.
+        """
         return logarithms(predicted + self.bias, self.powers)
 
     def of_features(self, own: npt.NDArray[np.bool_]) -> "Floor":
-        """The floor of some features [features], which are those of whole runs: runs are independent of each other."""
+        """The floor of the features marked in `own` [features], which must be all features of some runs.
+
+        Runs are independent of each other, so the whitening may be cut at their borders.
+        """
         rows = own[self.compared]
         return Floor(
             bias=self.bias[own],
@@ -54,12 +68,12 @@ class Floor(NamedTuple):
 
 
 def compress(z: Floats, knee: float = KNEE) -> Floats:
-    """T of the definition; fits begin with a larger knee."""
+    """T of the gap's definition (`diagnosis.gap.measure`): `z` in noise floors, any shape; fits begin with a larger knee."""
     return knee * np.arcsinh(z / knee)
 
 
 def slope_of_compress(z: Floats, knee: float = KNEE) -> Floats:
-    """Its derivative."""
+    """Derivative of `compress` at `z`, same shape."""
     return 1.0 / np.sqrt(1.0 + (z / knee) ** 2)
 
 
@@ -72,9 +86,19 @@ def replicates(
     jobs: int = 1,
     perhaps: Sequence[Point] = (),
 ) -> Floats:
-    """Runs of one model on other surfaces with other noise, [count, features]; the same ones in any number of processes.
+    """Predicted features of one model on other rough surfaces with other sensor noise, [count, features].
 
-    `perhaps` are points that will be asked for next.
+    The result does not depend on the number of processes.
+
+    Args:
+        problem: the runs.
+        point: the model.
+        roughness: share of the friction, and the length around which each replicate draws its own.
+        count: of replicates.
+        seed: of the draws.
+        jobs: processes.
+        perhaps: points that may be asked for next, simulated where a lane is free.
+
     """
     shares = np.array_split(np.arange(count), jobs)
     drawn = each(jobs, _drawn, problem, [(point, roughness, seed, share.tolist(), perhaps) for share in shares])
@@ -93,9 +117,10 @@ def _drawn(problem: Problem, share: tuple[Point, Roughness, int, list[int], Sequ
 
 
 def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None = None) -> Floor:
-    """The floor from replicates of the model at `point`, [count, features].
+    """The noise floor of the model at `point`, from its replicates `drawn` [count, features].
 
-    What a floor `before` compared stays compared, with its scatter: a refit that loses the slips does not lose their features.
+    A feature that the floor `before` compared stays compared, with the scatter of `before`: a refit that loses the slips
+    cannot drop the features of the slips.
     """
     labels = problem.labels
     powers = np.array([label.name in POWERS for _, label in labels])
@@ -105,11 +130,12 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
     count = np.maximum(finite.sum(axis=0), 1)
     mean = np.where(finite, drawn, 0.0).sum(axis=0) / count
     bias = np.where(compared, mean - np.where(compared, plain, 0.0), 0.0)
-    # noise adds to a power: where the noise-free one is above the mean by chance, taking that off leaves less than nothing
-    # of a ring a fifth as strong, and one feature left 2760 of chi2
+    # Noise only adds to a power, so a bias below 0 is chance. Added to the prediction of a weaker ring, such a bias would give
+    # a negative power, whose logarithm is far off (docs/method/gap.md).
     bias[powers] = np.maximum(bias[powers], 0.0)
     about = np.where(finite, logarithms(drawn, powers) - logarithms(mean, powers), 0.0)
-    # under vibration the phase at which a slip begins decides how it goes: the prediction is one draw, as the rig is
+    # Under vibration the phase at which a slip begins decides how the slip goes. So the prediction scatters as the measured
+    # run does, and the variance of their difference is twice that of the replicates.
     about *= np.where(_slips_under_vibration(problem), 2.0**0.5, 1.0)
     spread = np.sqrt((about * about).sum(axis=0) / np.maximum(count - 1, 1))
     least = np.array([_least(label, problem) for _, label in labels])
@@ -125,9 +151,9 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
         for (file, label), use in zip(labels, compared, strict=True)
         if use
     )
-    # the least scatter is as much a part of the floor as the drawn one: what of it the replicates do not show is added
+    # The replicates show only the drawn part of the scatter; the whitening needs the least part as well.
     promised = np.where(lost, 1.0, least / scatter)[compared] ** 2
-    # a run of its own differs from the mean of so many others by a little more than they do among themselves
+    # A further run differs from the mean of `count` replicates by a little more than the replicates do among themselves.
     others = (len(drawn) + 1.0) / (len(drawn) - 1.0)
     squares = np.where(lost[compared], 1.0, z * z)
     level = np.sqrt(others * np.mean([cell_means(row, cells).mean() for row in squares]))
@@ -136,7 +162,10 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
 
 
 def logarithms(values: Floats, powers: npt.NDArray[np.bool_]) -> Floats:
-    """Powers as half their logarithm, so that a difference is a relative one of amplitudes; the rest as it is."""
+    """Features [..., features] with each power as half its logarithm; all others unchanged.
+
+    A difference of two powers is then the relative difference of two amplitudes.
+    """
     return np.where(powers, 0.5 * np.log(np.maximum(values, _LEAST_POWER)), values)
 
 
@@ -151,17 +180,17 @@ def _slips_under_vibration(problem: Problem) -> npt.NDArray[np.bool_]:
 
 
 def cell_means(squares: Floats, cells: tuple[CellKey, ...]) -> Floats:
-    """Means of squares over the features of each cell, in the order in which cells first appear."""
+    """Mean of `squares` [compared] over the features of each cell, [cells], in the order in which the cells first appear."""
     number = {key: i for i, key in enumerate(dict.fromkeys(cells))}
     index = np.array([number[key] for key in cells], np.int64)
     return np.bincount(index, squares, len(number)) / np.bincount(index, minlength=len(number))
 
 
 def _whitening(z: Floats, promised: Floats, segments: list[tuple[str, int]]) -> Floats:
-    """Inverse root of the replicates' covariance, segment by segment: each begins anew on its own piece of the track.
+    """Inverse root of the covariance of the replicates `z` [count, compared], segment by segment.
 
-    Where so few replicates show a correlation of two segments it is by chance, and shrinking that away takes along what a slip
-    does to all features of its segment.
+    Each segment runs on its own piece of the track. With so few replicates, a correlation of two segments is chance, and a
+    shrinkage strong enough to remove this chance would also remove what a slip does to all features of its segment.
     """
     result = np.zeros((len(segments), len(segments)))
     for segment in dict.fromkeys(segments):
@@ -171,7 +200,10 @@ def _whitening(z: Floats, promised: Floats, segments: list[tuple[str, int]]) -> 
 
 
 def _inverse_root(z: Floats, promised: Floats) -> Floats:
-    """Of the covariance of replicates [count, features], shrunk towards independence (Ledoit and Wolf's intensity)."""
+    """Inverse root of the covariance of the replicates `z` [count, features], shrunk towards independence.
+
+    The intensity of the shrinkage is that of Ledoit and Wolf (2004). `promised` [features] is added to the variances.
+    """
     count, features = z.shape
     sample = z.T @ z / count
     off = sample - np.diag(np.diag(sample))
@@ -187,27 +219,28 @@ def _inverse_root(z: Floats, promised: Floats) -> Floats:
 
 
 def _least(label: Feature, problem: Problem) -> float:
-    """The scatter that a feature has at least, in its own unit: the grid's resolution and what ordinary sensors promise.
+    """Smallest scatter of a feature, in the unit of the feature: resolution of the grid and accuracy of ordinary sensors.
 
-    Where no such promise is named beside it, a number is set so that evidence made from the plant without a gap differs by one
-    to two floors (rms over eight such evidences of the protocol "ladder").
+    A smaller value raises false gaps from sensors as they are sold; a larger value hides small effects in that feature. A
+    number without a reason beside it was set so that synthetic evidence without a gap differs by one to two noise floors (rms
+    over eight evidences of the protocol "ladder").
     """
     force_N, slip_s, _, stiffness, _ = problem.scales
     if problem.rig.drive == "force":
         return _least_of_axis(label, force_N, problem.force_peak_N)
-    drop_m = 0.3 * force_N / stiffness  # of a slip, for friction that falls by a sixth
+    drop_m = 0.3 * force_N / stiffness  # length of a slip when friction falls by a sixth
     if label.name == "rest":
-        return 1.5  # of a displacement sensor between 5 and 24 Hz, where no piece of its noise can be had
+        return 1.5  # noise of a displacement sensor between 5 and 24 Hz cannot be taken from the run
     if label.name in {"scatter", "ripple"}:
-        return 0.6  # small powers, which hum, slow noise and the roughness of one track reach
+        return 0.6  # small powers: hum, slow noise and the roughness of one track are as large
     if label.name in {"ring", "spring rest"}:
         return 0.25
     if label.name == "spring cube":
-        return 8e-3 * force_N  # nor can such a bow be told from a bend of the spring over a short stretch
+        return 8e-3 * force_N  # over a short stretch the bow of a displacement sensor looks like a stiffening spring
     if label.name == "spring bend":
         return _SENSORS_BEND_S2 * stiffness
     if label.name.startswith("spring"):
-        return 2e-3 * force_N  # a displacement sensor's bow of 0.2 % changes its slope along the track
+        return 2e-3 * force_N  # a bow of 0.2 % in a displacement sensor changes the slope along the track
     if label.name.startswith("vibration"):
         return 0.006 if label.signal == "base_accel_mps2" else 0.04
     if label.name == "period":
@@ -217,10 +250,10 @@ def _least(label: Feature, problem: Problem) -> float:
     if label.signal == "drive_force_N":
         return 3e-4 * force_N
     if label.signal.endswith("accel_mps2"):
-        if label.name in {"shape -0.5", "shape 0.5"}:  # where a slip begins and ends the acceleration jumps
+        if label.name in {"shape -0.5", "shape 0.5"}:  # the acceleration jumps where a slip begins and where it ends
             return 0.1 * drop_m * (np.pi / slip_s) ** 2
         return 4e-3 * drop_m * (np.pi / slip_s) ** 2
-    if label.signal == "drive_position_m":  # a sensor's bow is slow; its errors over a short way are small
+    if label.signal == "drive_position_m":  # a sensor's bow fills the long waves; over a short way its error is small
         return (4e-4 if label.name in _SHORT_WAVES else 2e-3) * drop_m
     return 1e-3 * drop_m
 
@@ -231,7 +264,7 @@ def _least_of_axis(label: Feature, force_N: float, peak_N: float) -> float:
     if label.signal != "drive_force_N":
         return 0.002
     if label.regime == "breakaway" and label.name in {"mean", "over rest"}:
-        return 0.02 * force_N  # how far the contact was loaded before the run is not known
+        return 0.02 * force_N  # the load on the contact before the run is not known
     if " over " in label.name:
-        return 2e-4 * force_N
-    return 5e-4 * peak_N  # the linearity of a good force channel
+        return 2e-4 * force_N  # waves over time and position: a force channel errs slowly
+    return 5e-4 * peak_N  # linearity of a good force channel

@@ -1,19 +1,19 @@
 """The gap, defined once.
 
-A measured run and its prediction are compared feature by feature (`diagnosis.features`), since a sample-by-sample difference of
-two stick-slip records measures their phase: 0.1 % more static friction makes it as large as the signal after a few cycles while
-every cycle looks the same.
+A measured run and its prediction are compared feature by feature (`diagnosis.features`). A sample-by-sample difference of two
+stick-slip records measures their phase: with 0.1 % more static friction this difference is as large as the signal after a few
+cycles, while every cycle looks the same.
 
-Each difference is divided by its floor: the scatter that the feature shows among replicates of the model itself, which differ
-by sensor noise as measured, by the rough surface, and by the age of the contact at the start, and never less than what the
-1 ms grid and ordinary sensors can promise. The gap is the root of the mean square of these over cells of signal x regime x
-band x run, each cell counting alike, so that a shape of 14 points weighs no more than one mean level:
+Each difference is divided by its noise floor. The floor is the scatter that the feature shows among replicates of the model:
+they differ by sensor noise as measured, by the rough surface, and by the age of the contact at the start. The floor is never
+below what the 1 ms grid resolves and ordinary sensors hold. The gap is the root of the mean square of the differences over
+cells of signal x regime x band x run. Each cell counts alike, so a shape of 14 points weighs no more than one mean level:
 
     gap = sqrt(mean over cells of mean over the cell's features of T(difference / floor)^2) / level,  T(z) = 6 asinh(z / 6)
 
-The level is what the replicates themselves show, so that a perfect model has 1.0. T is the identity up to
-a few floors and a logarithm beyond: a drive that ripples by 500 floors of a laser-straight position says no more than one that
-ripples by 50, and must not hide everything else.
+The level is the same root for the replicates themselves, so a perfect model has the gap 1.0. T is the identity up to a few
+floors and a logarithm beyond. A ripple of 500 floors in a very accurate drive position says no more than a ripple of 50 floors,
+and must not hide all other differences.
 """
 
 from typing import Any
@@ -30,28 +30,44 @@ DEFINITION = (
     "features (cycle means and trends, slip shapes, levels, vibration, parity relations), each in units of the scatter of "
     "replicates of the model with measured noise and a rough surface; beyond 6 units logarithmic; 1.0 is a perfect model"
 )
-# Floors, of every feature of a rig that cannot be: more than any other may have. A base too light to compute came out best for a
-# log that nothing explains, as what lacks everything had only what lacking costs.
+# Difference, in noise floors, of every feature of a rig that cannot be simulated: larger than any other difference.
+# Too small: an impossible rig, which only pays for missing features, beats the possible ones (docs/method/gap.md).
 _IMPOSSIBLE = 1e4
-_LACKING = 8.0  # floors, of a feature that the rig shows and the model does not: it is far off
-# What a slip that the model lacks counts once differences are made independent: more than what slips differ by, or lacking it
-# would pay; no more, or there is no way from a model that slips too late. Eight floors for each signal were 690 for one slip.
+# Difference, in noise floors, of one feature that the rig shows and the model does not; only for the gap that is reported.
+# Too small: a model without slips seems near. Too large: the logarithm of T takes the rest away.
+_LACKING = 8.0
+# Penalty, in noise floors, for one measured slip that the model does not show (after whitening, so one slip counts once).
+# Too small: models that lose slips win. Too large: a fit that starts with late slips cannot find its way back.
+# Counted on one late slip (docs/method/gap.md).
 _LACKING_SLIP = 5.0
 
 
 def chi2_of(left: Floats) -> float:
-    """chi2 of what is left, whitened [compared]."""
+    """chi2 of the whitened differences `left` [compared]."""
     return float(left @ left)
 
 
 def differences(floor: Floor, problem: Problem, predicted: Floats) -> Floats:
-    """Measured less predicted in floors, [compared], not compressed."""
+    """Measured less predicted features, in noise floors, [compared], not compressed.
+
+    `predicted` is [features]; a feature that is measured and not predicted counts `_LACKING`.
+    """
     z = between(floor, predicted, problem.measured)
     return np.where(np.isfinite(z), z, _LACKING)
 
 
 def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KNEE) -> tuple[Floats, Floats]:
-    """Differences compressed and made independent [compared], and the derivative of the compression."""
+    """Differences of measured and predicted features, compressed and made independent; and the derivative of the compression.
+
+    Both are [compared]. Slips that the prediction lacks are charged by segment, see `_LACKING_SLIP`.
+
+    Args:
+        floor: the noise floor of `problem`.
+        problem: the measured runs.
+        predicted: features of the model, [features]; all NaN for a rig that cannot be simulated.
+        knee: noise floors beyond which a difference counts as its logarithm.
+
+    """
     if not np.isfinite(predicted).any():
         count = int(floor.compared.sum())
         return np.full(count, _IMPOSSIBLE), np.ones(count)
@@ -70,21 +86,24 @@ def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KN
 
 
 def between(floor: Floor, predicted: Floats, seen: Floats) -> Floats:
-    """Features as seen [..., features] less predicted ones [features] in floors, [..., compared], NaN where one is missing."""
+    """Features `seen` [..., features] less `predicted` [features], in noise floors, [..., compared].
+
+    NaN where one of the two is missing.
+    """
     apart = logarithms(seen, floor.powers) - floor.expected(predicted)
     return apart[..., floor.compared] / floor.scatter[floor.compared]
 
 
 def gap(floor: Floor, z: Floats) -> float:
-    """The gap of differences `z` [compared], 1.0 for a perfect model."""
+    """The gap of the differences `z` [compared] in noise floors; 1.0 for a perfect model."""
     return float(np.sqrt(cell_squares(floor, z).mean())) / floor.level
 
 
 def cell_squares(floor: Floor, z: Floats) -> Floats:
-    """Mean square of the compressed differences `z` [compared] in every cell, in the order of `cell_names`, [cells]."""
+    """Mean square of the compressed differences `z` [compared] of each cell, [cells], in the order of `cell_names`."""
     return cell_means(compress(z) ** 2, floor.cells)
 
 
 def cell_names(floor: Floor) -> tuple[CellKey, ...]:
-    """Signal, regime, band and run of every cell."""
+    """Signal, regime, band [Hz] and run of each cell, [cells]."""
     return tuple(dict.fromkeys(floor.cells))

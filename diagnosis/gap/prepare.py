@@ -1,4 +1,4 @@
-"""A measured run made ready: grid, segments, features, the force and state with which each segment begins."""
+"""A measured run made ready for comparison: the 1 ms grid, segments, noise, and the state in which each segment begins."""
 
 from typing import NamedTuple
 
@@ -17,25 +17,29 @@ from diagnosis.model.predict import predict
 from diagnosis.model.rig import Entry, Start, rig_config
 from diagnosis.model.segment_starts import entries_of
 
+# Seconds that an axis must move in a run. Too small: the mean friction is noise. Too large: short strokes are refused.
 _SHORTEST_MOTION_S = 0.5
 
 
 class Prepared(NamedTuple):
-    """One run, ready."""
+    """One run, ready. Signals are [blocks of 1 ms] each."""
 
     file: str
-    holdout: bool
+    holdout: bool  # held out: not fitted, only predicted
     signals: Signals
     commands: Commands
     start: Start
-    entries: tuple[Entry, ...]  # as the force sensor read it
-    before_s: float  # how long the rig had run in the runs before, in the manifest's order
+    entries: tuple[Entry, ...]  # state at the start of each segment, with the force as the sensor read it
+    before_s: float  # sum of the durations of the runs before this one, in the manifest's order
     noise: Noise
-    clipped: dict[str, tuple[float, float]]  # by signal: limits that the sensor could not pass
+    clipped: dict[str, tuple[float, float]]  # by signal: lowest and highest value that the sensor can show
 
 
 def prepare(evidence: Evidence) -> list[Prepared]:
-    """Reduce every run and find its commands, start and noise. Raises Fault BAD_EVIDENCE when an axis hardly moves."""
+    """Reduce every run and find its commands, start and noise; runs in the manifest's order.
+
+    Raises Fault BAD_EVIDENCE when a force-driven axis moves for less than 0.5 s.
+    """
     prepared: list[Prepared] = []
     before_s = 0.0
     for run in evidence.runs:
@@ -46,7 +50,7 @@ def prepare(evidence: Evidence) -> list[Prepared]:
 
 def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     signals = reduce_run(run)
-    for shake, source in SHAKEN.items():  # a clipped vibration is not that of a clipped mean
+    for shake, source in SHAKEN.items():  # a model is clipped in its block means only: its vibration would differ
         if source in run.clipped:
             signals.pop(shake, None)
     commands = commands_of(run, rig, signals)
@@ -76,7 +80,7 @@ def _start(rig: RigTable, signals: Signals, commands: Commands) -> Start:
     if rig.drive == "force":
         assert commands.motion is not None, "a force drive has a motion"  # noqa: S101
         at_m, velocity_mps = (float(values[0]) for values in commands.motion[:2])
-        # the bristle as it is in steady sliding, or as it holds the force at rest
+        # friction at the start: that of steady sliding, or, at rest, the force that the contact holds
         sliding = abs(velocity_mps) > rig.stribeck_velocity_mps
         force_N = float(signals["drive_force_N"][first].mean())
         return Start(np.sign(velocity_mps) * rig.coulomb_force_N if sliding else force_N, at_m, velocity_mps)

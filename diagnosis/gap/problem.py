@@ -1,4 +1,4 @@
-"""Runs of one evidence made ready for comparison: measured features, and predicted ones for any parameters and effects."""
+"""The measured features of one evidence, and predicted features for any rig numbers, sensor chain and effects."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,42 +27,48 @@ from plant.config import RigConfig
 from plant.effects.library import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
-AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # how old the contact was when a run began
+AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # an effect, and the contact's age when a run begins
 PIEZO_EFFECTS = frozenset(name for name, effect in EFFECTS.items() if effect.acts_on == "piezo")
-# of the position channels from one piece of track to another: a linearity of 0.2 % of the range is up to 0.8 % in slope
+# Spread of the position channels' scale from one piece of track to another (relative, standard deviation of the replicates).
+# Too small: the bow of a good sensor passes for a spring. Too large: a changed stiffness is hidden.
+# A linearity of 0.2 % of the range is up to 0.8 % in slope.
 _SCALE_SPREAD = 0.004
-_KEPT = 64  # simulated runs, of 0.6 MB each
-_DIVERGED = 1e100  # SI units, of a feature: its square must still be a number
+# Simulated runs that are kept, of 0.6 MB each. Fewer: trials simulate their common start again. More: memory.
+_KEPT = 64
+_DIVERGED = 1e100  # SI units: a feature beyond counts as missing, as its square must still be a number
 
 
 class Point(NamedTuple):
-    """Where the model is evaluated."""
+    """A model to evaluate: rig numbers, sensor chain and effects."""
 
-    values: dict[str, float]  # of the rig table, those that differ from the described ones
+    values: dict[str, float]  # rig numbers by name, only those that differ from the rig table
     chain: Chain
     effects: Effects
 
 
 class Draw(NamedTuple):
-    """What is random about one replicate."""
+    """The random part of one replicate."""
 
     random: np.random.Generator
     roughness: Roughness
 
 
 class _Asked(NamedTuple):
-    """A run of the model as it is to be simulated."""
+    """One run of the model to simulate."""
 
     point: Point
     draw: Draw | None
-    effects: Effects  # those that sensors have no part in
+    effects: Effects  # those that move the rig; sensor effects are applied afterwards
     start: Start
     entries: tuple[Entry, ...]
     chain: Chain
 
 
 class Problem:
-    """A set of runs under one rig table. Arrays of features are [features], the runs' features one after the other."""
+    """A set of runs under one rig table.
+
+    Arrays of features are [features]: the features of all runs, one run after the other; NaN where a run has no such feature.
+    """
 
     def __init__(self, rig: RigTable, runs: list[Prepared]) -> None:
         self.rig = rig
@@ -75,33 +81,33 @@ class Problem:
         self.measured = np.concatenate([np.array(found.values) for found in self._measured])
 
     def __getstate__(self) -> dict[str, Any]:
-        """For another process: without what was simulated here."""
+        """State for another process, without the kept simulations."""
         return self.__dict__ | {"_simulated": {}}
 
     @property
     def labels(self) -> list[tuple[str, Feature]]:
-        """File and feature of every entry."""
+        """File and feature of every entry, [features]."""
         return [
             (run.file, label) for run, found in zip(self.runs, self._measured, strict=True) for label in found.labels
         ]
 
     def predicted(self, point: Point) -> Floats:
-        """Features of the model, [features]; NaN where no rig is like that."""
+        """Features of the model at `point`, [features]; all NaN where such a rig cannot be simulated."""
         return self.predicted_many([point])[0]
 
     def predicted_many(
         self, points: Sequence[Point], draws: Sequence[Draw] = (), perhaps: Sequence[Point] = ()
     ) -> list[Floats]:
-        """As `predicted` of every point, in less time than one after the other.
+        """Features of the model at each point, [features] each, in less time than by calls of `predicted`.
 
         Args:
-            points: where.
-            draws: of each point what is random about it; without draws nothing is.
-            perhaps: points that may be asked for next, to be simulated where that costs nothing.
+            points: the models.
+            draws: the random part of each point; empty for noise-free predictions.
+            perhaps: points that may be asked for next, simulated where a lane is free.
 
         """
         parts: list[list[float]] = [[] for _ in points]
-        with np.errstate(over="ignore", invalid="ignore"):  # where a far start of a refit makes the model diverge
+        with np.errstate(over="ignore", invalid="ignore"):  # a refit may start so far away that the model diverges
             for run in self.runs:
                 found = self._signals(run, points, draws or [None] * len(points), perhaps)
                 for part, signals in zip(parts, found, strict=True):
@@ -113,7 +119,10 @@ class Problem:
         return result
 
     def signals(self, run: Prepared, point: Point) -> Signals:
-        """Predicted signals of one run, as its sensors would show them. Raises ValueError where no rig is like that."""
+        """Noise-free predicted signals of one run, [blocks] each, as its sensors would show them.
+
+        Raises ValueError when the rig at `point` cannot be simulated.
+        """
         (found,) = self._signals(run, [point], [None])
         if found is None:
             raise ValueError(f"no rig is like that: {point}")
@@ -122,7 +131,7 @@ class Problem:
     def _signals(
         self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None], perhaps: Sequence[Point] = ()
     ) -> list[Signals | None]:
-        """Of every point; None where no rig is like that."""
+        """Signals of each point, as the sensors show them; None where such a rig cannot be simulated."""
         asked = [_asked(run, point, draw) for point, draw in zip(points, draws, strict=True)]
         if self.rig.drive == "force":
             return [self._led(run, one) for one in asked]
@@ -130,7 +139,7 @@ class Problem:
         return [None if raw is None else _shown(run, one, raw) for one, raw in zip(asked, raws, strict=True)]
 
     def _led(self, run: Prepared, one: _Asked) -> Signals | None:
-        """As `_signals`, for a force drive: the force that leads the model along the measured motion."""
+        """Signals of one point with a force drive: among them the force that leads the model along the measured motion."""
         effects, draw = one.point.effects, one.draw
         chain = relative(one.point.chain)
         commands = true_commands(run.commands, effects, chain)
@@ -141,7 +150,7 @@ class Problem:
             motion = commands.motion
             if motion is not None and "mass_position_m" in noise:
                 motion = motion._replace(position_m=motion.position_m + noise["mass_position_m"])
-            # a disturbed input moves the mass, and what it takes to put that right is what noise costs
+            # noise on the input force moves the mass; the leading force that corrects this motion is the effect of the noise
             commands = commands._replace(drive=commands.drive + noise["drive_force_N"], motion=motion)
         sensors = {name: table for name, table in effects.items() if name in SENSOR_EFFECTS}
         (raw,) = self._raw(run, commands, [one], (chain, _hashable(sensors)))
@@ -163,7 +172,10 @@ class Problem:
         inputs: object = None,
         perhaps: Sequence[Point] = (),
     ) -> list[Signals | None]:
-        """Simulated signals; what was drawn is nobody's else, the rest may be there already."""
+        """Simulated signals of each model, before the sensors; None where such a rig cannot be simulated.
+
+        A run without a draw is kept and found again; a run with a draw is simulated each time.
+        """
         keys = [number if one.draw is not None else _key(run, one, inputs) for number, one in enumerate(asked)]
         found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
         todo = {key: one for key, one in zip(keys, asked, strict=True) if key not in found}
@@ -178,14 +190,17 @@ class Problem:
                 found[key] = signals
             elif signals is not None:
                 self._simulated[key] = signals
-        # at the end again: where all trials start from is asked for again and again
+        # What was used last moves to the end and is dropped last: the common start of all trials is needed often.
         self._simulated |= {key: found[key] for key, one in zip(keys, asked, strict=True) if one.draw is None}
         for key in list(self._simulated)[:-_KEPT]:
             del self._simulated[key]
         return [found[key] for key in keys]
 
     def _simulate(self, commands: Commands, asked: Sequence[_Asked], wanted: int) -> list[Signals | None]:
-        """The signals of the first `wanted`, None where no rig is like that; of the others where there was a lane for them."""
+        """Signals of each model, before the sensors.
+
+        The first `wanted` are all simulated, and None means that such a rig cannot be; the others only where a lane is free.
+        """
         configs: dict[int, RigConfig] = {}
         for number, one in enumerate(asked):
             with suppress(ValidationError):
@@ -231,7 +246,7 @@ def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
 
 
 def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
-    """The effects that move the rig in this run, as it shows them."""
+    """The effects that move the rig, with the numbers that they have in this run."""
     seed = draw.roughness.seed if draw else None
     shown = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
     moving = {name: table for name, table in shown.items() if table is not None and name not in SENSOR_EFFECTS}
@@ -243,7 +258,7 @@ def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
 
 
 def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
-    """What the sensors make of a simulated run."""
+    """A simulated run as its sensors show it: gains, delays, noise, clipping."""
     result = sensed(raw, run.commands.frequency_Hz, one.point.effects, one.chain)
     result = {name: result[name] for name in run.signals}
     for name in result:
@@ -258,7 +273,7 @@ def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
 
 
 def _key(run: Prepared, one: _Asked, inputs: object) -> object:
-    """What decides how a run of the model goes of which nothing is drawn."""
+    """Key of a run without a draw: all that decides how it goes."""
     rig = _hashable({"rig": one.point.values})
     return run.file, one.start.force_N, one.start.age_s, one.entries, inputs, rig, _hashable(one.effects)
 
@@ -268,9 +283,10 @@ def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:
 
 
 def _with_paths(effects: Effects, run: Prepared, draw: Draw | None) -> Effects:
-    """Random effects on a path: that of their seed, with seed 0 that of the draw; without a draw on none, which is their mean.
+    """The effects with a path for each random effect.
 
-    What goes over time takes another path in every run, what goes over place the same.
+    The path is that of the effect's seed; with seed 0, that of the draw. Without seed and draw the effect is left out, as its
+    mean is 0. An effect over time takes another path in every run, an effect over place the same path in all runs.
     """
     result: Effects = {}
     for name, table in effects.items():
