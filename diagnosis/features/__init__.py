@@ -1,10 +1,10 @@
-"""A run in numbers that do not depend on when it slips.
+"""A run as numbers that do not depend on the instants of its slips.
 
 grid                        a run on the 1 ms grid
-segments                    what the rig was told, and the stretches in which that does not change
+segments                    commands of a run, and the segments in which the commands are constant
 cycles, slips               slips, breakaways and re-sticks of a force record; the shape around a slip
-feature                     what a feature is
-spring_drive, force_drive   the features of a run of either drive
+feature                     definition of a feature
+spring_drive, force_drive   the features of a run with a spring drive, and with a force drive
 axis_motion                 the measured motion along which a force-driven model is led
 spring_law                  how the force follows the extension of the spring
 noise                       the noise of a run, taken from the run

@@ -1,8 +1,8 @@
-"""The motion of a force-driven axis: what a model of it is led along, so that the force it needs can be compared.
+"""The measured motion of a force-driven axis: the model is led along it, and the force that the model needs is compared.
 
-A model that is driven by the measured force alone drifts away within a stroke, since 1 % of friction is 2 mm after a second on an
-axis of 95 kg. Led along the measured motion it needs a force, and that force is what the model says; it does not drift, and a
-mass, a friction or a gain that is wrong shows where it acts.
+A model that is driven by the measured force alone drifts away within a stroke: 1 % of friction is 2 mm after a second on an axis
+of 95 kg. A model that is led along the measured motion cannot drift. The force that it needs is its prediction, and a wrong mass,
+friction or gain shows where it acts.
 """
 
 from typing import Any, NamedTuple
@@ -16,21 +16,33 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.grid import BLOCK_S
 
 Floats = npt.NDArray[np.floating[Any]]
-_WINDOW = 31  # blocks, of a cubic: 0.2 um of encoder noise are 1e-5 m/s and 1e-3 m/s^2
-_EVERY = 5  # blocks, where a line through the whole run is sought
+# Blocks over which a cubic smooths the position. Too small: noise of the encoder; too large: reversals are smeared.
+# With 31 blocks, 0.2 um of encoder noise give 1e-5 m/s and 1e-3 m/s^2.
+_WINDOW = 31
+_EVERY = 5  # blocks from one sample to the next in the search for zero and speed; fewer blocks only cost time
 
 
 class Motion(NamedTuple):
-    """One value a block, at the block's start as a sampled control has it. The last three are smoothed, for sorting only."""
+    """Motion of the slide, [blocks] each, at the start of each block as a sampled control has it.
+
+    Velocity, acceleration and inertia are smoothed; they only sort the blocks into bins.
+    """
 
     position_m: Floats
     velocity_mps: Floats
     accel_mps2: Floats
-    inertia_N: Floats  # force that accelerates the mass as described
+    inertia_N: Floats  # force that accelerates the mass of the rig table
 
 
 def motion_of(signals: dict[str, Floats], samples_per_block: float, rig: RigTable) -> Motion:
-    """The motion of a reduced run, from its position, or from its acceleration where there is none."""
+    """The motion of a reduced run, from its position; from its acceleration where no position was measured.
+
+    Args:
+        signals: by name, [blocks] each.
+        samples_per_block: of the measured run; with 2 or more the block means belong to the middle of the block.
+        rig: as described.
+
+    """
     position = signals.get("mass_position_m")
     if position is None:
         position = _from_acceleration(signals["mass_accel_mps2"], signals["drive_force_N"], rig)
@@ -43,10 +55,10 @@ def motion_of(signals: dict[str, Floats], samples_per_block: float, rig: RigTabl
 
 
 def _from_acceleration(accel_mps2: Floats, force_N: Floats, rig: RigTable) -> Floats:
-    """Position from an acceleration with an unknown zero and an unknown speed at the start.
+    """Position [m] from an acceleration whose zero and whose speed at the start are unknown.
 
-    These two are where the described friction leaves least of the force. A line taken out of the velocity would do for a long
-    record; of three strokes it takes a fifth of the motion along.
+    Both are chosen so that inertia and the described friction explain the force best. A line taken out of the velocity would be
+    enough for a long record, but from three strokes it removes a fifth of the motion.
     """
     gone_mps = np.cumsum(accel_mps2) * BLOCK_S
     time = np.arange(len(gone_mps)) / len(gone_mps)

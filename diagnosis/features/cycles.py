@@ -1,4 +1,4 @@
-"""Where a force record sticks and slips: breakaways, re-sticks, and the means over a run."""
+"""Slips of a force record: breakaways, re-sticks, and their means over a run."""
 
 import math
 from typing import Any, NamedTuple
@@ -11,10 +11,12 @@ from bridge.kernel import kernel
 Floats = npt.NDArray[np.floating[Any]]
 Indices = npt.NDArray[np.int64]
 
-# Samples are averaged over 1 ms first: a slip of the paper's rig lasts pi sqrt(m / k_d) = 36 ms and its peak
-# and its trough are round, so 1 ms costs below 3 mN there and takes 20 mN rms of noise at 20 kHz to 4.5 mN.
+# Seconds over which samples are averaged first. Too small: noise; too large: the peaks of a slip are cut.
+# A slip of the paper's rig lasts pi sqrt(m / k_d) = 36 ms and its peaks are round: 1 ms cuts them by less than 3 mN and
+# reduces noise of 20 mN rms at 20 kHz to 4.5 mN.
 _BIN_S = 1e-3
-# White noise spans 8 to 9 standard deviations over the 20000 bins of a 20 s run; 10 keeps it out.
+# Smallest slip, in standard deviations of the noise. Too small: noise counts as slips; too large: small slips are lost.
+# White noise spans 8 to 9 standard deviations over the 20000 bins of a 20 s run.
 _NOISE_SPANS = 10.0
 
 
@@ -84,14 +86,14 @@ def find_cycles(
     minimum_drop_N: float | None = None,
     slowest_fall_s: float = 0.1,
 ) -> Cycles:
-    """Find the slips in a drive force that was simulated or measured.
+    """Find the slips in a simulated or measured drive force.
 
-    `t_s` is the time, increasing and near regular, 100 Hz or more; `drive_force_N` the force in the drive
+    `t_s` is the time, increasing and nearly regular, 100 Hz or more; `drive_force_N` is the force in the drive
     spring, finite; both [samples].
 
-    A slip is a fall from a local maximum to the next local minimum that is big and fast. Big: at least
-    `minimum_drop_N`, by default the larger of 3 % of the median force and ten times the noise that the record
-    itself shows. (At 3 kHz, close to elimination, the paper's pairs still swing by 12 % of their force.)
+    A slip is a big and fast fall from a local maximum to the next local minimum. Big: at least
+    `minimum_drop_N`, by default the larger of 3 % of the median force and ten times the noise of the record.
+    (At 3 kHz, close to elimination, the paper's pairs still swing by 12 % of their force.)
     Fast: from 10 to 90 % of the fall within `slowest_fall_s`, by default 0.1 s, three times the 36 ms of a
     slip on the paper's spring; a softer drive needs more.
 
@@ -125,14 +127,17 @@ def _binned(t_s: Floats, force_N: Floats) -> tuple[Floats, Floats]:
 def _minimum_drop_N(force_N: Floats) -> float:
     if len(force_N) < 3:
         return 0.0
-    # second differences see neither the climb of a stick nor, as a median, the few bins of the slips
+    # second differences remove the climb of a stick, and their median ignores the few bins of the slips
     bend_N = np.abs(np.diff(force_N, 2))
     noise_N = 1.4826 * float(np.median(bend_N)) / 6.0**0.5
     return max(0.03 * abs(float(np.median(force_N))), _NOISE_SPANS * noise_N)
 
 
 def turning_points(force_N: Floats, drop_N: float) -> tuple[Indices, Indices]:
-    """Maxima and minima that alternate and lie at least `drop_N` apart, a maximum first; indices."""
+    """Indices of maxima and of minima that alternate and differ by at least `drop_N`; the first is a maximum.
+
+    Two arrays; the second is one shorter when the record ends in a fall.
+    """
     at = np.empty(len(force_N), np.int64)
     turns = _turns(force_N, drop_N, at)
     return at[:turns:2], at[1:turns:2]
@@ -157,7 +162,7 @@ def _turns(force_N: Floats, drop_N: float, at: Indices) -> int:
 
 @kernel
 def half_fallen(falling: Floats, tops: Indices, bottoms: Indices) -> Floats:
-    """Where half of each fall is done, between two samples [falls]."""
+    """Instant, in samples, at which half of each fall is done, [falls]; interpolated between two samples."""
     found = np.empty(len(tops))
     for fall in range(len(tops)):
         half = 0.5 * (falling[tops[fall]] + falling[bottoms[fall]])

@@ -1,4 +1,4 @@
-"""What a feature is: one number of a run that does not depend on when the run slips, its band and its scales."""
+"""Definition of a feature: one number of a run that does not depend on the instants of the slips; its band and its scales."""
 
 from typing import Any, NamedTuple
 
@@ -13,30 +13,30 @@ Band = tuple[float, float]
 LOW: Band = (0.0, 5.0)
 MIDDLE: Band = (5.0, 50.0)
 HIGH: Band = (50.0, 500.0)
-# features that are powers of what is left: noise and roughness add to them
+# features that are mean squares: noise and roughness add to them
 POWERS = frozenset({"scatter", "ring", "ripple", "rest", "spring rest"})
-DRIVE_WAVES = 24
-RESOLVED_M = 1e-9  # a commanded position that was logged as measured has no noise but the rounding of its sums
+DRIVE_WAVES = 24  # waves of the drive position over a run; more waves show shorter ripples and cost time
+RESOLVED_M = 1e-9  # least noise of a drive position; a commanded one that was logged as measured has only rounding
 
 
 class Feature(NamedTuple):
-    """What a number of the vector is, and where it belongs."""
+    """Label of one number in the vector of features."""
 
     name: str
     signal: str
     regime: str  # stick, breakaway, slip, restick, steady
-    band_Hz: Band
-    segment: int  # of the run; -1: the whole run
+    band_Hz: Band  # lowest and highest frequency
+    segment: int  # index in the run's segments; -1: the whole run
 
 
 class Scales(NamedTuple):
-    """Typical numbers of a rig, by which windows are sized and logarithms kept finite."""
+    """Typical numbers of a rig, which size windows and limits."""
 
     force_N: float  # static friction
-    slip_s: float  # half a period of the mass on its spring
+    slip_s: float  # duration of a slip: half a period of the mass on its spring
     drop_N: float  # smallest fall of the force that is a slip
     stiffness_N_per_m: float
-    fall_N: float  # of the force in a slip: twice the static less the Coulomb friction
+    fall_N: float  # fall of the force in a slip: twice the difference of static and Coulomb friction
 
 
 class Features:
@@ -48,20 +48,22 @@ class Features:
 
     @property
     def labels(self) -> list[Feature]:
-        """What the values are; a prediction is never asked, and thousands are made."""
+        """Label of every value, in order. Built on demand: thousands of predictions never need their labels."""
         return [Feature(*label) for label in self._labels]
 
     def add(self, name: str, signal: str, regime: str, band_Hz: Band, segment: int, value: float) -> None:
-        """Append one number; NaN where this run has no such thing."""
+        """Append one number; NaN where this run has no such feature."""
         self._labels.append((name, signal, regime, band_Hz, segment))
         self.values.append(value)
 
 
-_SMALLEST_DROP = 0.03  # of the static friction: a smaller fall of the force is no slip
+# Smallest fall of the force that is a slip, as a share of the static friction.
+# Too small: noise and ripple count as slips. Too large: the small slips near elimination are lost.
+_SMALLEST_DROP = 0.03
 
 
 def scales_of(rig: RigTable) -> Scales:
-    """The scales of a rig with a spring drive; with a force drive only the force means something."""
+    """The scales of a rig. With a force drive only `force_N` has a meaning."""
     stiffness = rig.drive_stiffness_N_per_m or 1.0
     slip_s = float(np.pi * np.sqrt(rig.mass_kg / stiffness))
     fall_N = 2.0 * max(rig.static_force_N - rig.coulomb_force_N, 0.02 * rig.static_force_N)

@@ -1,9 +1,11 @@
-"""Features of a force-driven axis: the force that is left after inertia, over velocity, position, direction and time.
+"""Features of a force-driven axis: the force less the inertia, over velocity, position, direction and time.
 
-Both sides are sorted by the measured motion (`diagnosis.axis_motion`), so every mean is over the same blocks, and all but the
-powers are linear in the force. In this order, each of what the one before left: a curve over velocity, with branches where
-it speeds up and slows down; what goes with acceleration and its rate; waves over time and position, of the friction (with the
-sign of the velocity) and of a force that knows no direction.
+Measured and predicted force are both sorted by the measured motion (`diagnosis.features.axis_motion`), so every mean is over the
+same blocks. All features but the powers are linear in the force. Each step works on the remainder of the step before:
+
+1. a curve over velocity, with a branch for speeding up and one for slowing down;
+2. the parts that are proportional to the acceleration and to its rate;
+3. waves over time and position, of the friction (with the sign of the velocity) and of a force without direction.
 """
 
 import math
@@ -22,22 +24,29 @@ from diagnosis.features.segments import Commands
 
 Floats = npt.NDArray[np.floating[Any]]
 Indices = npt.NDArray[np.int64]
-_EDGE = 50  # blocks at either end, where the smoothed motion is not to be trusted
-_SLOW = np.array([0.25, 0.5, 1.0, 2.0, 4.0])  # edges in Stribeck velocities: below the first it is about to stick
-_FAST = 8  # bins from there to the greatest speed
-_FORGOTTEN = 20.0  # presliding lengths F_s / k_t of travel, after which it no longer matters how a bristle began
-_FEWEST = 5  # blocks in a bin
-_FRICTION_WAVES_TIME = 72  # half waves: 3 Hz in 12 s
-_FRICTION_WAVES_POSITION = 80  # half waves: 5 mm on a stroke of 0.2 m
-_FORCE_WAVES = 8
-_BINS_PER_WAVE = 4  # of a half wave
-_RATE_WINDOW = 61  # blocks
-_BANDS_HZ = ((3.0, 8.0), (8.0, 24.0))
-_SHORTEST_REST_S = 0.2
+# Blocks left out at either end of a run, where the window of the smoothed motion is one-sided. Too small: its errors count.
+_EDGE = 50
+# Edges of the slow bins, in Stribeck velocities. Below the first edge the slide is about to stick.
+# More bins resolve the Stribeck curve; each bin then holds fewer blocks.
+_SLOW = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
+_FAST = 8  # bins from the last slow edge to the greatest speed
+# Travel, in presliding lengths F_s / k_t, before features count. Too small: the unknown load on the contact at the start of the
+# run shows as a gap. Too large: short runs lose their features.
+_FORGOTTEN = 20.0
+_FEWEST = 5  # blocks that a bin needs; fewer blocks make its mean noise
+_FRICTION_WAVES_TIME = 72  # half waves: up to 3 Hz in 12 s
+_FRICTION_WAVES_POSITION = 80  # half waves: down to 5 mm on a stroke of 0.2 m
+_FORCE_WAVES = 8  # half waves of a force without direction, which changes slowly
+_BINS_PER_WAVE = 4  # bins for each half wave of the shortest wave
+# Blocks over which the acceleration is smoothed before its rate is taken. Too small: noise of the encoder passes for a lag.
+# Too large: the rate is smeared.
+_RATE_WINDOW = 61
+_BANDS_HZ = ((3.0, 8.0), (8.0, 24.0))  # above the waves over time, below the noise
+_SHORTEST_REST_S = 0.2  # of a rest whose breakaway counts; shorter rests are reversals
 
 
 def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Features:
-    """All features of a run with a force drive."""
+    """All features of a run with a force drive; `signals` [blocks] each, measured or predicted."""
     found = Features()
     motion = commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
@@ -45,10 +54,10 @@ def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Featur
     _breakaways(found, rest_N, motion, rig.stribeck_velocity_mps)
     inner = slice(_first(motion, rig), len(rest_N) - _EDGE)
     cut = Motion(*(values[inner] for values in motion))
-    # a velocity out of an acceleration is off by some mm/s: it does not tell when the axis turns
+    # a velocity integrated from an acceleration is wrong by some mm/s: it does not tell when the axis turns
     slowest = 0 if "mass_position_m" in signals else len(_SLOW)
     rest_N = _without_curve(found, rest_N[inner], cut, rig.stribeck_velocity_mps, slowest)
-    # near a turn of the motion every error of the bristle would pass for a wave
+    # near a turn of the motion every error of the presliding model would pass for a wave
     sliding = np.abs(cut.velocity_mps) > _SLOW[-2] * rig.stribeck_velocity_mps
     rest_N = _without_inertia(found, np.where(sliding, rest_N, 0.0), cut, sliding)
     _waves(found, rest_N, cut, sliding)
@@ -66,7 +75,10 @@ def axis_features(signals: Signals, commands: Commands, rig: RigTable) -> Featur
 
 
 def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Friction over its mean at that direction and speed, less 1, [blocks]; and where it slides fast enough to say so."""
+    """Relative deviation of the friction from its mean at that direction and speed, and the blocks where it is known.
+
+    Both are [blocks]. The deviation is 0 where the slide is too slow for it to be known.
+    """
     rest_N = force_N - motion.inertia_N
     speed = np.abs(motion.velocity_mps)
     edges = np.quantile(speed, np.linspace(0.15, 1.0, 9))
@@ -79,7 +91,7 @@ def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray
 
 
 def moving_s(motion: Motion, rig: RigTable) -> float:
-    """How much of a run its features can use."""
+    """Seconds of a run that its features can use."""
     if float(np.ptp(motion.position_m)) <= _forgotten_m(rig):
         return 0.0
     return max(len(motion.position_m) - _EDGE - _first(motion, rig), 0) * BLOCK_S
@@ -90,36 +102,42 @@ def _forgotten_m(rig: RigTable) -> float:
 
 
 def _first(motion: Motion, rig: RigTable) -> int:
-    """Block from which the features count."""
+    """First block that counts for the features."""
     gone_m = np.abs(motion.position_m - motion.position_m[0])
     gone = gone_m > _forgotten_m(rig)
     return max(int(np.argmax(gone)), _EDGE)
 
 
 def _means(values: Floats, bins: Indices, count: int) -> Floats:
-    """Mean of every bin, NaN where too little is in it."""
+    """Mean of `values` [blocks] in each bin, [count]; NaN where a bin holds too few blocks."""
     held = np.bincount(bins, minlength=count)
     sums = np.bincount(bins, values, count)
     return np.where(held >= _FEWEST, sums / np.maximum(held, 1), np.nan)
 
 
 def _profile(values: Floats, bins: Indices, count: int) -> Floats:
-    """Mean of every bin, the less the fewer blocks are in it, since what the motion passes but once is rough."""
+    """Mean of `values` [blocks] in each bin, [count], shrunk towards 0 in bins with fewer blocks than the median bin.
+
+    The mean over a place that the motion passes only once is mostly roughness.
+    """
     held = np.bincount(bins, minlength=count)
     sums = np.bincount(bins, values, count)
     return sums / np.maximum(held, max(float(np.median(held)), 1.0))
 
 
 def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float, slowest: int) -> Floats:
-    """Features of the force over velocity, from the ring `slowest` on, and what they leave."""
+    """Add the features of the force over velocity, and return the remainder of the force [blocks].
+
+    A ring is a range of speeds, slowest first; features of rings below the index `slowest` are NaN.
+    """
     speed = np.abs(motion.velocity_mps) / stribeck_mps
     fastest = max(float(speed.max()), 1.01 * float(_SLOW[-1]))
     edges = np.concatenate([_SLOW, np.linspace(_SLOW[-1], fastest, _FAST + 1)[1:-1]])
     ring = np.searchsorted(edges, speed, side="right")
-    slow = len(_SLOW) - 1  # rings of it have two branches
+    slow = len(_SLOW) - 1  # rings 1 to `slow` have two branches
     forward = motion.velocity_mps > 0.0
     speeding = (motion.accel_mps2 > 0.0) == forward
-    # about to stick, there is no direction but that of the acceleration
+    # about to stick, the slide has no direction but that of the acceleration
     way = np.where(ring == 0, motion.accel_mps2 > 0.0, forward)
     branch = np.where((ring > 0) & (ring <= slow), speeding, False)
     bins = ring * 4 + way * 2 + branch
@@ -136,7 +154,7 @@ def _without_curve(found: Features, rest_N: Floats, motion: Motion, stribeck_mps
 
 
 def _without_inertia(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray[np.bool_]) -> Floats:
-    # smoothed well below what leads the model, or the encoder's noise in both would pass for a lag
+    # smoothed well below the motion that leads the model: otherwise the encoder's noise in both would pass for a lag
     smooth = uniform_filter1d(uniform_filter1d(motion.accel_mps2, _RATE_WINDOW), _RATE_WINDOW)
     for name, column in (("inertia", motion.accel_mps2), ("lag", np.gradient(smooth, BLOCK_S))):
         about = np.where(sliding, column - column.mean(), 0.0)
@@ -168,7 +186,7 @@ def _waves(found: Features, rest_N: Floats, motion: Motion, sliding: npt.NDArray
 
 
 def _breakaways(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: float) -> None:
-    """The force at which motion starts after a rest, and how it grows with the rest."""
+    """Add the force at which motion starts after a rest, and its slope over the logarithm of the rest."""
     still = np.abs(motion.velocity_mps) < _SLOW[0] * stribeck_mps
     ends = np.flatnonzero(still[:-1] & ~still[1:]) + 1
     begins = np.concatenate([[0] if still[0] else [], np.flatnonzero(~still[:-1] & still[1:]) + 1]).astype(np.int64)
@@ -189,5 +207,5 @@ def _breakaways(found: Features, rest_N: Floats, motion: Motion, stribeck_mps: f
 
 
 def _smooth(values: Floats, frequency_Hz: float) -> Floats:
-    """Moving mean with a cut-off (half the power) at about this frequency."""
+    """Moving mean of `values` [blocks] that passes half the power at about `frequency_Hz`."""
     return uniform_filter1d(values, max(round(0.44 / (frequency_Hz * BLOCK_S)), 1))

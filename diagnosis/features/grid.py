@@ -1,7 +1,7 @@
-"""A run on a grid of 1 ms: block means of every channel, and how much an accelerometer shakes within a block.
+"""A run on a grid of 1 ms: block means of every channel, and the rms of each accelerometer within a block (its shake).
 
-Measured and predicted runs are reduced alike, so what the reduction loses it loses on both sides. 1 ms resolves a slip (36 ms
-on the paper's spring) and averages 20 samples of noise; vibration is too fast for it and is kept as an rms.
+Measured and predicted runs are reduced in the same way and lose the same information. 1 ms resolves a slip (36 ms on the paper's
+spring) and averages 20 samples of noise. Vibration is too fast for the grid and is kept as an rms.
 """
 
 from typing import Any, NamedTuple
@@ -17,14 +17,18 @@ MEANS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m
 SHAKES = ("mass_shake_mps2", "base_shake_mps2")  # rms within a block, about the block's mean
 SIGNALS = (*MEANS, *SHAKES)
 SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_mps2"}
-_FURTHEST_BLOCKS = 5  # from a block to those that it is averaged with
-_LEAST_APART = 0.3  # cosine of the angle that the vibration turns by in between; above it noise would grow
+# Blocks from a block to the farthest block that it is averaged with. Too small: some frequencies find no partner.
+# Too large: slips are smeared.
+_FURTHEST_BLOCKS = 5
+# Largest cosine of the angle that the vibration turns by between the two. Too large: the average amplifies noise.
+# Too small: more frequencies find no partner.
+_LEAST_APART = 0.3
 
 
 def reduce_run(run: Run) -> dict[str, Floats]:
-    """The signals of a measured run by name, [blocks] each; what it lacks is not there.
+    """The signals of a measured run by name, [blocks] each; only those that its columns allow.
 
-    A block without a sample, in a gap or between slow samples, is interpolated.
+    A block without a sample (in a gap, or between slow samples) is interpolated.
     """
     index = np.floor((run.t_s - run.t_s[0]) / BLOCK_S + 1e-6).astype(np.int64)
     blocks = int(index[-1]) + 1
@@ -50,20 +54,20 @@ def reduce_run(run: Run) -> dict[str, Floats]:
 
 
 class Averaged(NamedTuple):
-    """With which others a block is averaged, so that nothing of the vibration is left: all [averaged]."""
+    """Blocks whose mean still holds some vibration, and the two blocks that each is averaged with; all [averaged]."""
 
     own: npt.NDArray[np.int64]
     before: npt.NDArray[np.int64]
     after: npt.NDArray[np.int64]
-    cosine: Floats  # of the angle that the vibration turns by in between
+    cosine: Floats  # of the angle that the vibration turns by from one of the blocks to the next
 
 
 def averaged(frequency_Hz: Floats) -> Averaged:
-    """The blocks under a vibration of this frequency [blocks], 0 where there is none.
+    """The blocks to average under a vibration of `frequency_Hz` [blocks], 0 where there is none.
 
-    A block holds 4.5 periods of 4.5 kHz: its mean keeps up to 7 % of the amplitude, of either sign, by the phase of the exciter,
-    which no log tells. Every block is averaged with those so many blocks off that the vibration is turned by most of half a
-    turn, with the weights that leave nothing at its frequency and a constant as it is.
+    A block holds 4.5 periods of 4.5 kHz. Its mean keeps up to 7 % of the amplitude, with a sign that depends on the phase of the
+    exciter, and no log holds this phase. So every block is averaged with one before and one after it. The distance is chosen so
+    that the vibration turns by nearly half a turn; the weights remove its frequency and keep a constant.
     """
     shaken = np.flatnonzero(frequency_Hz)
     values_Hz, which = np.unique(frequency_Hz[shaken], return_inverse=True)
@@ -75,11 +79,11 @@ def averaged(frequency_Hz: Floats) -> Averaged:
 
 
 def without_vibration(signals: dict[str, Floats], blocks: Averaged) -> dict[str, Floats]:
-    """The signals with accelerations whose means keep nothing of a vibration; what they lose belongs to the shake.
+    """The signals, with the remainder of the vibration moved from the mean accelerations to the shakes; new arrays.
 
     Args:
         signals: [blocks] each, measured or predicted.
-        blocks: of the vibration in their run.
+        blocks: from `averaged`, of the vibration in their run.
 
     """
     own, before, after, cosine = blocks

@@ -1,8 +1,8 @@
-"""The noise of a run, taken from the run: what is faster than 20 ms where the slide sticks, in pieces as they were measured.
+"""The noise of a run, taken from the run: the part faster than 20 ms where the slide sticks, in pieces as measured.
 
-So hum, colour and quantisation come along as they are; no spectrum has to be assumed. Slower noise cannot be told from motion
-and is drawn as a small drift of the force. An acceleration has no motion to be told from where the slide sticks: all of it is
-noise, slow or fast.
+The pieces keep hum, colour and quantisation, and no spectrum has to be assumed. Slower noise cannot be told from motion; it is
+drawn as a small drift of the force. An accelerometer shows no motion where the slide sticks: its whole signal there is noise,
+slow or fast.
 """
 
 from typing import Any, NamedTuple
@@ -16,23 +16,25 @@ from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.segments import Commands
 
 Floats = npt.NDArray[np.floating[Any]]
-_WINDOW = 21  # blocks
-_FEWEST = 500  # blocks of a piece
-_FEWEST_STILL = 100  # of an acceleration: better short than with what a vibration leaves in it
-_SLOW_SHARE = 3e-4  # of the static friction: 5 mN on the paper's rig, the drift of a strain gauge within 10 s
-_SLOW_WAVES = 6
-_POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks
+_WINDOW = 21  # blocks of the mean that is taken off. Too small: noise is lost; too large: motion counts as noise
+_FEWEST = 500  # blocks of a piece; a shorter piece would repeat too often within a run
+_FEWEST_STILL = 100  # blocks of a piece of acceleration: a short one is better than one with remains of a vibration
+# Drift of the force sensor in a replicate, as a share of the static friction: 5 mN on the paper's rig, the drift of a strain
+# gauge within 10 s. Too small: a good sensor's drift is a gap; too large: small effects on the level of the force are hidden.
+_SLOW_SHARE = 3e-4
+_SLOW_WAVES = 6  # half waves over a run that the drift is made of
+_POSITION_WINDOW, _FORCE_WINDOW = 41, 5  # blocks of the cubic that is taken off, with a force drive
 
 
 class Noise(NamedTuple):
-    """By signal: pieces of measured noise; and what an accelerometer shakes by without being shaken."""
+    """The noise of one run."""
 
-    pieces: dict[str, Floats]
-    shake_mps2: dict[str, float]
-    slow_force_N: float
+    pieces: dict[str, Floats]  # by signal: a stretch of measured noise, [blocks of the piece]
+    shake_mps2: dict[str, float]  # by shake signal: what an accelerometer shows without a vibration
+    slow_force_N: float  # size of the force sensor's drift
 
     def drawn(self, name: str, blocks: int, random: np.random.Generator) -> Floats:
-        """A stretch of noise, [blocks]."""
+        """A drawn stretch of noise of the signal `name`, [blocks], in the unit of the signal."""
         piece = self.pieces[name]
         offset = int(random.integers(len(piece)))
         result = np.tile(piece, blocks // len(piece) + 2)[offset : offset + blocks]
@@ -41,19 +43,19 @@ class Noise(NamedTuple):
             weights = random.normal(size=_SLOW_WAVES) * self.slow_force_N / np.sqrt(_SLOW_WAVES)
             slow = np.cos(np.outer(time, np.arange(1, _SLOW_WAVES + 1))) @ weights
             result = result + slow
-        elif name.endswith("accel_mps2"):  # what is slower than the piece is known in size, not in sign
+        elif name.endswith("accel_mps2"):  # the mean of the piece is noise slower than the piece: its sign is unknown
             result = result * (1.0 if random.random() < 0.5 else -1.0)
         return result
 
 
 def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
-    """The noise of a reduced run."""
+    """The noise of a reduced run; `signals` [blocks] each."""
     if commands.motion is not None:
         return _axis_noise(signals, scales)
     leading = signals.get("drive_force_N", signals.get("mass_accel_mps2"))
     assert leading is not None, "evidence without force and acceleration is refused when it is read"  # noqa: S101
     speed = np.abs(leading - uniform_filter1d(leading, _WINDOW))
-    # a slip stands far above the noise; keep three half periods away from it
+    # a slip is far above the noise; blocks within three slip durations of it are left out
     busy = speed > 6.0 * np.median(speed)
     reach = max(int(3.0 * scales.slip_s * 1e3), _WINDOW)
     quiet = np.logical_not(np.asarray(maximum_filter1d(busy, 2 * reach + 1)))
@@ -61,7 +63,7 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
         quiet = speed <= np.quantile(speed, 0.3)
     pieces: dict[str, Floats] = {}
     shake: dict[str, float] = {}
-    quiet[:_WINDOW] = quiet[-_WINDOW:] = False  # at the ends the mean is one-sided: a ramp would leave spikes
+    quiet[:_WINDOW] = quiet[-_WINDOW:] = False  # at the ends the mean is one-sided, and a ramp would leave spikes
     still = quiet & (commands.frequency_Hz == 0.0)
     for name, values in signals.items():
         if name.endswith("shake_mps2"):
@@ -78,15 +80,15 @@ def noise_of(signals: Signals, commands: Commands, scales: Scales) -> Noise:
 
 
 def _axis_noise(signals: Signals, scales: Scales) -> Noise:
-    """With a force drive the slide hardly ever rests: what a cubic leaves, without the ends and the reversals.
+    """Noise with a force drive, where the slide hardly ever rests: the remainder of a cubic, without ends and reversals.
 
-    Of the position, what the measured force does not explain, 12 Hz and above: mains hum is to stay in it. Of the force, which
-    is an input and moves as it likes, the fastest part only; what it lacks does not move the mass.
+    Of the position it is the part that the measured force does not explain, 12 Hz and above, so mains hum stays in. The force is
+    an input and may move in any way, so only its fastest part is noise; the noise that this misses does not move the mass.
     """
     pieces: dict[str, Floats] = {}
     for name, values in signals.items():
         window = _FORCE_WINDOW if name == "drive_force_N" else _POSITION_WINDOW
-        # of white noise the cubic takes the weight of the value itself
+        # the cubic follows white noise by the weight of the middle sample; this restores the size of the remainder
         scale = (1.0 - float(np.asarray(savgol_coeffs(window, 3))[window // 2])) ** -0.5
         rest = scale * (values - np.asarray(savgol_filter(values, window, 3)))
         size = uniform_filter1d(np.abs(rest), _POSITION_WINDOW)

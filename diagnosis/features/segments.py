@@ -1,8 +1,8 @@
-"""What the rig was told: drive and vibration on the 1 ms grid, and the segments in which neither changes.
+"""The commands of a run: drive and vibration on the 1 ms grid, and the segments in which neither changes.
 
-The drive is taken as even between changes of speed: an uneven drive is a gap, not an input. Where the manifest gives no
-velocity, it is read from the drive position as pieces of constant velocity. Where a drive takes its time from one to the next,
-it goes as it was measured.
+The drive counts as even between changes of speed: an uneven drive is a gap, not an input. Where the manifest gives no velocity,
+the velocity is read from the drive position, as pieces of constant velocity. Where the drive takes time to change its speed, the
+command follows the measured position.
 """
 
 from itertools import pairwise
@@ -18,60 +18,73 @@ from diagnosis.features.axis_motion import Motion, motion_of
 from diagnosis.features.grid import BLOCK_S
 
 Floats = npt.NDArray[np.floating[Any]]
-_WINDOW = 100  # blocks: 0.1 s, over which a velocity is read from a position with noise
-# A change of speed is one when it is larger than this share of the faster speed; a ripple of a screw stays below.
+# Blocks (0.1 s) over which a velocity is read from a position. Too small: noise; too large: changes of speed are smeared.
+_WINDOW = 100
+# Smallest change of speed, as a share of the faster speed. Too small: the ripple of a screw splits segments.
+# Too large: two speeds count as one.
 _SMALLEST_CHANGE = 0.35
-SHORTEST_S = 0.3
-_SHORTEST_WINDOWS = 3
-_SLOWEST = 0.01  # of the fastest speed of the run: less is a stop, whose slope is the sensor's noise
-_STILL_M = 1e-9  # and a drive that moves by less in all, or by less than its noise, stands: the rest is rounding
-# What a window may be off the velocity of its piece, of the change that the piece begins or ends with
+SHORTEST_S = 0.3  # of a segment; shorter stretches of constant command are not compared
+_SHORTEST_WINDOWS = 3  # of a piece of constant velocity; with fewer windows a ripple counts as a change
+_SLOWEST = 0.01  # share of the run's fastest speed below which a drive stands: its slope is the sensor's noise
+_STILL_M = 1e-9  # travel of a whole run below which a drive stands (or its noise, if larger): the rest is rounding
+# Deviation of a window from the velocity of its piece, as a share of the change of speed, up to which the drive has arrived.
+# Too small: noise and ripple count as a drive under way. Too large: the end of a ramp counts as constant speed.
 _ON_THE_WAY = 0.1
-_QUICK = 2  # windows that are off for a change that is taken as a step: the settling covers half of it
-_LONGEST_RAMP = 20  # windows
-_RATE_WINDOW = 41  # blocks that a velocity is read from on the way: noise of 1 um is 13 um/s
-# Blocks after a change of command, or the start of a run: 0.1 s, in which a drive or a piezo may still get there. A drive
-# that took 50 ms to 0.17 mm/s left the force 0.05 N lower for all of a slow climb, 8 floors.
+_QUICK = 2  # windows up to which a change of speed counts as a step; `_SETTLING` covers half of them
+_LONGEST_RAMP = 20  # windows up to which a rise of speed counts as a change; a longer rise is a piece with a gap
+_RATE_WINDOW = 41  # blocks over which the velocity of a change is read: 1 um of noise gives 13 um/s
+# Blocks (0.1 s) left out after a change of command and at the start of a run, while drive and piezo settle.
+# Too small: the settling shows as a gap; too large: short segments lose their slips. Counted: docs/method/features.md.
 _SETTLING = 100
 
 
 class Segment(NamedTuple):
-    """Blocks [first, last) of constant drive and vibration."""
+    """Blocks [first, last) of constant drive and vibration.
+
+    What is compared in a segment follows from the measured slips, so it is the same for every model.
+    """
 
     first: int
     last: int
     drive_velocity_mps: float  # 0 with a force drive
     frequency_Hz: float
     amplitude_m: float
-    slips: int = 0  # as measured: what is compared there must not depend on what a model does
-    sticks: bool = False  # whole ones between two slips, as measured
-    still: bool = False  # even sliding as measured
+    slips: int = 0  # measured slips
+    sticks: bool = False  # at least one whole stick between two slips was measured
+    still: bool = False  # even sliding was measured
 
     @property
     def at_the_edge(self) -> bool:
-        """Whether v_a is within a tenth of v_d, where stick-slip is about to end and every detail decides."""
+        """Whether v_a is within a tenth of v_d: there stick-slip is about to end, and any detail decides whether it does."""
         v_a = 2.0 * np.pi * self.frequency_Hz * self.amplitude_m
         return abs(v_a - abs(self.drive_velocity_mps)) < 0.1 * abs(self.drive_velocity_mps)
 
     @property
     def sign(self) -> float:
-        """Direction of the drive."""
+        """Direction of the drive, 1.0 or -1.0."""
         return -1.0 if self.drive_velocity_mps < 0.0 else 1.0
 
 
 class Commands(NamedTuple):
-    """One value a block, and the segments in time order."""
+    """The commands of a run, [blocks] each, and its segments in time order."""
 
     drive: Floats  # velocity [m/s], or force [N] with a force drive
     frequency_Hz: Floats
     amplitude_m: Floats
     segments: tuple[Segment, ...]
-    motion: Motion | None = None  # of the slide, with a force drive
-    changing_s: float = 0.0  # in which nothing stays the same for long enough to be a segment, in all
+    motion: Motion | None = None  # measured motion of the slide, with a force drive only
+    changing_s: float = 0.0  # sum of the stretches that are too short to be a segment
 
 
 def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands:
-    """The commands of a run, from its columns and the velocity that the manifest states."""
+    """The commands of a run, from its columns and the velocity that the manifest states.
+
+    Args:
+        run: the columns as measured.
+        rig: as described.
+        reduced: signals of the run on the 1 ms grid, [blocks] each.
+
+    """
     blocks = len(next(iter(reduced.values())))
     t_s = run.t_s[0] + (np.arange(blocks) + 0.5) * BLOCK_S
     frequency_Hz, amplitude_m = np.zeros(blocks), np.zeros(blocks)
@@ -106,7 +119,7 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
 
 
 def _stated(velocity_mps: float, blocks: int, position_m: Floats | None) -> Floats:
-    """The stated velocity a block, but where the drive starts and stops as it was measured."""
+    """The stated velocity [blocks]; the measured velocity while the drive starts and stops."""
     drive = np.full(blocks, velocity_mps)
     if position_m is not None:
         measured = _pieces(position_m)
@@ -118,7 +131,7 @@ def _stated(velocity_mps: float, blocks: int, position_m: Floats | None) -> Floa
 
 
 def _pieces(position_m: Floats) -> Floats:
-    """Velocity [m/s] a block: constant between changes of speed, and as measured where one takes its time."""
+    """Velocity [m/s] of each block: constant between changes of speed; as measured during a slow change."""
     blocks = len(position_m)
     if blocks < 4 * _WINDOW:
         return np.full(blocks, _slope(position_m))
@@ -135,7 +148,7 @@ def _pieces(position_m: Floats) -> Floats:
     done, lines = 0, list[tuple[float, float]]()
     for number, (first, last) in enumerate(pieces):
         before, own, after = speeds[number : number + 3]
-        # the outer windows of a piece may hold the change itself
+        # the outer windows of a piece may hold the change of speed
         begin = first + max(_off(velocity[first:last], own, before, first == 0), int(first > 0))
         end = last - max(_off(velocity[first:last][::-1], own, after, last == windows), int(last < windows))
         inner = slice(begin * _WINDOW, end * _WINDOW if end < windows else blocks)
@@ -155,9 +168,9 @@ def _pieces(position_m: Floats) -> Floats:
 
 
 def _off(velocity: Floats, own: float, other: float, at_the_end: bool) -> int:
-    """Windows from the first one on in which a piece is not at its velocity yet.
+    """Number of windows, from the first, in which a piece has not reached its velocity `own`; `other` is the neighbour's.
 
-    At an end of the run, where nothing says what was before, a drive that starts or stops is below half of it.
+    At an end of the run no neighbour is known; there a drive that starts or stops is below half of its velocity.
     """
     if at_the_end and own * velocity[0] >= 0.5 * own * own:
         return 0
@@ -167,7 +180,7 @@ def _off(velocity: Floats, own: float, other: float, at_the_end: bool) -> int:
 
 
 def _is_ramp(velocity: Floats) -> bool:
-    """Whether a piece is a change of speed itself."""
+    """Whether a piece is one long change of speed."""
     if len(velocity) > _LONGEST_RAMP:
         return False
     time = np.linspace(-0.5, 0.5, len(velocity))
@@ -179,7 +192,7 @@ def _is_ramp(velocity: Floats) -> bool:
 
 
 def _changes(velocity: Floats, first: int, last: int, fastest: float) -> list[int]:
-    """Binary segmentation: windows at which the mean velocity changes for good."""
+    """Windows in [first, last) at which the mean velocity changes, by binary segmentation."""
     shortest = _SHORTEST_WINDOWS
     if last - first < 2 * shortest:
         return []
@@ -194,7 +207,7 @@ def _changes(velocity: Floats, first: int, last: int, fastest: float) -> list[in
         return []
     left = float(np.median(velocity[first:best]))
     right = float(np.median(velocity[best:last]))
-    # a window on the change itself spoils neither median; a stop counts against the fastest speed of the run
+    # a window that holds the change spoils neither median; a stop is compared with the fastest speed of the run
     if abs(left - right) < max(_SMALLEST_CHANGE * max(abs(left), abs(right)), _SLOWEST * fastest):
         return []
     return [*_changes(velocity, first, best, fastest), best, *_changes(velocity, best, last, fastest)]

@@ -1,4 +1,4 @@
-"""Slips of a run, found in its force, and the force's shape around them."""
+"""The slips of a segment, found in the force, or in the acceleration where no force was measured."""
 
 import math
 from typing import Any, NamedTuple
@@ -14,33 +14,39 @@ from diagnosis.features.segments import Segment
 
 Floats = npt.NDArray[np.floating[Any]]
 
-# instants of a slip at which its shape is read, in half periods of the mass on its spring after the middle of the fall
+# instants at which the shape of a slip is read, in slip durations (half periods of the mass on its spring) after mid-fall
 SHAPE_AT = np.array([-1.5, -1.0, -0.75, -0.5, -0.35, -0.2, 0.0, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0])
-_ENOUGH_SLIPS = 0.5  # sum of their weights
-_LEVEL = 0.15  # of the static friction: sliding under a friction wave changes by less
-_TAPER = 0.12  # of a segment, from its ends, over which slips come to count in full
+# Sum of the weights of its slips from which a segment slips. Too small: a slip at the edge of a segment decides what is
+# compared. Too large: short segments are not compared.
+_ENOUGH_SLIPS = 0.5
+# Change of the force over the second half of a segment, as a share of the static friction, up to which the slide slides evenly.
+# Too small: a friction wave counts as a climb. Too large: a first climb counts as sliding.
+_LEVEL = 0.15
+# Share of a segment, from either end, over which the weight of a slip grows from 0 to 1.
+# Too small: features jump when a slip enters the segment. Too large: slips are wasted.
+_TAPER = 0.12
 
 
 class Slips(NamedTuple):
-    """The slips of a segment: blocks of breakaway and re-stick, where half of the fall is done, and how much each counts.
+    """The slips of a segment, [slips] each, in blocks from the start of the segment.
 
-    A slip counts less towards the ends of its segment and nothing at them: one that comes in or goes out as a parameter
-    moves must not make the features jump, or no fit finds its way.
+    The weight of a slip falls to 0 towards the ends of its segment. A slip that enters or leaves the segment as a parameter
+    changes then does not make the features jump, and a fit can follow their slope.
     """
 
-    tops: npt.NDArray[np.int64]
-    bottoms: npt.NDArray[np.int64]
-    middles: Floats
-    weights: Floats
+    tops: npt.NDArray[np.int64]  # breakaways
+    bottoms: npt.NDArray[np.int64]  # re-sticks
+    middles: Floats  # instants at which half of the fall is done
+    weights: Floats  # 0 to 1
 
     @property
     def some(self) -> bool:
-        """Whether there is enough of a slip to speak of."""
+        """Whether the slips have enough weight to be compared."""
         return float(self.weights.sum()) > 0.1
 
 
 def slip_pairs(slips: Slips) -> Floats:
-    """How much each stick between two slips counts."""
+    """Weight of each stick between two slips, [slips - 1]."""
     return np.minimum(slips.weights[:-1], slips.weights[1:])
 
 
@@ -48,10 +54,11 @@ NO_SLIPS = Slips(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), np.z
 
 
 def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
-    """A segment without what its start decides, and with what it shows: slips, even sliding, or neither, as in a first climb.
+    """A segment cut to the part that its start does not decide, marked with slips, even sliding, or neither (a first climb).
 
-    With three slips or more it begins in the second stick: how loaded the spring was and how old the contact is past then. A
-    single slip at an end or a climb that just does not slip would come and go with every parameter: nothing is read from them.
+    With three slips or more the segment begins in the second stick, where the load of the spring and the age of the contact
+    before the segment no longer matter. A single slip near an end, or a climb that just does not slip, would come and go with
+    every parameter; nothing is read from either.
     """
     cut = {name: segment.sign * values[segment.first : segment.last] for name, values in signals.items()}
     slips = find_slips(cut, scales)
@@ -68,7 +75,7 @@ def settled(signals: Signals, segment: Segment, scales: Scales) -> Segment:
 
 
 def _climbs(force_N: Floats, scales: Scales) -> bool:
-    """Or falls: its second half, over fiftieths of a segment, is not level."""
+    """Whether the force [blocks] of a segment rises or falls in the second half, smoothed over fiftieths of the segment."""
     half = force_N[len(force_N) // 2 :]
     width = max(len(force_N) // 50, 1)
     level_N = half[: len(half) // width * width].reshape(-1, width).mean(axis=1)
@@ -76,18 +83,25 @@ def _climbs(force_N: Floats, scales: Scales) -> bool:
 
 
 def find_slips(cut: Signals, scales: Scales) -> Slips:
-    """The slips of a segment whose signals are cut out and turned into the direction of the drive."""
+    """The slips of a segment.
+
+    Args:
+        cut: signals of the segment, [blocks] each, with positive values in the direction of the drive.
+        scales: of the rig.
+
+    """
     if "drive_force_N" in cut:
         falling = cut["drive_force_N"]
         tops, bottoms = turning_points(falling, scales.drop_N)
     else:
-        # no force: the slide's velocity, an integral that leaks over two slips, rises and falls once a slip
+        # Without a force: the velocity of the slide (the acceleration integrated with a leak over two slip durations) rises
+        # and falls once a slip.
         keep = math.exp(-BLOCK_S / (2.0 * scales.slip_s))
         falling = -np.asarray(lfilter([BLOCK_S], [1.0, -keep], cut["mass_accel_mps2"]))
         swing_mps = scales.drop_N * math.pi / (scales.stiffness_N_per_m * scales.slip_s)  # over sqrt(stiffness x mass)
         tops, bottoms = turning_points(falling, max(0.3 * float(np.ptp(falling)), swing_mps))
     tops = tops[: len(bottoms)]
-    # what takes ten times as long as a slip is a change of level
+    # a fall that takes ten times as long as a slip is a change of level
     quick = (bottoms - tops) * BLOCK_S < 10.0 * scales.slip_s
     tops, bottoms = tops[quick], bottoms[quick]
     middles = half_fallen(falling, tops, bottoms)

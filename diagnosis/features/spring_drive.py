@@ -1,9 +1,8 @@
-"""What a run looks like, in numbers that do not depend on when its slips happen.
+"""Features of a run with a spring drive; none depends on the instants of the slips.
 
-Everything is taken per segment of constant command: means and trends over the cycles, shapes aligned at the middle of a
-slip, the level over time where nothing slips, the vibration that arrives; and per run the parity relations between channels
-that need no friction model. A measured and a predicted run pass through the same code; a feature that one of them does not
-have is NaN.
+Features of a segment of constant command: means and trends over the cycles, shapes aligned at the middle of a slip, the level
+over time where nothing slips, the vibration that arrives. Features of a run: relations between channels that need no friction
+model. A measured and a predicted run pass through the same code; a feature that a run does not have is NaN.
 """
 
 import math
@@ -23,12 +22,19 @@ from diagnosis.features.spring_law import spring_bend, spring_law
 
 Floats = npt.NDArray[np.floating[Any]]
 
-_LEVELS = 8  # bins of a segment without slips
-_BREAKAWAY_WAVES = 5
+_LEVELS = 8  # bins over a segment without slips
+_BREAKAWAY_WAVES = 5  # half waves of the breakaway force over a segment; more follow shorter friction waves and noise
 
 
 def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Features:
-    """All features of a run with a spring drive; which ones, depends on commands and channels only."""
+    """All features of a run with a spring drive; commands and channels alone decide which features there are.
+
+    Args:
+        signals: [blocks] each, measured or predicted, from `without_vibration`.
+        commands: of the run, with settled segments.
+        scales: of the rig.
+
+    """
     found = Features()
     for number, segment in enumerate(commands.segments):
         own = slice(segment.first, segment.last)
@@ -79,7 +85,10 @@ def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, segment
 
 
 def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple[list[float], float]:
-    """Mean and cosine waves over the segment, and the power of what is left; NaN where there are too few slips."""
+    """Mean and `carried` cosine waves of `values` [slips] over the segment, and the mean square of the remainder.
+
+    NaN where there are too few slips.
+    """
     total = float(weights.sum())
     moments = [math.nan] * (carried + 1)
     if total <= 0.1:
@@ -106,10 +115,10 @@ def _period(found: Features, number: int, slips: Slips, segment: Segment) -> Non
 
 
 def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment) -> None:
-    """Levels over whole cycles, as much as their slips count; over the segment where nothing slips.
+    """Add levels of the force: over whole cycles, weighted as their slips are; over the segment where nothing slips.
 
-    A jump at the start of a segment, as a late force makes it, is a slip of no weight. Counted as one it moved a mean level by
-    six floors, and a slow sensor was named.
+    A jump of the force at the start of a segment, as a late force sensor makes it, looks like a slip. It has weight 0, and its
+    cycle must not count in the level (docs/method/features.md).
     """
     name = "drive_force_N"
     still = segment.still and not segment.at_the_edge
@@ -147,7 +156,7 @@ _SHAPES = tuple((f"shape {instant:g}", _regime(instant)) for instant in SHAPE_AT
 
 def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Scales, frequency_Hz: float) -> None:
     width = scales.slip_s / BLOCK_S
-    shaken = frequency_Hz > 0.0  # a vibration that the sampling folds down would pass for a ring
+    shaken = frequency_Hz > 0.0  # a vibration that the sampling folds to low frequencies would pass for a ring
     names = [name for name in ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m") if name in cut]
     if not names:
         return
@@ -185,7 +194,7 @@ def _vibration(found: Features, number: int, cut: Signals) -> None:
         found.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
         if source == "base_accel_mps2":
             time = np.linspace(-1.0, 1.0, len(shake))
-            shaken = mean > 0.0  # a sensor that went dead, or an amplifier that tripped, shows nothing to divide by
+            shaken = mean > 0.0  # a dead sensor or a tripped amplifier shows 0, and 0 cannot divide
             over_time = float(shake @ time) / (mean * len(shake) / 3.0) if shaken else math.nan
             found.add("vibration over time", source, "steady", HIGH, number, over_time)
             if "drive_force_N" in cut:
@@ -195,7 +204,7 @@ def _vibration(found: Features, number: int, cut: Signals) -> None:
 
 
 def _parity(found: Features, signals: Signals, commands: Commands, scales: Scales) -> None:
-    """Relations of a run that hold whatever the friction is."""
+    """Add the relations between channels of a run that hold for any friction."""
     if not {"drive_force_N", "mass_position_m", "drive_position_m"} <= signals.keys():
         return
     force_N, extension_m = signals["drive_force_N"], signals["drive_position_m"] - signals["mass_position_m"]
@@ -206,7 +215,7 @@ def _parity(found: Features, signals: Signals, commands: Commands, scales: Scale
 
 
 def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
-    """Waves of what the drive position does besides its even path."""
+    """Add waves and power of the drive position's deviation from a line and a bow in each segment."""
     rest_m = np.zeros_like(position_m)
     for segment in commands.segments:
         rows = slice(segment.first, segment.last)
@@ -227,7 +236,7 @@ def _without_line(position_m: Floats, segment: Segment) -> Floats:
 
 @lru_cache(maxsize=64)
 def _line_and_bow(blocks: int) -> tuple[tuple[Floats, float], ...]:
-    """A line, a sensor's zero and the speed, and a bow, its linearity: [blocks], and the square of each."""
+    """A line (zero of the sensor, and speed) and a bow (linearity of the sensor): [blocks] each, with its sum of squares."""
     line = np.linspace(-1.0, 1.0, blocks)
     bow = line * line - 1.0 / 3.0
     return (line, float(line @ line)), (bow, float(bow @ bow))

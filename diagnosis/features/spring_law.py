@@ -1,4 +1,4 @@
-"""How the force follows the extension of the spring: a massless, linear one that is measured at once pulls k e, and no more."""
+"""How the force follows the extension e of the spring: a massless linear spring, measured without delay, pulls with k e."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,21 +12,24 @@ from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
 
 Floats = npt.NDArray[np.floating[Any]]
-_ROUND_ENTRY = 10  # blocks: longer than the delays of a measuring chain
-# In slips: short against one, as the noise of displacement sensors grows with the square of frequency, and long, as a sensor's
-# bow changes the stiffness along the track. Without the second the bends of 60 rigs without a gap were up to 1.6 ms2 k.
+_ROUND_ENTRY = 10  # blocks left out around the start of a segment: longer than the delays of a measuring chain
+# Moving means, in slip durations, between which the bend is read. Shorter short mean: noise of the displacement sensors, which
+# grows with the square of frequency; longer: it smears the slip. Longer long mean: a sensor's bow passes for a bend; shorter: the
+# slip is removed. Counted on 60 rigs without a gap (docs/method/features.md).
 _SHORT, _LONG = 0.25, 8.0
 
 
 def spring_law(
     force_N: Floats, extension_m: Floats, segments: Sequence[Segment], scale_N: float, stiffness_N_per_m: float
 ) -> dict[str, float]:
-    """Force against extension, its rate, its cube, time and direction, one after the other, and the power of the rest.
+    """Part of the force [N] that follows the extension, its rate, its cube, time and direction; and the rest's mean square.
+
+    The parts are taken one after the other, by name: stiffness, rate, cube, time, direction (NaN without both), rest.
 
     Args:
         force_N, extension_m: [blocks] each.
         segments: of the run.
-        scale_N, stiffness_N_per_m: typical force and stiffness, by which the columns are sized.
+        scale_N, stiffness_N_per_m: typical force and stiffness, which size the columns.
 
     """
     even = _even(segments, len(force_N), _ROUND_ENTRY)
@@ -38,7 +41,7 @@ def spring_law(
     columns = {
         "stiffness": reaches,
         "rate": rate_mps * 1e3,
-        "cube": reaches * reaches * reaches,  # a power takes as long as all the rest of this
+        "cube": reaches * reaches * reaches,  # a power would take as long as the rest of this function
         "time": np.linspace(-1.0, 1.0, len(even))[even],
     }
     if both:
@@ -49,10 +52,11 @@ def spring_law(
 
 
 def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment], slip_s: float) -> float:
-    """The force [N] that goes with the second derivative of the extension [m/s2] where slips are fast.
+    """The force [N] for each m/s2 of the extension's second derivative, read where slips are fast.
 
-    A force that comes T later is F - T F' + T^2 F'' / 2, one behind n equal low-passes that take as long has (n + 1) / 2 n in
-    place of the half, and a frame that swings bends it without making it late: so the bend tells them apart.
+    A force that is late by T is F - T F' + T^2 F'' / 2. Behind n equal low-passes with the same total delay, the factor of
+    T^2 F'' is (n + 1) / (2 n) instead of 1/2. A swinging frame bends the force without making it late. So the bend tells a delay,
+    a low-pass and a frame apart.
     """
     short, long = (max(round(slips * slip_s / BLOCK_S), 1) for slips in (_SHORT, _LONG))
     level_m = uniform_filter1d(extension_m, short)
@@ -71,7 +75,7 @@ def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment
 
 
 def _even(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[np.bool_]:
-    """All blocks [blocks] but those so near to the start of a segment, where the model jumps to the measured force."""
+    """Marks [blocks] all blocks but those within `about` of the start of a segment, where the model takes the measured force."""
     even = np.ones(blocks, np.bool_)
     for segment in segments:
         if segment.still or segment.slips > 0:
@@ -80,9 +84,9 @@ def _even(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[n
 
 
 def _one_after_the_other(columns: Mapping[str, Floats], force_N: Floats) -> tuple[dict[str, float], float]:
-    """What of a force [blocks] goes with each column, freed of those before it, and the square of what is left.
+    """Coefficient of the force [blocks] on each column, each freed of the columns before it; and the rest's sum of squares.
 
-    All at once they would pass noise on to each other.
+    A fit of all columns at once would pass the noise of one to the other.
     """
     centred = np.array([*columns.values(), force_N])
     centred -= centred.mean(axis=1, keepdims=True)
