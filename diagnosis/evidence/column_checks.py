@@ -1,4 +1,4 @@
-"""Which samples and columns of a run can be used, and what is wrong with the others."""
+"""Which samples and columns of a run can be used, and a finding for each that cannot."""
 
 import math
 from collections.abc import Callable
@@ -17,27 +17,28 @@ Columns = dict[str, Floats]
 Clipped = dict[str, tuple[float, float]]
 Note = Callable[[str, str, str], None]  # kind, column, text
 
+# Limits of this file: beyond a limit a finding is made or the run is refused. A stricter limit refuses good files; a looser one
+# lets a damaged file or a wrong unit pass for a gap of the rig.
 _FEWEST_ROWS = 16
-# more bad rows than this, and the file is not what it says it is
-_LARGEST_BAD_SHARE = 0.1
-_LARGEST_WILD_SHARE = 1e-3  # of samples that no rig shows: a loose contact, or a value that stands for none
+_LARGEST_BAD_SHARE = 0.1  # of rows that cannot be used; with more, the file is refused
+_LARGEST_WILD_SHARE = 1e-3  # of samples that no rig can show: a loose contact, or a number that means "no value"
 _SENSORS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m")
 _COMMANDED = ("vibration_frequency_Hz", "vibration_amplitude_m")
-_GAP_STEPS = 10.0  # times the usual step
-# A pause that is longer, or gaps that take a larger share of a run, hide slips that the model would go on to make
+_GAP_STEPS = 10.0  # times the median step between samples from which a step is a gap
+# Longest gap, and largest share of gaps in a run. In a longer gap the rig slips unseen, and the model goes on slipping.
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
-_VELOCITY_TOLERANCE = 0.1  # of the stated drive velocity against the drive position's slope
-_ANOTHER = 3.0  # times as fast, or as slow, or the other way: another drive than the one stated
-_FURTHEST = 10.0  # times what the stated velocity comes to: mm in place of m are a thousand times
-_LEAST_TRAVEL = 0.002  # of the way to the first slip; the noise of a drive at rest is less
-_FASTEST = 300.0  # times the Stribeck velocity: mm/s in place of m/s are a thousand times
-_ANOTHER_UNIT = 5.0  # times: an acceleration in g is off by 9.8, a stiffness in N/mm by 1000
-_STRIDE_S = 0.1
+_VELOCITY_TOLERANCE = 0.1  # relative difference of the stated drive velocity and the drive position's slope
+_ANOTHER = 3.0  # factor between the two (or another sign) from which the stated velocity is that of another run
+_FURTHEST = 10.0  # times the way of the drive that a position may travel; mm in place of m are a factor of 1000
+_LEAST_TRAVEL = 0.002  # of the way to the first slip that a drive must move; the noise of a drive at rest is less
+_FASTEST = 300.0  # times the Stribeck velocity; mm/s in place of m/s are a factor of 1000
+_ANOTHER_UNIT = 5.0  # factor from which a unit is wrong: an acceleration in g is off by 9.8, N/mm by 1000
+_STRIDE_S = 0.1  # seconds between the positions whose distances add up to a way; with shorter strides noise adds up
 _FEWEST_IN_A_SLIP = 3.0  # samples
 _SHORTEST_S = 1.0  # of a run
-_QUICKEST_S = 2e-6  # between samples: 500 kHz
-_SLOWEST_S = 0.05  # between samples, where nothing slips: with a force drive
-# Largest values that can be right; a factor of 1000, as between mm and m, shows in at least one of them on a bench rig.
+_QUICKEST_S = 2e-6  # between samples (500 kHz); a shorter step means that time is not in seconds
+_SLOWEST_S = 0.05  # between samples, with a force drive
+# Largest values that can be right, SI units. A factor of 1000, as between mm and m, exceeds one of them on a bench rig.
 _LARGEST = {
     "mass_accel_mps2": 1e5,
     "base_accel_mps2": 1e5,
@@ -46,12 +47,15 @@ _LARGEST = {
     "vibration_frequency_Hz": 1e6,
     "vibration_amplitude_m": 1e-3,  # piezo stacks move by a tenth of a millimetre
 }
-# a force sensor that never shows 1/300 of the friction, or shows 300 times that, measures in another unit
+# a force sensor that never shows 1/300 of the static friction, or shows 300 times the static friction, has another unit
 _FORCE_FACTOR = 300.0
 
 
 def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, Clipped, list[Finding]]:
-    """Usable columns, the limits where they are clipped, and the findings. Raises Fault BAD_EVIDENCE when no time is left."""
+    """Usable columns of a run [samples], the limits of clipped columns in their unit, and the findings.
+
+    Raises Fault BAD_EVIDENCE when the run cannot be used: its time, length, rate, gaps, or a commanded column are wrong.
+    """
     findings: list[Finding] = []
     file = table.file
 
@@ -62,7 +66,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     usable = dict(columns)
     for name in list(usable):
         bad = ~np.isfinite(usable[name])
-        if name in _COMMANDED and bad.any():  # the model would run without it
+        if name in _COMMANDED and bad.any():  # the model would run without this vibration
             line = f"{file}: {name}: {bad.sum()} of {len(bad)} samples are no finite number, first row {np.argmax(bad) + 1}"
             raise Fault("BAD_EVIDENCE", f"{line}: must be one in every row; write 0 where the vibration is off")
         if name != "t_s" and bad.mean() > 0.5:
@@ -169,7 +173,10 @@ def _check_shape(columns: Columns, file: str) -> None:
 def _good_rows(
     columns: Columns, rig: RigTable, file: str, findings: list[Finding]
 ) -> tuple[Columns, npt.NDArray[np.int64]]:
-    """Only rows that are finite throughout, without a wild sample, and later than every row before, and which those are."""
+    """Rows that are finite, not wild, and later than every row before; and the indices of these rows.
+
+    Adds to `findings`. Raises Fault BAD_EVIDENCE when too few rows are left.
+    """
     t_s = columns["t_s"]
     rows = len(t_s)
     good = np.ones(rows, np.bool_)
@@ -182,7 +189,7 @@ def _good_rows(
             good[bad] = False
         limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else _LARGEST.get(name, math.inf)
         wild = np.flatnonzero(np.isfinite(values) & (np.abs(values) > limit))
-        # more of them, and it is the unit that is wrong
+        # with a larger share of wild samples the unit is wrong: `_wrong_unit` says so
         if not name.endswith("position_m") and 0 < len(wild) <= _LARGEST_WILD_SHARE * rows:
             at = int(wild[0])
             text = (
@@ -223,7 +230,7 @@ def _good_rows(
 
 
 def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
-    """Why the unit of a column cannot be right; empty when it can."""
+    """Reason why the unit of a column cannot be right; empty when it can."""
     size = float(np.abs(values).max())
     if name == "drive_force_N":
         static_N = rig.static_force_N
@@ -239,7 +246,7 @@ def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
 
 
 def _too_far(name: str, columns: Columns, rig: RigTable, table: RunTable) -> str:
-    """Why a position cannot be in metres where the drive's motion is known; empty when it can."""
+    """Reason why a position cannot be in metres, from the known motion of the drive; empty when it can."""
     if rig.drive_stiffness_N_per_m is None or not name.endswith("position_m"):
         return ""
     if table.drive_velocity_mps:
@@ -263,7 +270,7 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
         t_s, position_m = columns["t_s"], columns["drive_position_m"]
         travel_m = float(position_m[-1] - position_m[0])
         measured_mps = travel_m / float(t_s[-1] - t_s[0])
-        moved_mps = _way_m(t_s, position_m) / float(t_s[-1] - t_s[0])  # to and fro
+        moved_mps = _way_m(t_s, position_m) / float(t_s[-1] - t_s[0])  # both directions count as positive
         if stated_mps is not None:
             text = (
                 f"moves at {measured_mps:.4g} m/s on average, drive_velocity_mps says {stated_mps:.4g}: check units and time; "
@@ -285,13 +292,13 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
 
 
 def _way_m(t_s: Floats, position_m: Floats) -> float:
-    """The way of a position there and back, from one tenth of a second to the next: noise must not add up."""
+    """Length of the way of a position [samples], in steps of a tenth of a second, so that noise does not add up."""
     at = np.searchsorted(t_s, np.arange(t_s[0], t_s[-1], _STRIDE_S))
     return float(np.abs(np.diff(position_m[[*at, -1]])).sum())
 
 
 def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -> None:
-    """Note a drive that stands still, whose run fits nearly every rig."""
+    """Note a drive that stands still: such a run fits nearly every rig."""
     if rig.drive_stiffness_N_per_m is None:
         return
     if "drive_position_m" in columns:
@@ -308,7 +315,7 @@ def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -
 
 
 def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
-    """Drop a mass acceleration the wrong way round; note a drive stiffness in another unit."""
+    """Drop a mass acceleration with the wrong sign; note a drive stiffness in another unit."""
     described = rig.drive_stiffness_N_per_m
     told = told_stiffness_N_per_m(columns["t_s"], columns) if described else None
     if not described or told is None:
@@ -328,7 +335,7 @@ def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
 
 
 def _pulls_back(columns: Columns, table: RunTable, stiffness_N_per_m: float) -> bool:
-    """Whether the drive takes more work out of what it drags than a loaded spring can hold: friction gives none back."""
+    """Whether the drive gets more work back than a loaded spring can hold. Friction gives none back, so the sign is wrong."""
     force_N, t_s = columns["drive_force_N"], columns["t_s"]
     if "drive_position_m" in columns:
         work_J = float(force_N[1:] @ np.diff(columns["drive_position_m"]))

@@ -1,7 +1,7 @@
-"""Whether the base vibrates at other frequencies than the commanded one: an exciter that is no sine.
+"""Whether the base vibrates at other frequencies than the commanded one: an exciter whose motion is not a sine.
 
-Every model of the library shakes the base with a sine. The rest of the diagnosis compares how strongly it shakes, whatever the
-frequency: harmonics of the piezo passed for a resonance of it on two sealed sets (seeds 1995661 and 3736536).
+Every model of the library shakes the base with a sine. The rest of the diagnosis compares the rms of the shake over all
+frequencies, so without this check harmonics of the piezo pass for a resonance of the piezo (docs/method/evidence.md).
 """
 
 from collections.abc import Mapping
@@ -14,11 +14,12 @@ from bridge.units import percent
 from diagnosis.evidence.lock_in import BESIDE_HZ, WINDOW_S, Floats, LockIn
 
 DISTORTED = "distorted"  # kind of the finding
-_MULTIPLES = (0.5, 1.5, 2.0, 3.0)
-# Of the velocity, which decides where slips end: v_a / v_d of 1.00 fails and 1.05 passes. A piezo's hysteresis makes some per
-# cent; of 56 made rigs those with a rigid base show 0.1 % at most, harmonics of 2.1 detection limits and more 6 %.
+_MULTIPLES = (0.5, 1.5, 2.0, 3.0)  # of the commanded frequency, at which a line is looked for
+# Smallest line that is reported, as a share of the commanded line's velocity (velocity decides where slips end: v_a / v_d = 1.00
+# fails, 1.05 passes). Too small: the hysteresis of every piezo, some per cent, is reported. Too large: harmonics stay unseen.
+# Counted on 56 synthetic rigs (docs/method/evidence.md).
 _SHARE = 0.05
-_OF_BESIDE = 4.0  # times what is found beside: noise, and slips
+_OF_BESIDE = 4.0  # times the amplitude beside the line that the line must have; noise and slips are at both frequencies
 
 
 class Distortion(NamedTuple):
@@ -30,18 +31,18 @@ class Distortion(NamedTuple):
 
     @property
     def limits(self) -> float:
-        """How many times what is ordinary."""
+        """Share of the line, as a multiple of the smallest share that is reported."""
         return self.share / _SHARE
 
     @property
     def band_Hz(self) -> tuple[float, float]:
-        """Where it lies, to one line of a window."""
+        """Lowest and highest frequency of the line, as well as one window resolves it."""
         centre_Hz = self.multiple * self.commanded_Hz
         return centre_Hz - 1.0 / WINDOW_S, centre_Hz + 1.0 / WINDOW_S
 
     @property
     def text(self) -> str:
-        """The finding."""
+        """Text of the finding."""
         return (
             f"commanded to vibrate at {self.commanded_Hz:.0f} Hz, moves at {self.multiple * self.commanded_Hz:.0f} Hz as well, "
             f"with {percent(self.share)} of that velocity: an exciter driven too hard or loose, or a base that yields to friction"
@@ -49,10 +50,10 @@ class Distortion(NamedTuple):
 
 
 def distortion(t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> Distortion | None:
-    """The strongest multiple of the vibration in the base's acceleration; None where it is ordinary or cannot be known.
+    """The strongest multiple of the vibration in the base's acceleration; None where it is small or cannot be known.
 
-    The base's acceleration and the vibration's frequency and amplitude are needed in `columns`, [samples] as `t_s`. A multiple
-    above half the sampling rate is found where the sampling folds it to, unless a filter before it takes it away.
+    `columns` needs the base's acceleration and the vibration's frequency and amplitude, [samples] as `t_s`. A multiple above half
+    the sampling rate is found where the sampling folds it to, unless a filter removes it before.
     """
     needed = {"base_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}
     if not needed <= columns.keys():
@@ -76,6 +77,6 @@ def distortion(t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> 
 
 
 def _is_apart(line_Hz: float, commanded_Hz: float, rate_Hz: float) -> bool:
-    """Whether a line lies, folded down, away from rest and from the commanded one, and what is looked at beside it as well."""
+    """Whether a line, folded by the sampling, and the frequencies beside it are away from 0 Hz and from the commanded line."""
     folded_Hz = abs((line_Hz + 0.5 * rate_Hz) % rate_Hz - 0.5 * rate_Hz)
     return folded_Hz > 2.0 * BESIDE_HZ and abs(folded_Hz - commanded_Hz) > 2.0 * BESIDE_HZ

@@ -1,6 +1,6 @@
-"""An evidence folder read into memory: the rig as described, the runs as float64 arrays in SI units, and every doubt.
+"""An evidence folder read into memory: the rig as described, the runs as float64 arrays in SI units, and the findings.
 
-What cannot be used is left out and reported as a finding; where nothing usable remains, a Fault says so.
+Data that cannot be used is left out and reported as a finding. When nothing usable remains, a Fault is raised.
 """
 
 from collections.abc import Iterator
@@ -22,11 +22,13 @@ from diagnosis.evidence.manifest import MANIFEST, STANDARD, ChannelMap, Manifest
 from diagnosis.evidence.run_log import columns_of_log
 
 Floats = npt.NDArray[np.float64]
-_LACKING = "column"  # kind of finding: one that the channel map names is not in this file
+_LACKING = "column"  # kind of finding: the file lacks a column that the channel map names
 _NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "drive_stiffness_N_per_m")
-_ALIKE = 0.85  # of two names, by `difflib`: a letter or the case is another
-SHAKE_RATE_HZ = 8000.0  # a slower accelerometer has too few samples a millisecond to tell how strongly it vibrates
-# what each column tells that no other one does, by kind of drive
+# Similarity of two column names (`difflib`) from which one may be a misspelling of the other: one letter, or the case, differs.
+# Too small: unrelated columns are offered. Too large: misspellings stay unseen.
+_ALIKE = 0.85
+SHAKE_RATE_HZ = 8000.0  # lowest sampling rate at which the rms within 1 ms is compared; slower has too few samples
+# what is lost without a column, by kind of drive
 _COST_SPRING = {
     "drive_force_N": "slips are seen in the acceleration only, and no force level or drive stiffness can be judged",
     "mass_accel_mps2": "mass, normal-load fluctuation and the fast part of a slip are judged from the force alone",
@@ -41,22 +43,21 @@ _COST_FORCE = {
 
 
 class Run(NamedTuple):
-    """One run. Every column has the length of `t_s`, which increases, and is finite."""
+    """One measured run. Arrays are [samples], finite, SI units; `t_s` increases."""
 
     file: str
     t_s: Floats
     columns: dict[str, Floats]  # by standard name, without t_s; only the usable ones
-    clipped: dict[
-        str, tuple[float, float]
-    ]  # by standard name: limits that the sensor could not pass, infinite where none showed
-    drive_velocity_mps: float | None
-    holdout: bool
+    # by standard name: lowest and highest value that the sensor can show, infinite where the run does not reach it
+    clipped: dict[str, tuple[float, float]]
+    drive_velocity_mps: float | None  # as the manifest states
+    holdout: bool  # held out: not fitted, only predicted
     pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
     distortion: Distortion | None = None  # a base that vibrates at other frequencies than the commanded one
 
 
 class Evidence(NamedTuple):
-    """A whole folder."""
+    """A whole evidence folder; runs in the manifest's order."""
 
     folder: Path
     rig: RigTable
@@ -65,7 +66,10 @@ class Evidence(NamedTuple):
 
 
 def load_evidence(folder: Path) -> Evidence:
-    """Read and check an evidence folder. Raises Fault BAD_EVIDENCE: file, key or column, row, expectation, remedy."""
+    """Read and check an evidence folder. The last of several runs is held out when the manifest holds none out.
+
+    Raises Fault BAD_EVIDENCE: file, key or column, row, expectation, remedy.
+    """
     manifest = read_manifest(folder)
     runs: list[Run] = []
     findings = [
@@ -87,7 +91,7 @@ def load_evidence(folder: Path) -> Evidence:
         runs.append(run)
         findings += damaged + found
     if len(runs) > 1 and not any(run.holdout for run in runs):
-        # the last one, so that adding nothing but a run never changes an earlier choice silently
+        # the last run is held out, and the finding says so: a run that is added later moves the choice
         runs[-1] = runs[-1]._replace(holdout=True)
         text = "no run is marked holdout: this one is kept for judging; mark one to choose for yourself"
         findings.append(Finding("holdout", runs[-1].file, text))
@@ -95,7 +99,7 @@ def load_evidence(folder: Path) -> Evidence:
 
 
 def _refuse_misspelt(manifest: Manifest, findings: list[Finding]) -> None:
-    """A column that some runs lack is missing there; one that no run has is misspelt. Raises Fault BAD_EVIDENCE."""
+    """Raise Fault BAD_EVIDENCE for a mapped column that no run has: it is misspelt. A column that some runs lack is missing."""
     tables = sum(not table.file.endswith(".mcap") for table in manifest.run)
     for name in manifest.channels:
         lacking = [finding for finding in findings if finding.kind == _LACKING and finding.where.endswith(f": {name}")]
@@ -105,7 +109,10 @@ def _refuse_misspelt(manifest: Manifest, findings: list[Finding]) -> None:
 
 
 def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list[Finding]]:
-    """A run out of its raw columns, with what was found on the way. Raises Fault BAD_EVIDENCE."""
+    """A checked run from its raw columns ([samples], SI units), and the findings about it.
+
+    Raises Fault BAD_EVIDENCE when the run cannot be used, or lacks a column that this kind of drive needs.
+    """
     usable, clipped, findings = checked(columns, rig, table)
     reasons = "; ".join(f"{finding.where}: {finding.text}" for finding in findings if finding.kind != "clipped")
 
@@ -139,7 +146,7 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
 
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
-    """Kind, column and text of what cannot be known about the vibration."""
+    """Kind, column and text of each finding about the commanded vibration."""
     told = [name for name in ("vibration_frequency_Hz", "vibration_amplitude_m") if name in columns]
     if len(told) == 1:
         yield (
@@ -166,9 +173,9 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
 
 
 def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, list[Finding]]:
-    """The standard columns of a data file, mapped and in SI units, unchecked, and what it has besides, lacks or has lost.
+    """The standard columns of a data file, mapped and in SI units but not checked; and findings about missing columns and damage.
 
-    A run log has the standard columns; one of them that `channels` maps is scaled like any other. Raises Fault BAD_EVIDENCE.
+    A run log has the standard columns; a column that `channels` maps is scaled as in any other file. Raises Fault BAD_EVIDENCE.
     """
     try:
         if path.suffix == ".mcap":
@@ -194,7 +201,7 @@ def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, 
 
 
 def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
-    """Columns that are not used and have nearly the name of one that is not there."""
+    """A finding for each unused column whose name is nearly that of a missing standard column."""
     for name in STANDARD:
         near = [] if name in found else get_close_matches(name, table.columns.keys() - found.keys(), 1, _ALIKE)
         for other in near:
@@ -204,5 +211,5 @@ def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
 
 
 def _scaled(values: Floats, channel: ChannelMap | None, name: str) -> Floats:
-    """A column of a run log; a map that names another column is that of the folder's other files."""
+    """A scaled column of a run log; a channel map that names another column is meant for the other files of the folder."""
     return values if channel is None or channel.column != name else values * channel.scale + channel.offset

@@ -1,7 +1,6 @@
 """Whether the force signal holds a vibration that the spring cannot carry: the exciter's voltage in the sensor's cable.
 
-The rest of the diagnosis compares means over 1 ms, in which the vibration is gone: of the four such rigs of two sealed sets, 0.13
-to 0.45 N beside a spring that carries 0.03 to 0.07 mN (seeds 4742003 and 8156207), it saw none.
+The rest of the diagnosis compares means over 1 ms, in which a vibration is lost, and cannot see it (docs/method/evidence.md).
 """
 
 from collections.abc import Mapping
@@ -16,32 +15,34 @@ from diagnosis.evidence.manifest import RigTable
 
 Floats = npt.NDArray[np.floating[Any]]
 PICK_UP = "pick-up"  # kind of the finding
-_SHARE = 0.005  # of the static friction: what a surface's roughness counts as at most
-_OF_SPRING = 3.0  # times what the spring carries by the described numbers, which are not exact
-_OF_BESIDE = 4.0  # times what is found where nothing vibrates: noise, and slips where they are quick
+# A vibration of the force is reported above the largest of these three limits. Lower limits report ordinary rigs; higher limits
+# miss a pick-up.
+_SHARE = 0.005  # of the static friction: the most that the roughness of a surface makes
+_OF_SPRING = 3.0  # times the force that the spring carries by the described rig numbers, which are not exact
+_OF_BESIDE = 4.0  # times the amplitude at frequencies beside the commanded one: noise, and quick slips
 
 
 class PickUp(NamedTuple):
     """A vibration in the force signal of one run."""
 
-    frequency_Hz: float  # as commanded; of a sweep the median
+    frequency_Hz: float  # as commanded; the median of a sweep
     force_N: float  # amplitude, median over the windows
-    spring_N: float  # what the spring would carry
-    limit_N: float  # above which it is told
+    spring_N: float  # amplitude that the spring would carry
+    limit_N: float  # amplitude above which the vibration is reported
 
     @property
     def limits(self) -> float:
-        """How many times what is ordinary."""
+        """Amplitude, as a multiple of the smallest amplitude that is reported."""
         return self.force_N / self.limit_N
 
     @property
     def band_Hz(self) -> tuple[float, float]:
-        """Where it lies, to one line of a window."""
+        """Lowest and highest frequency of the vibration, as well as one window resolves it."""
         return self.frequency_Hz - 1.0 / WINDOW_S, self.frequency_Hz + 1.0 / WINDOW_S
 
     @property
     def text(self) -> str:
-        """The finding."""
+        """Text of the finding."""
         return (
             f"vibrates with {_rounded(self.force_N)} at {self.frequency_Hz:.0f} Hz, where the spring carries "
             f"{_rounded(self.spring_N)}: "
@@ -54,11 +55,11 @@ def _rounded(force_N: float) -> str:
 
 
 def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> PickUp | None:
-    """The vibration in the force signal of a run of a spring drive; None where it is ordinary or cannot be known.
+    """The vibration in the force signal of a run with a spring drive; None where it is small or cannot be known.
 
-    Force, mass acceleration and the vibration's frequency are needed in `columns`, [samples] as `t_s`. The median window of each
-    frequency counts: a slip is in few of them. Of several frequencies the one where it stands out most is told: a pick-up of a
-    voltage grows with the frequency.
+    `columns` needs force, mass acceleration, and the vibration's frequency and amplitude, [samples] as `t_s`. Each frequency
+    counts with its median window, as few windows hold a slip. Of several frequencies, the one that is farthest above its limit is
+    returned: a pick-up of a voltage grows with the frequency.
     """
     stiffness_N_per_m = rig.drive_stiffness_N_per_m
     needed = {"drive_force_N", "mass_accel_mps2", "vibration_frequency_Hz", "vibration_amplitude_m"}

@@ -1,4 +1,4 @@
-"""Measured data of other programs, with a channel map, into an evidence folder or a run log of this project."""
+"""Import of measured data of other programs, with a channel map, into an evidence folder or a run log of this project."""
 
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -34,14 +34,15 @@ from diagnosis.evidence.manifest_text import manifest_text
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
 _BLOCK_SAMPLES = 20
-_IRREGULAR_SHARE = 0.01  # of a step; below this, time is as regular as a DAQ's printed column
-# Presliding of metals is a fraction of a micrometre: the paper's steel pair reaches its static force after 0.22 um.
+_IRREGULAR_SHARE = 0.01  # of a step, up to which time counts as even: rounding of a printed column of a DAQ
+# Presliding length that is assumed when the map gives no contact stiffness: the paper's steel pair reaches its static force after
+# 0.22 um, and other metals after a fraction of a micrometre. Too small: a stiff contact, small steps; too large: soft sticks.
 _PRESLIDING_M = 0.22e-6
-_ASSUMED_TOLERANCE = 0.3  # of what follows from it: 3.3 of these reach from 0.11 to 2.2 um
+_ASSUMED_TOLERANCE = 0.3  # relative, of the numbers that follow from it: 3.3 standard deviations reach 0.11 to 2.2 um
 
 
 class SourceMap(Strict):
-    """How the file is written."""
+    """How the source file is written."""
 
     sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = None  # where no column holds the time
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] = ","
@@ -51,7 +52,7 @@ class SourceMap(Strict):
 
 
 class RunMap(Strict):
-    """What the manifest says of the run."""
+    """Keys of the run that go to the manifest."""
 
     drive_velocity_mps: DriveVelocity | None = None
     holdout: bool = False
@@ -76,10 +77,10 @@ class ImportMap(Strict):
 
 
 class Imported(NamedTuple):
-    """What was written."""
+    """The result of an import."""
 
-    out: Path
-    file: str  # data file or log
+    out: Path  # evidence folder or .mcap file
+    file: str  # name of the data file or log that was written
     rows: int
     columns: list[str]
     missing: list[str]  # standard columns that the source does not have
@@ -111,7 +112,7 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
 
 
 def _check_free(out: Path) -> None:
-    """Nothing is overwritten: it may be the measured file itself."""
+    """Raise Fault CONFIG when `out` exists: it may be the measured file itself."""
     if out.exists():
         raise Fault("CONFIG", f"{out}: is there already; nothing was written; choose another --out")
 
@@ -145,7 +146,7 @@ def _missing(columns: Columns) -> list[str]:
 
 
 def _rig(given: dict[str, Any], map_name: str) -> tuple[RigTable, list[str]]:
-    """The rig of the map; what its owner can hardly know is filled in. Returns the names of these too."""
+    """The rig of the map, with assumed values for numbers that an owner can hardly know; and the names of these numbers."""
     table = dict(given)
     if not table:
         raise Fault("CONFIG", f"{map_name}: rig: missing; an evidence folder needs it, or import into a .mcap file")
@@ -157,10 +158,10 @@ def _rig(given: dict[str, Any], map_name: str) -> tuple[RigTable, list[str]]:
         stiffness = table.get("contact_stiffness_N_per_m", static_N / _PRESLIDING_M)
         assumed["contact_stiffness_N_per_m"] = stiffness
         if isinstance(stiffness, float | int) and stiffness > 0:
-            # presliding that is critically damped, as the paper's pairs are
+            # critical damping of the presliding motion, as for the paper's pairs
             assumed["contact_damping_Ns_per_m"] = 2.0 * (stiffness * mass_kg) ** 0.5
     filled = [name for name in assumed if name not in table]
-    if isinstance(table.get("tolerance", {}), dict):  # else it is refused below
+    if isinstance(table.get("tolerance", {}), dict):  # any other type is refused by `validate`
         unsure = {name: _ASSUMED_TOLERANCE for name in filled if name.startswith("contact")}
         table["tolerance"] = unsure | table.get("tolerance", {})
     return validate(RigTable, assumed | table, f"{map_name}: rig"), filled
@@ -212,7 +213,7 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
 
 
 def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
-    """Sensor blocks of 20 samples at the source's own rate; float32, as every sensor block is."""
+    """Write a log of sensor blocks of 20 samples at the source's own rate; float32, as in every sensor block."""
     findings: list[Finding] = []
     t_s = columns["t_s"]
     if len(t_s) < _BLOCK_SAMPLES or not np.isfinite(t_s).all() or (np.diff(t_s) <= 0).any():

@@ -1,4 +1,4 @@
-"""A lock-in amplifier: how strongly a signal swings at the commanded vibration, or at a multiple of it, window by window."""
+"""A lock-in amplifier: amplitude of a signal at the commanded vibration, or at a multiple of its frequency, by window."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,24 +7,25 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.floating[Any]]
+# Seconds of a window. Too short: lines near each other melt together. Too long: every window holds a slip.
 WINDOW_S = 0.02
-FEWEST_WINDOWS = 5
-BESIDE_HZ = 3.5 / WINDOW_S  # to either side: a line leaks no further than two of 1 / WINDOW_S
-_HIGHEST = 0.45  # of the sampling rate: above it the vibration is folded down
+FEWEST_WINDOWS = 5  # windows that a frequency needs; a median of fewer may be one of a slip
+BESIDE_HZ = 3.5 / WINDOW_S  # distance to the frequencies beside a line; a line leaks over 2 / WINDOW_S at most
+_HIGHEST = 0.45  # share of the sampling rate above which a vibration is not used: sampling folds it to a low frequency
 
 
 class LockIn:
-    """The windows of a run under a vibration that the sampling shows.
+    """The windows of a run under a vibration that the sampling rate resolves.
 
     Attributes:
         rate_Hz: of the samples.
-        lowest_Hz: the smallest commanded frequency of every window [windows].
-        used: numbers of the windows that vibrate throughout.
+        lowest_Hz: the smallest commanded frequency in each window, [windows].
+        used: indices of the windows that vibrate throughout.
 
     """
 
     def __init__(self, t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> None:
-        """`columns` need the vibration's frequency and amplitude, [samples] as `t_s`."""
+        """`columns` needs the vibration's frequency and amplitude, [samples] as `t_s`."""
         self.rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
         self._t_s = t_s
         self._rows = round(WINDOW_S * self.rate_Hz)
@@ -41,13 +42,20 @@ class LockIn:
         return values[: count * self._rows].reshape(count, self._rows)
 
     def steady(self) -> list[npt.NDArray[np.int64]]:
-        """Numbers of the windows of every frequency that is held long enough."""
+        """For each frequency that is held for `FEWEST_WINDOWS` or more: the indices of its windows."""
         held = self.used[self.lowest_Hz[self.used] == self._highest_Hz[self.used]]
         alike = [held[self.lowest_Hz[held] == each_Hz] for each_Hz in np.unique(self.lowest_Hz[held])]
         return [own for own in alike if len(own) >= FEWEST_WINDOWS]
 
     def amplitude(self, values: Floats, times: float = 1.0, apart_Hz: float = 0.0) -> Floats:
-        """Of `values` [samples] at `times` the commanded frequency, and so far beside it, [windows]."""
+        """Amplitude of `values` [samples] in each window, [windows], in their unit.
+
+        Args:
+            values: the signal.
+            times: multiple of the commanded frequency.
+            apart_Hz: distance from this multiple.
+
+        """
         turned = values * np.exp(-2j * np.pi * (times * self._turns + apart_Hz * (self._t_s - self._t_s[0])))
         weights = np.hanning(self._rows)
         result: Floats = np.abs(self._windows(turned) @ weights) * 2.0 / float(weights.sum())

@@ -1,4 +1,4 @@
-"""What `manifest.toml` of an evidence folder may say: the rig, how well it is known, the channels and the runs."""
+"""The keys of `manifest.toml` in an evidence folder: the rig, how well it is known, the channels and the runs."""
 
 import math
 from pathlib import Path, PurePath
@@ -25,17 +25,17 @@ STANDARD = (
 )
 _SPRING_ONLY = ("drive_stiffness_N_per_m", "drive_damping_Ns_per_m")
 
-# far above any rig, and far below what arithmetic ends at
+# The upper limit is far above any rig, and low enough that no product of such numbers overflows.
 Positive = Annotated[float, Field(gt=0, lt=1e12)]
 NotNegative = Annotated[float, Field(ge=0, lt=1e12)]
-# Of the mass on the contact's stiffness, 7.2e3 on the paper's rig. The plant refuses 1e5, the inverse of its step, and fits
-# vary both within their tolerances.
+# Highest natural frequency of the mass on a stiffness. Larger values let the plant's step become unstable: the plant refuses the
+# numbers beside, and fits vary mass and stiffness within their tolerances. Smaller values would refuse stiff rigs.
 _FASTEST_RAD_PER_S = {
-    "contact_stiffness_N_per_m": 9e4,
-    "drive_stiffness_N_per_m": 3e4,  # likewise: 88 on the paper's rig, the plant refuses 3.14e4
+    "contact_stiffness_N_per_m": 9e4,  # the plant refuses 1e5, the inverse of its step; 7.2e3 on the paper's rig
+    "drive_stiffness_N_per_m": 3e4,  # the plant refuses 3.14e4; 88 on the paper's rig
 }
-_LONGEST_SLIP_S = 5.0
-_FASTEST_MPS = 10.0  # of a drive: in mm/s a slow one already is faster
+_LONGEST_SLIP_S = 5.0  # a longer slip means a wrong unit of mass or stiffness
+_FASTEST_MPS = 10.0  # of a drive; a velocity in mm/s exceeds it even for a slow drive
 DriveVelocity = Annotated[float, Field(ge=-_FASTEST_MPS, le=_FASTEST_MPS)]
 
 
@@ -52,7 +52,7 @@ class RigTable(Strict):
     coulomb_force_N: Positive
     static_force_N: Positive
     stribeck_velocity_mps: Positive
-    tolerance: dict[str, float] = {}  # one standard deviation, relative; a value left out is known exactly
+    tolerance: dict[str, float] = {}  # one standard deviation, relative; a number without a tolerance is known exactly
 
     @model_validator(mode="after")
     def _fits_together(self) -> "RigTable":
@@ -90,12 +90,12 @@ class RigTable(Strict):
         return self
 
     def values(self) -> dict[str, float | None]:
-        """The numbers by name; None where the drive has no such part."""
+        """The rig numbers by name, SI units; None where the drive has no such part."""
         return {name: getattr(self, name) for name in RigTable.model_fields if name not in {"drive", "tolerance"}}
 
 
 class ChannelMap(Strict):
-    """Where a standard column comes from: value = column * scale + offset."""
+    """Source of a standard column: value = column * scale + offset, in the SI unit of the standard column."""
 
     column: Annotated[str, Field(min_length=1)]
     scale: float = 1.0
@@ -109,7 +109,7 @@ class ChannelMap(Strict):
 
 
 class RunTable(Strict):
-    """One run."""
+    """One run of the manifest."""
 
     file: Annotated[str, Field(min_length=1)]
     drive_velocity_mps: DriveVelocity | None = None
@@ -126,7 +126,7 @@ class RunTable(Strict):
 
 
 class Manifest(Strict):
-    """The whole file."""
+    """The whole `manifest.toml`."""
 
     format: Literal["evidence/1"]
     rig: RigTable
@@ -149,14 +149,14 @@ class Manifest(Strict):
 
 
 def check_channel_names(channels: dict[str, Any]) -> None:
-    """Raise ValueError where a channel is none of the standard columns."""
+    """Raise ValueError when a channel is not a standard column."""
     for name in channels:
         if name not in STANDARD:
             raise ValueError(f"channels.{name}: unknown key; known here: {', '.join(STANDARD)}")
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Read and check `manifest.toml`. Raises Fault BAD_EVIDENCE, one line a problem."""
+    """Read and check `manifest.toml` of an evidence folder. Raises Fault BAD_EVIDENCE, with one line for each problem."""
     if shown(folder) != str(folder):
         raise Fault("BAD_EVIDENCE", f"{shown(folder)}: its name is not UTF-8; rename it")
     try:

@@ -7,7 +7,7 @@ from diagnosis.evidence.manifest import FORMAT, RigTable, RunTable
 
 
 def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> str:
-    """A manifest with these runs; the names in `assumed` carry the remark that nobody measured them."""
+    """Text of a `manifest.toml` with this rig and these runs; rig numbers in `assumed` get the remark that they are assumed."""
     lines = [f"format = {_value(FORMAT)}", "", "[rig]", f"drive = {_value(rig.drive)}"]
     for name, value in rig.values().items():
         if value is not None:
@@ -22,5 +22,5 @@ def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> st
 
 
 def _value(value: Any) -> str:
-    """A number, a truth value or a text: JSON writes these as TOML does, but for DEL; `repr` keeps every digit of a number."""
+    """A number, a truth value or a text in TOML: JSON has the same form but for DEL; `repr` keeps every digit of a number."""
     return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,4 +1,4 @@
-"""A run log of this project as evidence: its sensor blocks, and the commands that were in force."""
+"""A run log of this project as evidence: its sensor blocks, and the commands in force during each block."""
 
 from pathlib import Path
 
@@ -15,13 +15,16 @@ Columns = dict[str, npt.NDArray[np.float64]]
 
 
 def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
-    """The standard columns of a run log, one row a sample, and what of it is damaged. Raises Fault BAD_LOG, BAD_MESSAGE."""
+    """The standard columns of a run log, [samples] each in SI units, and a finding for each damage.
+
+    Raises Fault BAD_LOG, BAD_MESSAGE.
+    """
     run = read_run(path)
     sensors = run.sensors
     if not len(sensors):
         raise Fault("BAD_LOG", f"{path.name}: holds no sensor block; give another log")
     columns: Columns = {"t_s": sample_times_s(sensors, block_period_ns(sensors)).ravel()}
-    # an imported log has zeros where its source had no such channel, and says so
+    # an imported log has zeros for a channel that its source lacked, and names the channel in its header
     absent = run.headers.get("import", {}).get("missing", "")
     columns |= {name: sensors[name].astype(np.float64).ravel() for name in CHANNELS if name not in absent}
     if len(run.command):
@@ -35,7 +38,7 @@ def columns_of_log(path: Path) -> tuple[Columns, list[Finding]]:
 def _commanded(run: RunData) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Frequency and amplitude in force during each block, [blocks]; 0 before the first command."""
     block = run.sensors["sequence"]
-    # the command that answers the block before, as in lockstep; what the rig says of itself is surer
+    # The rig's own log of the applied commands comes first; else the command that answers the block before, as in lockstep.
     answered = np.where(block > 0, block - np.uint64(1), np.uint64(2**64 - 1))
     if len(run.applied):
         order = np.argsort(run.applied["sequence"], kind="stable")

@@ -1,6 +1,6 @@
-"""Whether the force bends as the mass accelerates, before anything of the rig is believed: a sensor the wrong way round, a unit.
+"""Stiffness from force and mass acceleration alone: it shows a sensor with the wrong sign, or a wrong unit.
 
-A drive that moves evenly pulls with F = k (s - x), so F'' = -k x'', in every slip and whatever the friction is.
+A drive that moves evenly pulls with F = k (s - x). So F'' = -k x'' in every slip, for any friction, and without a rig number.
 """
 
 from collections.abc import Mapping
@@ -12,18 +12,21 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 Floats = npt.NDArray[np.floating[Any]]
 _BIN_S = 1e-3
-_SMOOTH_BINS = (
-    4.0  # of 40 ms, which a slip on the paper's spring takes, a smoothing by 4 leaves most of the acceleration
-)
-_BESIDE_BINS = 61  # around a vibration, whose remainder in a mean over 1 ms is as large as a slip
-_FEWEST_BINS = 500
-_AS_ONE = 0.9  # correlation: 0.98 in the middle of 52 runs of made rigs; without slips it is noise against noise
+# Standard deviation of the smoothing. Too small: noise; too large: slips are lost. A slip on the paper's spring takes about 40 ms,
+# and 4 ms leave most of its acceleration.
+_SMOOTH_BINS = 4.0
+_BESIDE_BINS = 61  # around a vibration that are left out: its remainder in a mean over 1 ms is as large as a slip
+_FEWEST_BINS = 500  # that a run needs; a stiffness from fewer bins is noise
+# Smallest correlation of force and acceleration for which a stiffness is returned. Too small: runs without slips, noise against
+# noise, give a false stiffness. Too large: wrong signs and units stay unseen. Counted: docs/method/evidence.md.
+_AS_ONE = 0.9
 
 
 def told_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> float | None:
-    """The drive's stiffness as force and mass acceleration tell it, below 0 where one has the wrong sign; None: they do not.
+    """The drive's stiffness as force and mass acceleration show it; below 0 when one of the two has the wrong sign.
 
-    Without drive and friction in it, it is good for a sign and a unit only. `t_s` and every column are [samples].
+    None where the two do not correlate or one is missing. The stiffness leaves out the motion of the drive, so it is good for a
+    sign and a unit only. `t_s` and every column are [samples].
     """
     if not {"drive_force_N", "mass_accel_mps2"} <= columns.keys():
         return None
