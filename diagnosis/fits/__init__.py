@@ -1,12 +1,12 @@
 """Refits, from one to the search over all trials.
 
-retuning                   the baseline: the rig without effects, refitted; all evidence is measured against it
-fit, gauss_newton, batch   a fit; how it is found; many at once whose predictions go side by side
-search                     from all trials to the few that are refitted in full
-screening, refits          what every trial promises, cheaply; refits spread over processes
-restarts, late_friction    further starts: for close contenders; for friction that lags by much
-load_phases                where the refit of a load wave starts, in the phases of every run
-random_friction            friction without a path that could be followed: judged by what it scatters
-refloored                  once more on the floors of the nearest model, where nothing explains the runs
-expected                   what a right model leaves, and what noise hides
+retuning                   the baseline: the rig without effects, refitted within its tolerances; every fit is compared with it
+fit, gauss_newton, batch   one fit; how a fit is found; many fits at once, whose predictions run side by side
+search                     from all trials to the few trials that are refitted in full
+screening, refits          a cheap estimate of what each trial gains; refits spread over processes
+restarts, late_friction    further starts: for fits that come close to the best one; for friction that lags by much
+load_phases                starts for the refit of a load wave, with a phase for every run
+random_friction            friction that changes without a path to follow: judged by the scatter that it causes
+refloored                  a second search under the noise floor of the nearest model, where no trial explains the runs
+expected                   the chi2 that a right model leaves, and whether noise hides the slips
 """

@@ -1,4 +1,4 @@
-"""Many fits at once: what each of them wants predicted next goes through the runs side by side with what the others want."""
+"""Many fits at once: the points that all fits ask for next are predicted side by side, in one pass through the runs."""
 
 from collections.abc import Generator, Iterator, Sequence
 from itertools import chain
@@ -12,31 +12,33 @@ from diagnosis.model.rig import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
 R = TypeVar("R")
-AT_ONCE = 2 * LANES  # works: many ask for one point at a time
+# Works that proceed at the same time. Fewer leave lanes of the prediction empty, as most works ask for one point at a time;
+# more hold more predictions in memory.
+AT_ONCE = 2 * LANES
 At = tuple[Floats, Effects]  # deviations of the nuisances, and effects
 
 
 class Question(NamedTuple):
-    """Points where features are wanted now, and points that may be wanted next: they fill the lanes left empty."""
+    """Points where a work needs the features now, and points that it may need next; those fill lanes left empty."""
 
     points: Sequence[At]
     perhaps: Sequence[At] = ()
 
 
-# a calculation that yields questions, is sent the features predicted at the points, and returns what it found
+# A work is a generator: it yields questions, receives the features predicted at their points, and returns a result.
 Work = Generator[Question, list[Floats], R]
 
 
 class Predicts(Protocol):
-    """What answers questions."""
+    """A function that predicts features at many points."""
 
     def __call__(self, at: Sequence[At], perhaps: Sequence[At] = ()) -> list[Floats]:
-        """The features at every point of `at`."""
+        """The features [features] at every point of `at`, in the order of `at`."""
         ...
 
 
 def together(predicted: Predicts, works: Sequence[Work[R]]) -> list[R]:
-    """What every work returns, in their order; `AT_ONCE` of them at a time."""
+    """Run all works, `AT_ONCE` of them at a time, and return their results in the order of `works`."""
     results: dict[int, R] = {}
     waiting: dict[int, Work[R]] = {}
     wanted: dict[int, Question] = {}

@@ -1,24 +1,24 @@
-"""What a right model leaves of chi2, and what noise can hide."""
+"""The chi2 that a right model leaves, and whether noise hides the slips. Case histories: docs/method/fits.md."""
 
 from diagnosis.fits.fit import Fit
 
-# What follows is in chi2 of a perfect model on this evidence. 35 rigs without a gap left 0.6 to 1.7.
-# What is beyond this counts against `none` in full: however wrong every model is, that there is a gap stays certain.
+# Both limits below are multiples of the chi2 that a perfect model leaves on this evidence.
+# Beyond this limit all of the baseline's chi2 counts against "no gap", however badly every model fits.
+# Too small: rigs without a gap get one. Too large: a gap that no model explains becomes uncertain. Counted: docs/method/fits.md.
 NEVER_WITHOUT_GAP = 1.8
-# More than a model that is right leaves: of 84 single effects rightly named, of 1 to 14 detection limits and in other formulas,
-# 78 left less. The others left up to 3.8 where the rig was 60 times the expected off; of 19 effects outside the library all but
-# a tilted track left 1.9 to 35.
+# A fit beyond this limit leaves more than a right model would. Too small: right effects are called unexplained.
+# Too large: an effect outside the library passes for one inside. Counted: docs/method/fits.md.
 MUCH = 1.6
-# chi2 a feature that a perfect model leaves: 0.2 to 0.28 are usual, 0.52 on a log whose noise hides the slips. What its floor is
-# worth nobody knows: there a right model must leave the expected, and nothing is looked for in what scatters.
+# Chi2 of a perfect model, per compared feature, from which noise is said to hide the slips; the floor is doubtful there.
+# Too small: ordinary evidence is called hidden. Too large: scatter is searched for effects. Counted: docs/method/fits.md.
 _HIDDEN_BY_NOISE = 0.4
 
 
 def much_left(fit: Fit, expected_chi2: float) -> bool:
-    """Whether a fit leaves more than a model that is right would; that leaves `expected_chi2` on average."""
+    """Whether a fit leaves more than a right model would; a right model leaves `expected_chi2` on average."""
     return fit.chi2 > MUCH * expected_chi2
 
 
 def hidden_by_noise(fit: Fit, expected_chi2: float) -> bool:
-    """Whether even a model that is right leaves so much that noise must hide the slips."""
+    """Whether even a right model leaves so much per compared feature that noise must hide the slips."""
     return expected_chi2 > _HIDDEN_BY_NOISE * len(fit.residual)

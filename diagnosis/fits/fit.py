@@ -1,4 +1,4 @@
-"""A fit: a point in nuisances and parameters, what the runs say of it, and the step from it."""
+"""A fit: values of nuisances and effect, how well the model matches the runs there, and the Newton step from there."""
 
 from typing import Any, NamedTuple
 
@@ -15,20 +15,23 @@ class Fit(NamedTuple):
     """A model fitted to the measured features of a problem."""
 
     hypothesis: Hypothesis
-    deviations: Floats  # of the nuisances, in tolerances [nuisances]
-    w: Floats  # [axes]
-    chi2: float  # with the priors' terms
-    residual: Floats  # whitened [compared]
-    columns: Floats  # whitened derivatives, nuisances then axes [compared, nuisances + axes]
-    finished: bool = False  # a refit from here gains nothing worth having
+    deviations: Floats  # of the nuisances from the described rig, in tolerances [nuisances]
+    w: Floats  # values of the hypothesis' coordinates [coordinates]
+    chi2: float  # squares of the residual, and the priors' terms
+    residual: Floats  # whitened differences, measured less predicted [compared]
+    columns: Floats  # whitened derivatives, nuisances then coordinates [compared, nuisances + coordinates]
+    finished: bool = False  # whether another refit from here would gain next to nothing
 
     @property
     def effects(self) -> Effects:
-        """The effects of the model as tables of a rig file."""
+        """The effects of the model, as tables of a rig file."""
         return self.hypothesis.tables(self.w)
 
     def covariance(self) -> Floats:
-        """Of nuisances and axes together, from the columns and the priors."""
+        """Covariance from columns and priors, nuisances then coordinates [nuisances + coordinates, same].
+
+        Raises numpy.linalg.LinAlgError when the columns hold values that are not finite.
+        """
         prior = np.concatenate(
             [np.ones(len(self.deviations)), [axis.prior**-2 for axis in self.hypothesis.coordinates]]
         )
@@ -37,18 +40,22 @@ class Fit(NamedTuple):
 
 
 def prior_of(hypothesis: Hypothesis, deviations: Floats) -> Floats:
-    """Inverse standard deviations of nuisances and axes."""
+    """Inverse prior standard deviations [nuisances + coordinates]: 1 for a nuisance, as deviations count in tolerances."""
     return np.concatenate([np.ones(len(deviations)), [1.0 / axis.prior for axis in hypothesis.coordinates]])
 
 
 def step_within(normal: Floats, gradient: Floats, at: Floats, most: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """The Newton step from `at`, and what is free on it: what stands at its bound stays there if it would go beyond.
+    """The Newton step from `at` [parameters], and which parameters it moves [parameters].
+
+    A nuisance that stands at its bound stays there if the step would take it beyond.
 
     Args:
         normal: matrix of the normal equations [parameters, parameters].
-        gradient: their right side [parameters].
-        at: where the step begins [parameters]: nuisances, then axes.
-        most: bounds of the nuisances, either way [nuisances].
+        gradient: right side of the normal equations [parameters].
+        at: where the step begins [parameters]: nuisances, then coordinates.
+        most: bounds of the nuisances, the same in both directions [nuisances].
+
+    Raises numpy.linalg.LinAlgError where the normal equations are singular.
 
     """
     own = len(most)

@@ -1,7 +1,8 @@
-"""Fitting the model to the measured features: nuisances inside their tolerances, and the parameters of an effect.
+"""Fitting the model to the measured features: nuisances inside their tolerances, and the coordinates of an effect.
 
-Gauss-Newton in whitened, compressed differences. The nuisances' columns are computed once where the rig was retuned; an effect's
-own columns at every step, since effects are as nonlinear as a gap that opens or a wave that passes.
+The method is Gauss-Newton on whitened, compressed differences. The derivatives of the nuisances are computed once, at the
+baseline, and again only where no step gains. The derivatives of an effect are computed at every step, as effects are strongly
+nonlinear: a clearance opens, a wave passes. Case histories of the constants: docs/method/fits.md.
 """
 
 from collections.abc import Sequence
@@ -20,42 +21,57 @@ from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Effects
 
 Floats = npt.NDArray[np.floating[Any]]
-_NARROW = 0.1  # prior of a coordinate that is known so well that a common step would leave its line
-# What goes further is a gap: of seven numbers drawn from their tolerances one is beyond this in 1 of 150 rigs. The sensors'
-# lags and corners have no stated tolerance to hold them to.
+# Coordinates with a prior below this take the short derivative step of `_coordinate_steps`. Too small: the common step leaves
+# the narrow line of a wave's period. Too large: coarser coordinates get derivatives of mere grid noise.
+_NARROW = 0.1
+# Bounds of the rig's numbers, in tolerances: a deviation beyond is a gap, not a tolerance.
+# Too small: a right rig is held back. Too large: the rig takes what an effect causes. Counted: docs/method/fits.md.
 _MOST_TOLERANCES = 3.3
+# The same for lags and corners of the sensors, in their assumed spreads: wider, as no tolerance is stated for them.
 _MOST_OF_CHAIN = 5.0
-_WORTH_A_STEP = 0.5  # of chi2
-_SHARES = (1.0, 0.3, 0.1)  # of a step; a static friction stayed at chi2 235 without the last, and went to 158 with it
-_MORE_REFITS, _GAINED = 5, 0.97  # refits of a fit, while each leaves this share of chi2 or less
+# Gain in chi2 below which a step counts as none. Too small: fits creep on. Too large: fits stop before they are done.
+_WORTH_A_STEP = 0.5
+# Shares of the Newton step that are tried, until one gains. Without the small share a curved valley stops the fit; each further
+# share costs a prediction where nothing gains. Counted: docs/method/fits.md.
+_SHARES = (1.0, 0.3, 0.1)
+# `going_further` refits at most so often, and while a refit leaves this share of chi2 or less. A larger share, or more refits,
+# gains little for more time; a smaller one stops fits that still move. Counted: docs/method/fits.md, `going_further`.
+_MORE_REFITS, _GAINED = 5, 0.97
 
 
 class Stage(NamedTuple):
-    """How a fit proceeds."""
+    """One stage of a fit: how many steps, and under which compression."""
 
-    steps: int
-    renewals: int  # how often the nuisances' derivatives may be computed anew when no step gains any more
-    knee: float  # of the compression
-    columns: bool = True  # whether the derivatives are wanted where the fit ends; else those of the step before do
+    steps: int  # at most
+    renewals: int  # renewals of the nuisances' derivatives that may gain nothing before the fit ends
+    knee: float  # of the compression, in noise floors
+    columns: bool = (
+        True  # whether to compute the derivatives where the fit ends; otherwise the last step's derivatives stay
+    )
 
 
-# Far off, compressed differences pull at nothing: there a fit is nearly one of plain squares.
+# Knee of the compression for a start far from the runs, in noise floors. Too small: far differences are cut flat and give no
+# direction. Too large: single differences from slips that come or go outweigh all others.
 FAR_KNEE = 60.0
 _FAR = Stage(4, 1, FAR_KNEE)
 _NEAR = Stage(6, 1, KNEE)
-_RETUNE = Stage(9, 3, KNEE)  # what everything is measured against
+_RETUNE = Stage(
+    9, 3, KNEE
+)  # of the baseline: more steps and renewals than other fits, as every fit is compared with it
 _QUICK = Stage(2, 0, FAR_KNEE, columns=False)
+# Largest difference, in noise floors, from which a refit begins with the far stage. Too small: fits that are near lose time
+# there. Too large: fits start where the compression is nearly flat.
 _FAR_OFF = 3.0 * KNEE
-# Of what the rig without effects leaves: of 120 forms tried on three rigs that no single effect explains, 108 were between these
-# after the first steps, and none of those came below 0.9 in the end.
+# A trial ends after its first steps when its chi2 lies between these shares of the baseline's chi2: it then gains nothing.
+# A narrower range costs time; a wider one drops trials that would still improve. Counted: docs/method/fits.md.
 _NO_LESS, _ASTRAY = 0.97, 1.5
-# of a tolerance, for derivatives: large against the grid, small against the curvature; the second time the other way and wider,
-# over the jumps that slips make where they come and go, the third time closer
+# Steps for the nuisances' derivatives, in tolerances, for the first, second and third renewal. Too small: the grid of the
+# features shows. Too large: curvature does. The second goes the other way and further, across slips that come or go.
 _STEPS = (0.5, -1.0, 0.25)
 
 
 def _axis_steps(hypothesis: Hypothesis, w: Floats) -> Floats:
-    """By how much each axis is moved for its derivative."""
+    """How far each coordinate moves for its derivative [coordinates]."""
     steps = np.zeros(len(w))
     for i, axis in enumerate(hypothesis.coordinates):
         steps[i] = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
@@ -65,40 +81,40 @@ def _axis_steps(hypothesis: Hypothesis, w: Floats) -> Floats:
 
 
 def _beside(hypothesis: Hypothesis, deviations: Floats, w: Floats) -> list[At]:
-    """Where the derivatives of all axes are taken."""
+    """The points that the derivatives of all coordinates need."""
     return [(deviations, hypothesis.tables(ahead)) for ahead in w + np.diag(_axis_steps(hypothesis, w))]
 
 
 class _Place(NamedTuple):
-    """Where a fit is."""
+    """A point that a fit has reached, and the prediction there."""
 
-    at: Floats  # nuisances, then axes
+    at: Floats  # nuisances, then coordinates [nuisances + coordinates]
     predicted: Floats  # [features]
     residual: Floats  # whitened [compared]
-    slope: Floats  # of the compression [compared]
-    chi2: float  # with the priors' terms
+    slope: Floats  # derivative of the compression [compared]
+    chi2: float  # squares of the residual, and the priors' terms
 
 
 class Fitter:
-    """Fits forms to one problem under one floor."""
+    """Fits hypotheses to the measured features of one problem, under one noise floor."""
 
     def __init__(self, problem: Problem, floor: Floor, nuisances: Nuisances) -> None:
         self.problem = problem
         self.floor = floor
         self.nuisances = nuisances
         own = len(nuisances.rig_names)
-        # how far each nuisance may go, either way
+        # bounds of the nuisances, the same in both directions [nuisances]
         self.most = np.where(np.arange(len(nuisances)) < own, _MOST_TOLERANCES, _MOST_OF_CHAIN)
         self._rates = np.zeros((int(floor.compared.sum()), len(nuisances)))
 
     def for_problem(self, problem: Problem) -> "Fitter":
-        """The same floor and derivatives for other measured features of the same runs."""
+        """A fitter with the same floor and derivatives for other measured features of the same runs."""
         other = Fitter(problem, self.floor, self.nuisances)
         other._rates = self._rates
         return other
 
     def of_runs(self, files: set[str]) -> "Fitter":
-        """The same for some of the runs, by their files."""
+        """A fitter for some of the runs, given by the names of their files."""
         own = np.array([file in files for file, _ in self.problem.labels])
         problem = Problem(self.problem.rig, [run for run in self.problem.runs if run.file in files])
         other = Fitter(problem, self.floor.of_features(own), self.nuisances)
@@ -106,11 +122,11 @@ class Fitter:
         return other
 
     def predicted(self, deviations: Floats, effects: Effects) -> Floats:
-        """Features of the model, free of noise [features]."""
+        """Features of the model without noise [features], for nuisances in tolerances [nuisances] and tables of effects."""
         return self.predicted_many([(deviations, effects)])[0]
 
     def predicted_many(self, at: Sequence[At], perhaps: Sequence[At] = ()) -> list[Floats]:
-        """As `predicted` of every point, in less time than one after the other; `perhaps` are points that may be next."""
+        """As `predicted`, for many points side by side; `perhaps` are points that the caller may ask for next."""
         points, soon = ([self.nuisances.point(*one) for one in some] for some in (at, perhaps))
         return self.problem.predicted_many(points, perhaps=soon)
 
@@ -119,13 +135,13 @@ class Fitter:
         return whitened(self.floor, self.problem, predicted, knee)
 
     def column(self, here: Floats, there: Floats, slope: Floats) -> Floats:
-        """The way from one prediction [features] to another as it shows in whitened compressed differences."""
+        """The change from one prediction [features] to another, in whitened compressed differences [compared]."""
         z = (self.floor.expected(there) - self.floor.expected(here))[self.floor.compared]
         z *= slope / self.floor.scatter[self.floor.compared]
         return self.floor.whitening @ np.where(np.isfinite(z), z, 0.0)
 
     def retuning(self, deviations: Floats) -> Work[Fit]:
-        """The rig without effects, refitted; other fits start from its nuisances' derivatives."""
+        """Fit the baseline; later fits start with the derivatives that the nuisances have there."""
         fit = yield from self.refitting(NOTHING, deviations, np.zeros(0))
         fit = yield from self.fitting(NOTHING, fit.deviations, fit.w, _RETUNE)
         (here,) = yield Question([(fit.deviations, {})])
@@ -135,7 +151,7 @@ class Fitter:
         return fit
 
     def described(self, deviations: Floats) -> Fit:
-        """The rig as it stands, with its nuisances' derivatives, under the wide compression of a far start."""
+        """The rig without effects at these deviations, not refitted, with derivatives under the knee of a far start."""
         here = self.predicted(deviations, {})
         residual, slope = self.whitened(here, FAR_KNEE)
         aside = self._aside(deviations, _STEPS[0])
@@ -144,18 +160,25 @@ class Fitter:
         return Fit(NOTHING, deviations, np.zeros(0), chi2, residual, self.floor.whitening @ (rates * slope[:, None]))
 
     def refit(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Fit:
-        """Fit a hypothesis to the end, from a starting point that may be far off."""
+        """Fit a hypothesis to the end, from a start that may be far from the runs.
+
+        Args:
+            hypothesis: the effects to add to the rig.
+            deviations: start of the nuisances, in tolerances [nuisances].
+            w: start of the hypothesis' coordinates [coordinates].
+
+        """
         return together(self.predicted_many, [self.refitting(hypothesis, deviations, w)])[0]
 
     def quick(self, hypothesis: Hypothesis, starts: Sequence[tuple[Floats, Floats]]) -> Work[Fit]:
-        """A hypothesis fitted a little, from the best of some starts, with the chi2 of the gap's own compression."""
+        """Fit a hypothesis in two steps, from the best of some starts; chi2 is under the compression of the gap."""
         there = yield Question([(deviations, hypothesis.tables(w)) for deviations, w in starts])
         far = [self.far_chi2(hypothesis, *one) for one in zip(starts, there, strict=True)]
         fit = yield from self.fitting(hypothesis, *starts[far.index(min(far))], _QUICK)
         return (yield from self._judging(fit))
 
     def judged(self, fit: Fit) -> Fit:
-        """A fit of any stage with the chi2 and the residual of the gap's own compression."""
+        """A fit of any stage, with chi2 and residual under the compression of the gap."""
         return together(self.predicted_many, [self._judging(fit)])[0]
 
     def _judging(self, fit: Fit) -> Work[Fit]:
@@ -165,12 +188,12 @@ class Fitter:
         return fit._replace(chi2=chi2, residual=residual)
 
     def far_chi2(self, hypothesis: Hypothesis, at: tuple[Floats, Floats], predicted: Floats) -> float:
-        """chi2 of a prediction [features] for nuisances and axes, under the wide compression of a far start."""
+        """chi2 of a prediction [features] for nuisances and coordinates `at`, under the knee of a far start."""
         residual, _ = self.whitened(predicted, FAR_KNEE)
         return self._chi2(prior_of(hypothesis, at[0]), residual, np.concatenate(at))
 
     def refitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Work[Fit]:
-        """As `refit`, beside others."""
+        """As `refit`, as a work that proceeds beside others."""
         (predicted,) = yield Question([(deviations, hypothesis.tables(w))])
         if np.abs(differences(self.floor, self.problem, predicted)).max() > _FAR_OFF:
             fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
@@ -178,7 +201,7 @@ class Fitter:
         return (yield from self.fitting(hypothesis, deviations, w, _NEAR))
 
     def trying(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, base_chi2: float) -> Work[Fit]:
-        """As `refitting`, but not to the end where the first steps lead to what the rig without effects leaves, `base_chi2`."""
+        """As `refitting`, but stop after the first steps where chi2 is about that of the baseline, `base_chi2`."""
         fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
         fit = yield from self._judging(fit)
         if _NO_LESS * base_chi2 < fit.chi2 < _ASTRAY * base_chi2:
@@ -186,14 +209,11 @@ class Fitter:
         return (yield from self.fitting(hypothesis, fit.deviations, fit.w, _NEAR))
 
     def further(self, fit: Fit) -> Fit:
-        """A fit refitted again as long as that gains."""
+        """Refit a fit again as long as chi2 falls."""
         return together(self.predicted_many, [self.going_further(fit)])[0]
 
     def going_further(self, fit: Fit) -> Work[Fit]:
-        """As `further`, beside others: a lag in distance went from chi2 298 to 230, 212 and 85.
-
-        Where no step gained any more, a refit from there took 4 % of chi2 at most, nothing in 18 of 24 (seven rigs).
-        """
+        """As `further`, as a work that proceeds beside others; a finished fit is returned as it is."""
         for _ in range(_MORE_REFITS):
             if fit.finished:
                 break
@@ -205,7 +225,7 @@ class Fitter:
         return fit._replace(finished=True)
 
     def fitting(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, stage: Stage) -> Work[Fit]:
-        """Fit a hypothesis from a starting point, in the way of one stage."""
+        """Fit a hypothesis from a start, by the rules of one stage."""
         own = len(deviations)
         prior = prior_of(hypothesis, deviations)
         most = np.concatenate([self.most, np.full(len(w), np.inf)])
@@ -239,7 +259,7 @@ class Fitter:
                     break
             if gain < _WORTH_A_STEP:
                 if without_gain == stage.renewals:
-                    finished = without_gain > 0  # no step gains any more, with renewed derivatives
+                    finished = without_gain > 0  # no step gains, not even with renewed derivatives
                     break
                 size = _STEPS[renewed % len(_STEPS)]
                 nuisance_rates, there = yield from self._renewed(hypothesis, here, stage.knee, size)
@@ -251,16 +271,16 @@ class Fitter:
         return Fit(hypothesis, here.at[:own], here.at[own:], here.chi2, here.residual, columns, finished)
 
     def _placed(self, hypothesis: Hypothesis, at: Floats, predicted: Floats, knee: float) -> _Place:
-        """A point, nuisances and axes, with what the model predicts there [features]."""
+        """A point, nuisances then coordinates, with the prediction there [features]."""
         residual, slope = self.whitened(predicted, knee)
         prior = prior_of(hypothesis, at[: len(self.nuisances)])
         return _Place(at, predicted, residual, slope, self._chi2(prior, residual, at))
 
     def _renewed(self, hypothesis: Hypothesis, here: _Place, knee: float, size: float) -> Work[tuple[Floats, _Place]]:
-        """The nuisances' derivatives anew, and the best place that single nuisances moved by as much lead to, or `here`.
+        """Renew the nuisances' derivatives, and go where single moves of nuisances gain; otherwise stay at `here`.
 
-        Where slips come and go derivatives lead astray, all numbers at once, and a single number does not. From the true numbers
-        of a rig whose friction is 7.8 ms late a refit stayed at chi2 467; so it came to 180.
+        Where slips come and go, a step of all numbers by their derivatives leads astray, and moving a single number does not.
+        The place returned is the best of all single moves and of all gaining moves at once (docs/method/fits.md).
         """
         own = len(self.nuisances)
         aside = self._aside(here.at[:own], size)
@@ -279,7 +299,7 @@ class Fitter:
         return rates, min(*better, self._placed(hypothesis, all_at_once, there, knee), key=lambda one: one.chi2)
 
     def _with_levels(self, nuisance_rates: Floats, axis_rates: Floats, hypothesis: Hypothesis, now: Floats) -> Floats:
-        """The nuisances' derivatives, of a number that an effect changes that of the effect."""
+        """The nuisances' derivatives; a rig number that an effect changes takes the derivative of that effect."""
         rates = nuisance_rates.copy()
         for column, axis, w in zip(
             axis_rates.T, hypothesis.coordinates, now[len(self.nuisances) :].tolist(), strict=True
@@ -297,7 +317,7 @@ class Fitter:
         return float(residual @ residual + held @ held)
 
     def _aside(self, deviations: Floats, size: float) -> Floats:
-        """A point beside these deviations for every nuisance, `size` towards what is described [nuisances, nuisances]."""
+        """For every nuisance a point that differs by `size` tolerances towards the description [nuisances, nuisances]."""
         return deviations + np.diag(np.where(deviations > 0.0, -size, size))
 
     def _nuisance_rates(self, deviations: Floats, here: Floats, aside: Floats, there: Sequence[Floats]) -> Floats:

@@ -1,8 +1,8 @@
-"""Where the refit of a load wave starts when its breakaways mislead: in every run the phase that suits that run best.
+"""Starts for the refit of a load wave whose breakaways mislead: every run gets the phase that suits this run best.
 
-Slips come and go as a wave moves, so a refit ends near the phases that it began with, and breakaways say little of them where a
-wave turns as fast as slips follow each other. The runs' shares of chi2 are apart: eight phases tried for all runs at once are
-eight for each, in any combination. A load of 2.8 Hz came to chi2 749 from the breakaways' phases and to 249 from these.
+Slips come and go as a wave moves, so a refit ends near the phases that it started with. Where a wave turns as fast as slips
+follow each other, the breakaways say little about its phase. Each run has its own share of chi2, so eight predictions of all
+runs give eight phases for each run, in any combination (docs/method/fits.md).
 """
 
 import math
@@ -23,19 +23,19 @@ from diagnosis.processes import each
 Floats = npt.NDArray[np.floating[Any]]
 EFFECT, FORM = "normal-load-fluctuation", "sine"
 _PHASES_RAD = 2.0 * math.pi * np.arange(8) / 8.0
-_RATIOS = (0.007, 0.02, 0.06)  # of the friction: from hardly visible to large
-_MOST = 3  # frequencies that get a refit
+_RATIOS = (0.007, 0.02, 0.06)  # amplitudes that are tried, over the mean load: from hardly visible to large
+_MOST = 3  # frequencies that get a refit; each more costs one refit, fewer may miss the right frequency
 
 
 class _TriedWave(NamedTuple):
-    """A wave in its best phases."""
+    """A wave with the best phase for every run."""
 
-    chi2: float  # of the differences, under the wide compression of a far start
+    chi2: float  # squares of the whitened differences, under the knee of a far start
     wave: Wave
 
 
 def starts_by_run(fitter: Fitter, origin: Fit, trials: list[Trial], jobs: int = 1) -> list[Start]:
-    """Starts of a load wave on the rig of `origin`, at those frequencies of the trials that promise most."""
+    """Starts of a load wave on the rig of `origin`, at the `_MOST` frequencies of the trials with the lowest chi2."""
     waves: dict[float, Wave] = {}
     slowest_Hz = 0.0
     for trial in trials:

@@ -16,7 +16,8 @@ from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]
 
-Start = tuple[Hypothesis, Floats, Floats]  # of a refit: nuisances, then the effect's coordinates
+# start of a refit: the hypothesis, its nuisances in tolerances [nuisances], its coordinates [coordinates]
+Start = tuple[Hypothesis, Floats, Floats]
 
 
 _Formed = TypeVar("_Formed", Fit, Screened, Trial)
@@ -24,7 +25,7 @@ T = TypeVar("T")
 
 
 def refits(fitter: Fitter, starts: Sequence[Start], jobs: int) -> list[Fit]:
-    """A refit to the end from every start."""
+    """Refit from every start to the end, in `jobs` processes; the fits stand in the order of the starts."""
     return each_beside(jobs, _refitting, fitter, starts)
 
 
@@ -33,7 +34,7 @@ def _refitting(fitter: Fitter, start: Start) -> Work[Fit]:
 
 
 def each_beside(jobs: int, work: Callable[[Fitter, T], Work[Fit]], fitter: Fitter, items: Sequence[T]) -> list[Fit]:
-    """What becomes of every item, beside the others, in `jobs` processes."""
+    """Turn every item into a fit, many at once in each of `jobs` processes; the fits stand in the order of the items."""
     shares = each(jobs, _share, fitter, [(work, items[i::jobs]) for i in range(jobs)])
     return [shares[number % jobs][number // jobs] for number in range(len(items))]
 
@@ -44,7 +45,7 @@ def _share(fitter: Fitter, share: tuple[Callable[[Fitter, T], Work[Fit]], Sequen
 
 
 def best_of_each(found: list[_Formed], by_form: bool = False) -> list[_Formed]:
-    """The first of every effect, or of every form of it, in their order."""
+    """The first of every set of effects, in the order of `found`; with `by_form`, the first of every form of the effects."""
     seen: set[frozenset[tuple[str, str]]] = set()
     result: list[_Formed] = []
     for one in found:

@@ -1,4 +1,7 @@
-"""Where leading fits are refitted from, so that none wins because another one's valley was never entered."""
+"""More starts for the leading fits, so that no effect wins only because another effect's fit stopped too early.
+
+Case histories: docs/method/fits.md.
+"""
 
 import math
 from typing import Any
@@ -12,13 +15,18 @@ from diagnosis.fits.refits import Start
 from diagnosis.hypotheses.hypothesis import Hypothesis
 
 Floats = npt.NDArray[np.floating[Any]]
-_CONTENDERS, _CONTENDS = 3, 0.3  # single effects, if they close this share of what the best one closes,
-_RIVALS = 0.9  # this one where two effects explain what none does alone
-_RIVAL_PAIRS = 0.7  # of what the best pair takes beyond the best single effect
+# Fits that are restarted: so many at most, and only those that close this share of what the best one closes. Fewer, or a larger
+# share: a right effect whose first fit stopped early is lost. More, or a smaller share: time.
+_CONTENDERS, _CONTENDS = 3, 0.3
+# The same share where two effects explain the gap and no single effect does: only close rivals are worth a refit there.
+_RIVALS = 0.9
+# Pairs that are restarted take this share of the best pair's gain over the best single effect. Larger: a right pair whose fit
+# stopped early is lost. Smaller: time.
+_RIVAL_PAIRS = 0.7
 
 
 def alone(pairs: list[Fit]) -> list[Start]:
-    """Each effect of the best pair alone, from where the pair left it."""
+    """Starts for each effect of the best pair alone, at its values in the pair."""
     if not pairs:
         return []
     best = min(pairs, key=lambda fit: fit.chi2)
@@ -32,7 +40,10 @@ def alone(pairs: list[Fit]) -> list[Start]:
 
 
 def contenders(retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> list[Fit]:
-    """The leading single effects; where only two explain the gap, the best one if it is of the two, and its rivals."""
+    """The single effects to restart: the first few.
+
+    Where only a pair explains the gap: the best single effect, if the pair contains it or rivals are close, and those rivals.
+    """
     if not pairs or much_left(pairs[0], expected_chi2) or not much_left(singles[0], expected_chi2):
         return singles[:_CONTENDERS]
     rivals = [fit for fit in close(retuned, singles, _RIVALS)[:_CONTENDERS] if fit is not singles[0]]
@@ -40,11 +51,7 @@ def contenders(retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2
 
 
 def rival_pairs(singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
-    """The best pairs, if they take nearly as much more than the best single effect does.
-
-    Beside a base of 11 detection limits a Stribeck velocity had ended at chi2 331, friction that lags at 255 and was named; from
-    the described rig, from the retuned one and from the lag's nuisances it came to 179 to 188, the lag to no less.
-    """
+    """The first few pairs whose gain over the best single effect is nearly as large as that of the best pair."""
     return [
         pair
         for pair in pairs[:_CONTENDERS]
@@ -53,12 +60,10 @@ def rival_pairs(singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
 
 
 def starts_of(contenders: list[Fit], retuned: Fit, sizes: tuple[float, ...]) -> list[Start]:
-    """The contenders from the described rig, from the retuned one and from the best one's nuisances, and that one from theirs.
+    """Starts for those contenders that are close to the best one.
 
-    From the first two also with `sizes` times their first number.
-
-    A lag was named at chi2 155, as the static friction that it was had ended at 235: from the described rig and from the lag's
-    nuisances it came to 143. A roll-off at 481 got a second effect; from the retuned rig it came to 245, refitted further to 117.
+    Each starts with the nuisances of the described rig and of the baseline, there also with `sizes` times its first coordinate.
+    The best one starts also with the nuisances of each other contender, and each other contender with those of the best one.
     """
     if not contenders:
         return []
@@ -82,5 +87,5 @@ def _resized(fit: Fit, size: float) -> Floats:
 
 
 def close(retuned: Fit, fits: list[Fit], share: float = _CONTENDS) -> list[Fit]:
-    """The fits, best first, that close more than this share of what the best one closes."""
+    """The fits that close more than this share of what the best one, the first, closes of the baseline's chi2."""
     return [fit for fit in fits if retuned.chi2 - fit.chi2 > share * (retuned.chi2 - fits[0].chi2)]

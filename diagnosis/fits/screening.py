@@ -1,4 +1,4 @@
-"""What every trial promises, from derivatives at the baseline: cheap, and only good enough to choose what is refitted."""
+"""An estimate of what each trial gains, from derivatives at the baseline: cheap, and good enough to choose what to refit."""
 
 import math
 from typing import Any, NamedTuple
@@ -15,41 +15,42 @@ from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]
 
-_FURTHEST = 8.0  # times the starting size that a screening may go
+# Bounds of a screened start: times the trial's own size, and tolerances of a nuisance. Too small: large effects look too small
+# to matter. Too large: starts lie where the derivatives no longer hold.
+_FURTHEST = 8.0
 _FURTHEST_TOLERANCES = 3.0
 
 
 class Screened(NamedTuple):
-    """A trial with a better start, and the chi2 that its direction would leave if everything were linear."""
+    """A trial with a better start, and the chi2 that would be left if the model were linear."""
 
-    hypothesis: Hypothesis  # with the effects of the base
-    deviations: Floats
-    w: Floats
-    chi2: float  # infinite where nothing was screened
-    others: tuple[tuple[Floats, Floats], ...]  # more starts, deviations and w: a refit takes the best of all
+    hypothesis: Hypothesis  # the trial's effects together with those of the fit that the trial is added to
+    deviations: Floats  # start of the nuisances, in tolerances [nuisances]
+    w: Floats  # start of the coordinates [coordinates]
+    chi2: float  # infinite for a start that was not screened
+    others: tuple[tuple[Floats, Floats], ...]  # further starts, deviations and w; a refit takes the best of all starts
 
 
 class Origin(NamedTuple):
-    """A fit of the rig without effects that a search starts from, and the knee it was fitted under."""
+    """A fit without effects that a search starts from, and the knee of the compression that it was fitted under."""
 
     fit: Fit
     knee: float
 
 
 class _Base(NamedTuple):
-    """A fit that trials are added to, what it predicts [features] and the slope of the compression there [compared]."""
+    """A fit that trials are added to, with the prediction and the nuisances' directions there."""
 
     fit: Fit
-    predicted: Floats
-    slope: Floats
+    predicted: Floats  # [features]
+    slope: Floats  # derivative of the compression [compared]
     directions: "Directions"
 
 
 class Directions:
-    """The nuisances' columns at a fit, to let them move along with any other direction.
+    """The columns of a fit's nuisances and coordinates, which may move along with a further direction.
 
-    What stands at its bound stays there. Where it was let go beyond, it took what a longer delay of the force would have taken:
-    chi2 585, 268 left without any effect, 167 with the delay, which was never tried.
+    A nuisance at its bound stays there; if it went beyond, it would take what an effect causes (docs/method/fits.md).
     """
 
     def __init__(self, fit: Fit, most: Floats) -> None:
@@ -63,24 +64,24 @@ class Directions:
         self.left = self.freed(self.residual)
 
     def freed(self, column: Floats) -> Floats:
-        """What is left of a whitened direction [compared] when the nuisances move along, [compared + nuisances]."""
+        """The rest of a whitened direction [compared] when nuisances and coordinates move along [compared + parameters]."""
         full = np.concatenate([column, np.zeros(len(self.residual) - len(column))])
         return full - self._columns @ (self._inverse @ (self._columns.T @ full))
 
     def moved(self, column: Floats, size: float) -> Floats:
-        """Where nuisances and axes go when `size` of a direction [compared] is taken out of the differences."""
+        """Nuisances and coordinates [parameters] after `size` times a direction [compared] is taken out of the differences."""
         rest = self.residual.copy()
         rest[: len(column)] -= size * column
         return self._at + self._inverse @ (self._columns.T @ rest)
 
 
 def added(base: Hypothesis, more: Hypothesis) -> Hypothesis:
-    """Both effects at once."""
+    """A hypothesis with the effects of both."""
     return Hypothesis(base.forms | more.forms, (*base.coordinates, *more.coordinates))
 
 
 def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Screened | None:
-    """Scale a trial's start, where the model predicts `there`, so that it explains most; nothing where it changes nothing."""
+    """Scale a trial's start, where the model predicts `there` [features], so that chi2 is least; None if nothing changes."""
     base, directions = origin.fit, origin.directions
     column = fitter.column(origin.predicted, there, origin.slope)
     direction = directions.freed(column)
@@ -108,20 +109,20 @@ def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Scree
 
 
 def screened(fitter: Fitter, origins: list[Origin], trials: list[Trial], jobs: int = 1) -> list[list[Screened]]:
-    """All trials that change anything from each origin, the most promising first."""
+    """For each origin all trials that change a prediction, the lowest estimated chi2 first; in `jobs` processes."""
     return [_screened(fitter, one.fit, one.knee, trials, jobs) for one in origins]
 
 
 def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs: int) -> list[Screened]:
-    """All trials that change anything, the most promising first."""
+    """All trials that change a prediction, the lowest estimated chi2 first."""
     shares = each(jobs, _screened_share, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
-    # in the order of the trials, or which of two as good comes first would depend on `jobs`
+    # in the order of the trials: otherwise `jobs` would decide which of two equal trials comes first
     in_order = (shares[number % jobs][number // jobs] for number in range(len(trials)))
     return sorted((one for one in in_order if one is not None), key=lambda one: one.chi2)
 
 
 def beside_origin(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int) -> list[Screened]:
-    """The trials of other effects beside one that is there."""
+    """The trials of all other effects, screened in addition to the effects of `first`; the lowest estimated chi2 first."""
     others = [trial for trial in trials if not set(trial.hypothesis.effects) & set(first.hypothesis.effects)]
     return _screened(fitter, first, KNEE, others, jobs)
 
