@@ -1,7 +1,7 @@
 """The flexible residual: every effect of the library at once, in its first form, blended linearly with a ridge.
 
-It names nothing; it says how far the gap could be closed by something as free as this. What a named effect closes is measured
-against it.
+The blend names no effect. It shows how far so free a model closes the gap on held-out runs; the report compares the named
+effect with it.
 """
 
 from typing import Any
@@ -17,11 +17,22 @@ from diagnosis.processes import each
 from diagnosis.verdict.held_out import HeldOut
 
 Floats = npt.NDArray[np.floating[Any]]
-_STEP = 0.5  # of a nuisance's tolerance
+# Step for the derivatives of the nuisances on the held-out runs, in tolerances. Too small: the grid of the features shows.
+# Too large: curvature does.
+_STEP = 0.5
 
 
 def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
-    """Differences on the held-out runs in floors [compared] under the blend that was fitted to the others."""
+    """Differences on the held-out runs, in floors [compared], under the blend that is fitted to the other runs.
+
+    Args:
+        fitter: of the fitted runs.
+        base: the baseline.
+        trials: the library's trials; the first trial of every effect takes part.
+        held_out: the held-out runs.
+        jobs: processes.
+
+    """
     trials = list({trial.hypothesis.effects: trial for trial in reversed(trials)}.values())
     directions = Directions(base, fitter.most)
     here = fitter.predicted(base.deviations, {})

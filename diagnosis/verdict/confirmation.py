@@ -1,4 +1,4 @@
-"""What becomes of a verdict on the runs that no fit has seen."""
+"""Whether the held-out runs, which no fit has seen, confirm a verdict."""
 
 from typing import NamedTuple
 
@@ -9,22 +9,30 @@ from diagnosis.verdict.held_out import MORE_THAN_RIGHT, HeldOut
 from diagnosis.verdict.judge import Verdict, doubted, is_of_one_place
 from diagnosis.verdict.selection import Contest
 
-# Floors that the rig without effects leaves. What varies at random scatters in every run: of 15 rigs of 2 limits or more
-# two left less, and showed no gap in the fitted runs; of 60 without a gap half, and one of them had been called a rough track.
+# Noise floors that the baseline leaves on the held-out runs: up to here a random effect is not named, as it scatters in every
+# run. Too small: chance scatter in the fitted runs is named. Too large: weak random effects are lost.
+# Counted: docs/method/verdict.md.
 _NO_GAP = 1.0
 
 
 class Confirmation(NamedTuple):
-    """The last word."""
+    """The final verdict, after a look at the held-out runs."""
 
     verdict: Verdict
-    best: Fit  # what is named, or the rig without effects
-    gone: Fit | None  # what won, and is refuted
-    held_out: HeldOut | None  # the runs kept aside, if there are any
+    best: Fit  # the named fit, or the baseline
+    gone: Fit | None  # the fit that had won, if the held-out runs refute it
+    held_out: HeldOut | None  # None where the evidence holds out no run
 
 
 def borne_out(contest: Contest, unseen: Problem | None, jobs: int) -> Confirmation:
-    """The verdict of a contest if the runs kept aside bear it out; what else is left if they refute it."""
+    """The verdict of a contest if the held-out runs confirm it, otherwise the verdict that remains.
+
+    Args:
+        contest: what was fitted, and the verdict over it.
+        unseen: the problem of the held-out runs; None keeps the verdict.
+        jobs: processes.
+
+    """
     rig, verdict = contest.rig, contest.verdict
     best = verdict.named or rig.fit
     if unseen is None:

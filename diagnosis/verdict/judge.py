@@ -1,10 +1,10 @@
 """From fits to a verdict: is there a gap, which effects close it, and how sure that is.
 
-Fits compete by the logarithm of their evidence, Laplace's approximation: half of how far chi2 falls, less what the freedom of
-their parameters costs. What comes from the differences is divided by the misfit that even the best model leaves, so that a
-model that is wrong everywhere cannot be sure of anything (a quasi-likelihood), and by the jitter of the refits. `none` is the
-rig refitted inside its tolerances. `unexplained` stands for a model that nobody wrote down and that leaves what a right model
-leaves at most: it wins where the best of the library leaves more.
+Fits compete by the logarithm of their evidence, in Laplace's approximation: half the fall of chi2, less a cost for the freedom
+of their parameters. The part of the fall that comes from the differences is divided by the misfit that even the best model
+leaves, so that a model that is wrong everywhere is sure of nothing (a quasi-likelihood), and by the jitter of the refits.
+`none` is the baseline. `unexplained` stands for a model outside the library that leaves as much as a right model leaves at
+most: it wins where the best fit of the library leaves more. Case histories: docs/method/verdict.md.
 """
 
 import math
@@ -51,28 +51,28 @@ _UNDER_RANDOM = 2  # single effects that a random one is tried on top of
 
 
 class RankedFit(NamedTuple):
-    """A fit in the competition."""
+    """A fit with its log evidence."""
 
     fit: Fit
-    evidence: float  # log, against the refitted rig without effects
-    scatters: bool = False  # friction varies at random in it
+    evidence: float  # natural logarithm, against the baseline
+    scatters: bool = False  # whether friction varies at random in the fit
 
 
 class Verdict(NamedTuple):
-    """What came of the competition."""
+    """The answer of one judgement over fits."""
 
     kind: Literal["effect", "no-gap", "unexplained"]
-    named: Fit | None
-    probabilities: dict[str, float]  # of every effect, none and unexplained; they add up to 1
+    named: Fit | None  # None unless `kind` is "effect"
+    probabilities: dict[str, float]  # of every effect, "none" and "unexplained", largest first; they add up to 1
     runner_up: Fit | None
-    ranked: tuple[RankedFit, ...]  # single effects by evidence, the best first
-    scale: float  # the misfit that all evidence is divided by
-    refuted: tuple[str, ...] = ()  # effects that won, and that the runs kept aside do not bear out
-    outside: bool = False  # something shows that is not compared, and that the library lacks
+    ranked: tuple[RankedFit, ...]  # single effects, the largest evidence first
+    scale: float  # the misfit that all evidence is divided by, at least 1
+    refuted: tuple[str, ...] = ()  # effects that won, and that the held-out runs do not confirm
+    outside: bool = False  # whether the runs show a vibration that no feature compares and no effect makes
 
 
 def _left_by_right(base: Fit, best: RankedFit, expected_chi2: float) -> float:
-    """What a right explanation leaves at most; nothing more than the expected where noise hides the slips."""
+    """The largest chi2 that a right explanation leaves; the expected chi2 where noise hides the slips."""
     if hidden_by_noise(base, expected_chi2):
         return expected_chi2
     one = len(best.fit.hypothesis.effects) == 1 and not best.scatters and not _is_exact(best.fit)
@@ -81,12 +81,12 @@ def _left_by_right(base: Fit, best: RankedFit, expected_chi2: float) -> float:
 
 
 def _is_exact(fit: Fit) -> bool:
-    """Whether an effect can have no other formula."""
+    """Whether all effects of a fit have only one possible formula."""
     return _EXACT.issuperset(fit.hypothesis.effects)
 
 
 def occam(fit: Fit) -> float:
-    """Log evidence that the freedom of the effects' parameters costs."""
+    """The log evidence that the freedom of the effects' coordinates costs; 0 for a fit without effects."""
     if not fit.hypothesis.coordinates:
         return 0.0
     own = len(fit.deviations)
@@ -102,14 +102,14 @@ def judge(
     random: Sequence[RandomFriction] = (),
     refuted: bool = False,
 ) -> Verdict:
-    """The verdict over single effects and pairs of them.
+    """The verdict over single effects and pairs of effects.
 
     Args:
-        base: the rig without effects.
-        singles, pairs: the best fit of each, best first.
-        expected_chi2: of a perfect model.
-        random: effects that vary at random, to be judged alone and on top of the best single effects.
-        refuted: the runs kept aside do not bear out the effect that wins here.
+        base: the baseline.
+        singles, pairs: the best fit of every single effect and of every pair, the lowest chi2 first.
+        expected_chi2: chi2 of a perfect model.
+        random: effects that vary at random; each is judged alone and on top of the best single effects.
+        refuted: whether the held-out runs refute the effect that wins here.
 
     """
     alone, doubles, scale = _models(base, singles, pairs, expected_chi2, random)
@@ -130,7 +130,8 @@ def judge(
     probabilities = with_mistakes(softmax(scores), leaders, mistaken)
     if best is None or top == "none":
         return Verdict("no-gap", None, probabilities, ranked[0].fit if ranked else None, tuple(ranked), scale)
-    followed = [one.fit for one in ranked if not is_random(one.fit.hypothesis)]  # no run separates a path from a path
+    # fits whose friction can be predicted: no experiment separates two random paths
+    followed = [one.fit for one in ranked if not is_random(one.fit.hypothesis)]
     if top == "unexplained":
         nearest = followed[0] if followed and is_random(best.fit.hypothesis) else best.fit
         gone = best.fit.hypothesis.effects if refuted else ()
@@ -145,14 +146,14 @@ def judge(
 def _models(
     base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
 ) -> tuple[list[RankedFit], list[RankedFit], float]:
-    """Single effects and pairs with their evidence, and the misfit that it is divided by."""
+    """Single effects and pairs with their evidence, and the misfit that all evidence is divided by."""
 
     def scattered(noise: float) -> list[tuple[Fit, str, Scattered]]:
-        """What lies under a random effect, the effect, and both."""
+        """For every random effect and every fit that it is added to: the fit, the effect's name, and both together."""
         found: list[tuple[Fit, str, Scattered]] = []
         for effect in random:
             others = [one for one in singles if effect.effect not in one.hypothesis.effects][:_UNDER_RANDOM]
-            # a track is more than the two waves of its form: what they leave was named as a load beside it
+            # a real track has more than the two waves of its form; without its random part the rest would be named as a load
             own = [one for one in singles[:_UNDER_RANDOM] if effect.effect in one.hypothesis.effects]
             found += [(fit, effect.effect, effect.on(fit, noise)) for fit in (base, *others, *own)]
         return found
@@ -170,7 +171,7 @@ def _models(
     doubles = [model(fit) for fit in pairs]
     for (under, effect, both), (*_, close) in zip(scattered(scale * JITTER), closest, strict=True):
         if close.fit.chi2 > NEVER_WITHOUT_GAP * expected_chi2:
-            continue  # so free a path leaves no more if it is the cause; a plug that came loose left 4.5 times the expected
+            continue  # a random path is so free that it leaves no more than this where it is the cause
         if under is base:
             alone.append(RankedFit(both.fit, both.gained, scatters=True))
         elif effect in under.hypothesis.effects:
@@ -184,12 +185,12 @@ def _models(
 
 
 def _pays(double: RankedFit, first: RankedFit, base: Fit, expected_chi2: float) -> bool:
-    """Whether a second effect is worth naming beside the best single one."""
+    """Whether a second effect gains enough to be named beside the best single effect."""
     taken = first.fit.chi2 - double.fit.chi2
     closed = taken / max(first.fit.chi2 - expected_chi2, 1.0)
     adds = taken / max(base.chi2 - double.fit.chi2, 1.0)
     completes = much_left(first.fit, expected_chi2) and not much_left(double.fit, expected_chi2)
-    # a path leaves little of anything: beside friction that differs by direction, at 208 of 90 expected, a track was named
+    # A random path takes nearly any rest, so it is not added to a single effect that is explained by itself.
     needless = double.scatters and first.fit.chi2 <= _left_by_right(base, first, expected_chi2)
     is_mismatch = adds < _SECOND_ADDS and not completes and not _is_exact(first.fit)
     gained = double.evidence - first.evidence
@@ -197,12 +198,12 @@ def _pays(double: RankedFit, first: RankedFit, base: Fit, expected_chi2: float) 
 
 
 def _of_no_effect(base: Fit, best: RankedFit | None, scale: float, expected_chi2: float) -> dict[str, float]:
-    """Log evidence of `none` and `unexplained`."""
+    """The log evidence of `none` and of `unexplained`."""
     certain = max(base.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
     against_none = 0.5 * certain / JITTER
     none = COST_OF_EFFECT - against_none
     unknown = 0.5 * (base.chi2 - expected_chi2) / (scale * JITTER)
-    if best is not None:  # what nobody wrote down would pay as much for its freedom as the best that somebody did
+    if best is not None:  # the unknown model pays as much for its freedom as the best model of the library
         unknown = best.evidence + 0.5 * (best.fit.chi2 - _left_by_right(base, best, expected_chi2)) / (scale * JITTER)
     unknown -= _COST_OF_UNKNOWN
     if against_none > 0.0:
@@ -211,12 +212,12 @@ def _of_no_effect(base: Fit, best: RankedFit | None, scale: float, expected_chi2
 
 
 def _of_effects(ranked: list[RankedFit], double: RankedFit | None) -> dict[str, float]:
-    """Log evidence of every effect of the library."""
+    """The log evidence of every effect of the library; the two effects of a named pair share its evidence."""
     alone = {
         one.fit.hypothesis.effects[0]: one.evidence for one in reversed(ranked)
     }  # the better one of two forms last
     scores: dict[str, float] = {}
-    if double is not None:  # both as probable, so the stronger one first
+    if double is not None:  # both get one evidence, so the effect with the larger evidence alone comes first
         for name in sorted(double.fit.hypothesis.effects, key=lambda name: -alone.get(name, -math.inf)):
             scores[name] = double.evidence - math.log(2.0)
     for name in (*alone, *EFFECTS):
@@ -225,38 +226,38 @@ def _of_effects(ranked: list[RankedFit], double: RankedFit | None) -> dict[str, 
 
 
 def is_of_one_place(fit: Fit) -> bool:
-    """Whether a fit is waves of the track alone: elsewhere it may have others."""
+    """Whether a fit has waves of the track and nothing else; another stretch of the track may have other waves."""
     return fit.hypothesis.effects == (TRACK,) and not is_random(fit.hypothesis)
 
 
 def of_another_place(
     base: Fit, singles: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
 ) -> Verdict | None:
-    """The verdict without the track's waves, which another run refutes, if that is friction that varies at random.
+    """The verdict without the waves of the track, if friction that varies at random then wins; otherwise None.
 
-    A track of three waves, told by two of them, left 3.98 of 5.63 floors of a run elsewhere; what it scatters closes 0.61.
+    For a verdict that a held-out run on another stretch of the track refutes: there the scatter may fit where the waves do not.
     """
     verdict = judge(base, [fit for fit in singles if not is_of_one_place(fit)], [], expected_chi2, random)
     return verdict if verdict.named is not None and is_random(verdict.named.hypothesis) else None
 
 
 def refittable(verdict: Verdict) -> bool:
-    """Whether a single effect was named that a prediction can follow."""
+    """Whether the verdict names a single effect that is not random, so that it can be refitted to a prediction."""
     named = verdict.named
     return named is not None and len(named.hypothesis.effects) == 1 and not is_random(named.hypothesis)
 
 
 def doubted(verdict: Verdict) -> Verdict:
-    """The same name, less sure of it: it leaves more of the runs kept aside than right ones do."""
+    """The same answer with a lower probability, for a fit that leaves more of the held-out runs than right fits do."""
     assert verdict.named is not None, "nothing is named"  # noqa: S101
     leaders = verdict.named.hypothesis.effects
     return verdict._replace(probabilities=with_mistakes(verdict.probabilities, leaders, MISTAKEN_DOUBTFUL))
 
 
 def although_outside(verdict: Verdict, imitators: frozenset[str] = frozenset()) -> Verdict:
-    """The verdict where something shows that no fit looks at, and that no effect of the library makes.
+    """The verdict where the runs show a vibration that no feature compares and no effect of the library makes.
 
-    That is never "no gap", nor what would imitate it alone.
+    "No gap" becomes "unexplained", and so does a verdict that names only effects of `imitators`, which that vibration imitates.
     """
     named = verdict.named
     if verdict.kind == "no-gap":

@@ -1,4 +1,4 @@
-"""Which effects these runs cannot tell apart: what explains them as well, and what imitates the effect that was named."""
+"""Which effects these runs cannot tell apart: effects that explain them equally well, or that imitate the named effect."""
 
 import copy
 
@@ -6,24 +6,24 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.verdict.judge import JITTER, RankedFit
 
-# Log evidence: what explains the runs, or imitates the named effect, to within this could as well have been named. A delay of the
-# force of 9 limits was 1.4 behind a slow sensor that it could not have imitated: neither formula was quite the rig's.
+# Log evidence within which two effects count as alike. Too small: a name stands alone although another fits as well.
+# Too large: effects that the runs separate are called alike. Counted: docs/method/verdict.md.
 _SAME = 6.0
-_TRIED = 4  # candidates behind the named one
+_TRIED = 4  # candidates behind the named effect that are compared with it; each may cost a refit
 
 
 def imitators(fitter: Fitter, ranked: list[RankedFit], scale: float) -> tuple[str, ...]:
-    """The named effect and those that would have explained its runs as well; empty where it stands alone.
+    """The named effect, then the effects that explain its runs equally well; empty where no other effect does.
 
     Args:
         fitter: of the fitted runs.
-        ranked: single effects, the named one first.
-        scale: the misfit of the verdict.
+        ranked: single effects, the named effect first.
+        scale: the misfit that the verdict's evidence is divided by.
 
     """
     named = ranked[0]
     perfect = copy.copy(fitter.problem)
-    # what the rig would have shown if the named effect were all of the truth
+    # the features that the rig would show if the named effect were its only effect
     perfect.measured = fitter.predicted(named.fit.deviations, named.fit.effects) + fitter.floor.bias
     imitated = fitter.for_problem(perfect)
     alike = [
@@ -36,7 +36,7 @@ def imitators(fitter: Fitter, ranked: list[RankedFit], scale: float) -> tuple[st
 
 
 def _loss(imitated: Fitter, named: Fit, other: Fit, scale: float) -> float:
-    """Log evidence that an effect is behind the truth in the truth's own runs."""
+    """The log evidence by which `other` is behind `named` on runs that `named` alone has made."""
     there = imitated.judged(named)
     best = imitated.refit(other.hypothesis, other.deviations, other.w)
     closer = float(best.residual @ best.residual - there.residual @ there.residual)

@@ -1,4 +1,4 @@
-"""From evidence to probabilities, told down by how often answers like these were mistaken."""
+"""From evidence to probabilities, lowered by how often answers of the same kind were wrong."""
 
 import math
 from typing import NamedTuple
@@ -9,11 +9,11 @@ _TEMPERATURE = 3.0  # of the probabilities: a guess
 
 
 class _Mistaken(NamedTuple):
-    """How often a verdict turned out to be something else."""
+    """Shares of verdicts of one kind whose truth was something else."""
 
-    none: float
-    unexplained: float
-    other_effect: float
+    none: float  # no gap
+    unexplained: float  # an effect outside the library
+    other_effect: float  # another effect of the library
 
 
 # How often verdicts on two opened sets were wrong: 29 of 102 without a gap, 9 of 48 unexplained, 10 of 43 on two effects (8 had
@@ -31,7 +31,7 @@ MISTAKEN_DOUBTFUL = _Mistaken(0.0, 0.25, 0.15)
 
 
 def softmax(scores: dict[str, float]) -> dict[str, float]:
-    """Scores, in natural logarithms, as probabilities that add up to 1."""
+    """Scores, in natural logarithms, as probabilities that add up to 1, the largest first."""
     highest = max(scores.values())
     weights = {name: math.exp((score - highest) / _TEMPERATURE) for name, score in scores.items()}
     total = sum(weights.values())
@@ -39,7 +39,7 @@ def softmax(scores: dict[str, float]) -> dict[str, float]:
 
 
 def mistaken_of(leaders: tuple[str, ...], random: bool) -> _Mistaken:
-    """`random`: the best model varies at random."""
+    """How often verdicts on these leaders were wrong; `random` says that the best model varies at random."""
     if leaders == ("none",):
         return _MISTAKEN_NONE
     if leaders == ("unexplained",):
@@ -50,9 +50,9 @@ def mistaken_of(leaders: tuple[str, ...], random: bool) -> _Mistaken:
 
 
 def with_mistakes(probabilities: dict[str, float], leaders: tuple[str, ...], mistaken: _Mistaken) -> dict[str, float]:
-    """Probabilities of which the leading ones give to all others what verdicts like it were mistaken in.
+    """Probabilities after the leaders give away the share in which verdicts of their kind were wrong.
 
-    In proportion to how far each is ahead, so that it stays ahead.
+    Each leader gives in proportion to its lead over the best of the others, so that it stays ahead.
     """
     behind = max(value for name, value in probabilities.items() if name not in leaders)
     ahead = {name: probabilities[name] - behind for name in leaders}
