@@ -1,4 +1,4 @@
-"""From fits and a verdict to what is reported: candidates, cells, what the runs kept aside say, what to do next."""
+"""From fits and a verdict to a diagnosis: candidates, cells of the gap, the gap on held-out runs, the next experiment."""
 
 import math
 import time
@@ -34,7 +34,9 @@ from diagnosis.verdict.lookalikes import imitators
 from diagnosis.verdict.selection import Contest
 
 Floats = npt.NDArray[np.floating[Any]]
-_MUCH_CHANGING = 0.2  # of a run: ramps of a drive and a piezo take less
+# Share of a run that may pass while speed or vibration change before a finding says so. Too small: the ramps of a drive and a
+# piezo raise it. Too large: a run is hardly compared and nothing tells.
+_MUCH_CHANGING = 0.2
 
 
 def assembled(
@@ -49,11 +51,11 @@ def assembled(
     """The diagnosis of an evidence.
 
     Args:
-        evidence, runs: what was read, and its runs, those kept aside among them.
-        contest: what was fitted.
-        outcome: what came of it.
+        evidence, runs: the evidence as read, and all its runs, held-out runs among them.
+        contest: all fits, and the verdict over them.
+        outcome: the final verdict, after the held-out runs.
         tried: the library's trials.
-        began: `time.monotonic()` when the work did.
+        began: `time.monotonic()` at the start of the diagnosis.
         jobs: processes.
 
     """
@@ -115,7 +117,7 @@ def assembled(
 
 
 def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
-    """What is judged on the runs kept aside: what is named, or was until they refuted it (`gone`), then the runner-up."""
+    """The fits whose gap is reported on the held-out runs: the named fit, or the refuted one (`gone`), then the runner-up."""
     first, second = verdict.named or gone, verdict.runner_up
     if first is None or second is None:
         return [fit for fit in (first, second) if fit is not None]
@@ -150,7 +152,7 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
 
 
 def _changing(runs: list[Prepared]) -> Iterator[Finding]:
-    """What is not compared since speed or vibration do not stay the same for long enough: nothing else would tell."""
+    """A finding for every run that is hardly compared because speed or vibration change all the time."""
     for run in runs:
         seconds, length_s = run.commands.changing_s, len(run.commands.drive) * BLOCK_S
         if seconds > _MUCH_CHANGING * length_s:
@@ -163,7 +165,7 @@ def _shrinkage(who: str, closed: Closed) -> Shrinkage:
 
 
 def _cells(floor: Floor, z: Floats) -> list[Cell]:
-    """Cells with what they hold above the floor; all that they hold where nothing is above it."""
+    """Cells with their squared differences above the floor; with all of them where no cell is above the floor."""
     squares = cell_squares(floor, z)
     above = np.maximum(squares - floor.level**2, 0.0)
     shares = above if above.sum() > 0.0 else squares
@@ -175,7 +177,7 @@ def _cells(floor: Floor, z: Floats) -> list[Cell]:
 
 
 def _vibrating(evidence: Evidence) -> list[Cell]:
-    """Cells of what vibrates as no model does, in what is ordinary, as the others are in floors."""
+    """Cells for vibrations that no model makes: sizes in ordinary vibrations, where other cells count in floors."""
     found = [
         (signal, run.file, one)
         for run in evidence.runs
@@ -198,9 +200,9 @@ def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
 
 
 def estimate_of(axis: Coordinate, w: float, deviation: float) -> Estimate:
-    """A parameter with its 90 % interval, from its coordinate and the standard deviation of that."""
+    """A parameter with its 90 % interval, from the value of its coordinate and that value's standard deviation."""
     value, half = axis.value(w), 1.645 * deviation
-    if is_phase(axis.name):  # round the value, and not round again where it passes pi
+    if is_phase(axis.name):  # half a turn either way at most, and no wrap where an end passes pi
         half = min(half * axis.scale, math.pi)
         return Estimate(value, (value - half, value + half))
     low, high = sorted((axis.value(w - half), axis.value(w + half)))

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one HTML file that needs nothing else, the answer first."""
+"""The report of a diagnosis: one HTML file that needs no other file, with the answer first."""
 
 import math
 from pathlib import Path
@@ -11,13 +11,15 @@ from diagnosis.report.page_plots import STYLES, draw
 from diagnosis.result import Candidate, Cell, Diagnosis, Gap, RigNumber
 
 _REGIMES = ("stick", "breakaway", "slip", "restick", "steady")
-_SMALL = 0.005  # a row of the map that no run brings above this is left out, and counted
+# Share of the gap below which a row of the map is left out and only counted. Smaller: a long map. Larger: rows are missed.
+_SMALL = 0.005
+# Probability below which an effect is listed by name alone. Smaller: a long table. Larger: candidates are missed.
 _SMALL_PROBABILITY = 0.015
 _BANNERS: Final = {"effect": "An effect was found", "no-gap": "No gap", "unexplained": "Unexplained gap"}
 
 
 class GapBar(NamedTuple):
-    """One bar of the gap chart; `width` in percent of the widest."""
+    """One bar of the gap chart; `value` in noise floors, `width` in percent of the widest bar."""
 
     label: str
     value: float
@@ -26,7 +28,7 @@ class GapBar(NamedTuple):
 
 
 class MapRow(NamedTuple):
-    """One row of the map: where, and its share in every run (None: no such cell)."""
+    """One row of the map: the place of a cell, and its share of the gap in every run (None where a run has no such cell)."""
 
     signal: str
     regime: str
@@ -35,7 +37,10 @@ class MapRow(NamedTuple):
 
 
 class RigRow(NamedTuple):
-    """One number of the rig, in words; `shift_sd` is None where it counts as known exactly or is not a number."""
+    """One number of the rig, in words.
+
+    `shift_sd` is the refitted less the described number, in tolerances; None for a number that is known exactly or not finite.
+    """
 
     name: str
     described: str
@@ -50,7 +55,7 @@ def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path) -> None:
 
 
 def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
-    """The report as text."""
+    """The report as the text of an HTML file."""
     from jinja2 import Environment, StrictUndefined  # noqa: PLC0415
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -89,12 +94,12 @@ def _estimates(candidate: Candidate) -> list[str]:
 
 
 def _meaning(effect: str) -> str:
-    """In plain words; empty for one that has no words here."""
+    """An effect in plain words; empty for an effect without words."""
     return words.EFFECT_WORDS.get(effect, "")
 
 
 def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
-    """Rig as described, retuned, and with the effect if one is named; a bar that is no number has no width."""
+    """Bars for the rig as described, the baseline, and the named effect if there is one; a gap of NaN has no width."""
     bars = [("the rig as described", gap.nominal, "nominal"), ("retuned inside its tolerances", gap.retuned, "retuned")]
     if named:
         bars.append(("with the best explanation", gap.with_effect, "effect"))
@@ -115,7 +120,7 @@ def _widest(gap: Gap) -> float:
 
 
 def where_map(cells: tuple[Cell, ...]) -> tuple[list[str], list[MapRow], float]:
-    """The runs, the rows that matter, and the share of all the rows that were left out."""
+    """The runs, the rows above `_SMALL`, and the summed share of the rows that were left out."""
     runs = sorted({cell.run for cell in cells})
     table: dict[tuple[str, str, tuple[float, float]], dict[str, float]] = {}
     for cell in cells:
@@ -140,12 +145,12 @@ def _cell_in_words(cell: Cell) -> str:
 
 
 def _place(regime: str) -> tuple[int, str]:
-    """The regimes in the order of a cycle, unknown ones last."""
+    """The place of a regime in the order of a cycle; unknown regimes come last."""
     return (_REGIMES.index(regime) if regime in _REGIMES else len(_REGIMES), regime)
 
 
 def rig_row(parameter: RigNumber) -> RigRow:
-    """A number of the rig as the table shows it."""
+    """A number of the rig as a row of the table."""
     name, unit = units.name_and_unit(parameter.name)
     scale = (parameter.described or 1.0) * parameter.tolerance
     shift: Any = (parameter.retuned - parameter.described) / scale if scale else None

@@ -1,4 +1,4 @@
-"""The pictures of a diagnosis as PNG inside the page, together small enough to be mailed."""
+"""The pictures of a diagnosis as PNG inside the page, together small enough for a mail."""
 
 import base64
 import io
@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DPI = 110.0
-_ALL_BYTES = 3_500_000  # of base64; the page is to stay under 5 MB
-# the same colours everywhere in the page; told apart by line style as well
+# Bytes of base64 for all pictures. Larger: the page grows beyond 5 MB and mail servers refuse it. Smaller: coarse pictures.
+_ALL_BYTES = 3_500_000
+# the same colours everywhere in the page; line styles differ as well, for readers who do not see the colours
 STYLES: Final[dict[str, dict[str, Any]]] = {
     "measured": {"color": "#1c2833", "linewidth": 1.6},
     "nominal": {"color": "#808b96", "linewidth": 1.2, "linestyle": ":"},
@@ -33,14 +34,14 @@ class Drawn(NamedTuple):
 
 
 def draw(pictures: tuple[Picture, ...]) -> list[Drawn]:
-    """Draw every picture, all of them together in 3.5 MB: with very many, coarser."""
+    """Draw every picture; all together take at most 3.5 MB, so many pictures are drawn with fewer pixels."""
     dpi = _DPI
     while True:
         drawn = [Drawn(picture.title, picture.kind, _png(_figure(picture), dpi)) for picture in pictures]
         size = sum(len(one.png) for one in drawn)
         if size <= _ALL_BYTES:
             return drawn
-        # the size goes a little slower than the number of pixels
+        # The size falls a little slower than the number of pixels, so 0.8 keeps the number of rounds small.
         dpi *= 0.8 * math.sqrt(_ALL_BYTES / size)
 
 
@@ -59,19 +60,19 @@ def _figure(picture: Picture) -> "Figure":
     if picture.kind == "residual":
         axis.axhline(0.0, color="#808b96", linewidth=0.8)
     if any(curve.label for curve in picture.curves):
-        # above the curves: inside it could hide them
+        # above the curves, as a legend between the curves could hide them
         figure.legend(loc="outside upper left", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
 def _finite(curve: Curve) -> tuple[Any, Any]:
-    """Infinity as NaN, which is drawn as a hole."""
+    """The points of a curve, with infinity as NaN: matplotlib draws NaN as a hole."""
     x, y = (np.where(np.isfinite(values), values, np.nan) for values in (curve.x, curve.y))
     return x, y
 
 
 def _plain(text: str) -> str:
-    """Text that is not taken for a formula, nor left out of a legend."""
+    """A label as plain text: `$` would begin a formula, and a legend leaves out labels that begin with `_`."""
     return text.replace("$", r"\$").removeprefix("_")
 
 

@@ -1,4 +1,4 @@
-"""A diagnosis turned into a rig file: the refitted numbers, and the named effects with their fitted parameters."""
+"""A diagnosis as a rig file: the refitted numbers, and the named effects with their fitted parameters."""
 
 import math
 from pathlib import Path
@@ -13,7 +13,7 @@ from diagnosis.report.words import headline
 from diagnosis.result import Diagnosis
 from plant.config import RigConfig
 
-# of the evidence's rig table -> of a rig file
+# name in the evidence's rig table -> table and key of a rig file
 _PLACES: Final = {
     "mass_kg": ("slide", "mass_kg"),
     "drive_stiffness_N_per_m": ("drive", "stiffness_N_per_m"),
@@ -32,7 +32,7 @@ _DIGITS = 7
 def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
     """Write the corrected rig to `path`, whole or not at all; `stickslip run --rig` reads it.
 
-    Raises Fault CONFIG where a diagnosis gives no rig that the plant can be, OSError when the file cannot be written.
+    Raises Fault CONFIG where the diagnosis gives no rig that the plant can simulate, OSError when the file cannot be written.
     """
     refuse_force_drive(evidence)
     name = evidence.folder.name
@@ -48,7 +48,7 @@ def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
 
 
 def refuse_force_drive(evidence: Evidence) -> None:
-    """Raise Fault CONFIG for a rig that no rig file can describe."""
+    """Raise Fault CONFIG for a force-driven rig, which no rig file can describe."""
     name = evidence.folder.name
     if evidence.rig.drive == "force":
         raise Fault(
@@ -59,10 +59,10 @@ def refuse_force_drive(evidence: Evidence) -> None:
 
 
 def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
-    """The corrected rig as the tables of a rig file."""
+    """The corrected rig as the tables of a rig file, named after the evidence's folder."""
     values = {name: value for name, value in evidence.rig.values().items() if value is not None}
     values |= {parameter.name: parameter.retuned for parameter in diagnosis.rig}
-    # refitted one by one they may cross; a contact cannot
+    # The two forces are refitted one by one and may cross; the plant refuses a static force below the Coulomb force.
     values["static_force_N"] = max(values["static_force_N"], values["coulomb_force_N"])
     table: dict[str, Any] = {"name": f"{_word(evidence.folder.name)}-diagnosed"}
     for name, (part, key) in _PLACES.items():
@@ -105,10 +105,10 @@ def _line(key: str, value: float | str) -> str:
     if isinstance(value, str):
         return f'{key} = "{value}"'
     text = f"{value:.{_DIGITS}g}"
-    # TOML takes 1e5 and 1.0 for floats and 1 for an integer
+    # TOML reads 1e5 and 1.0 as floats, and 1 as an integer
     return f"{key} = {text}" if any(mark in text for mark in ".e") else f"{key} = {text}.0"
 
 
 def _word(text: str) -> str:
-    """A folder's name without what a quoted name or a comment cannot hold."""
+    """A folder's name without the characters that a quoted name or a comment cannot hold."""
     return "".join(letter if letter.isprintable() and letter not in '"\\' else "-" for letter in text) or "evidence"

@@ -1,4 +1,4 @@
-"""The answer in plain words, the first sentence first."""
+"""The answer of a diagnosis in sentences."""
 
 import math
 
@@ -10,11 +10,11 @@ from diagnosis.report.words import EFFECT_WORDS, cannot_tell, estimate_in_words
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
-_SMALL_SHARE = 0.05
+_SMALL_SHARE = 0.05  # of the gap: regimes with less are not told
 
 
 def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Sentences for a person at the machine."""
+    """Sentences for a person at the machine, the verdict first and the next experiment last."""
     gap, unexplained = diagnosis.gap, diagnosis.verdict == "unexplained"
     sentences: list[str] = []
     if diagnosis.verdict == "no-gap":

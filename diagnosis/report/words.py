@@ -1,4 +1,4 @@
-"""How a diagnosis is put into words: verdicts, numbers with their units, and what each effect means on a machine."""
+"""A diagnosis in words: verdicts, numbers with their units, and what each effect means on a machine."""
 
 import math
 from typing import Final
@@ -36,7 +36,9 @@ EFFECT_WORDS: Final = {
     "none": "the rig as described, inside its tolerances, is enough",
     "unexplained": "there is a gap, and nothing in the library closes it",
 }
-_FAR_FOR_NO_GAP = 2.0  # floors on the held-out runs; evidence without a gap shows 0.8 to 1.7
+# Noise floors that the baseline may leave on held-out runs for an answer of "no gap". Too small: a good "no gap" is doubted.
+# Too large: a gap that shows only on held-out runs is not told. Counted: docs/method/report.md.
+_FAR_FOR_NO_GAP = 2.0
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -45,13 +47,13 @@ def headline(diagnosis: Diagnosis) -> str:
 
 
 def cannot_tell(diagnosis: Diagnosis) -> bool:
-    """Whether the fitted runs show no gap, and those kept aside do."""
+    """Whether the fitted runs show no gap and the held-out runs do."""
     gap = diagnosis.gap
     return diagnosis.verdict == "no-gap" and bool(gap.runs) and gap.retuned > _FAR_FOR_NO_GAP
 
 
 def answer(diagnosis: Diagnosis) -> str:
-    """What the verdict means here, in one line."""
+    """The answer in one line, without the word of the verdict."""
     if diagnosis.verdict == "no-gap":
         if cannot_tell(diagnosis):
             return f"these runs cannot tell, what was kept aside is {times(diagnosis.gap.retuned)} noise floors off"
@@ -67,7 +69,7 @@ def answer(diagnosis: Diagnosis) -> str:
 
 
 def estimate_in_words(name: str, estimate: Estimate) -> str:
-    """`gap 81 µm (90 %: 76 to 86)`; an interval that is not finite is left out."""
+    """A parameter in words, such as `gap 81 µm (90 %: 76 to 86)`; an interval that is not finite is left out."""
     word, unit = name_and_unit(name)
     low, high = estimate.interval_90
     known = math.isfinite(low) and math.isfinite(high)
