@@ -85,7 +85,7 @@ def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
     gap = diagnosis.gap
     if gap.runs and math.isfinite(gap.with_effect):
         lines.append(
-            f"Gap on runs kept for judging, in noise floors: {gap.nominal:.3g} as described, {gap.with_effect:.3g} so."
+            f"Gap on held-out runs, in noise floors: {gap.nominal:.3g} as described, {gap.with_effect:.3g} so."
         )
     lines += [f"The runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
     lines.append("What is left out is the paper's rig: piezo, sensors and drive profile.")

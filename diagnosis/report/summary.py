@@ -20,8 +20,8 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     if diagnosis.verdict == "no-gap":
         if cannot_tell(diagnosis):
             sentences.append(
-                "These runs cannot tell: nothing beyond the stated tolerances shows in those that were fitted, yet what was "
-                f"kept aside is {times(gap.retuned)} noise floors off."
+                "These runs cannot tell: nothing beyond the stated tolerances shows in those that were fitted, yet the "
+                f"held-out runs are {times(gap.retuned)} noise floors off."
             )
         else:
             sentences.append("No gap beyond the stated tolerances: the rig as described explains these runs.")
@@ -36,7 +36,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             with_it = next(one.gap for one in gap.compared if one.who == names)
             explain, it = ("explains", "it") if len(gap.refuted) == 1 else ("explain", "them")
             sentences.append(
-                f"{names} {explain} the runs that were fitted, but not {', '.join(gap.runs)}, kept aside: "
+                f"{names} {explain} the runs that were fitted, but not {', '.join(gap.runs)}, held out: "
                 f"there the gap is {times(with_it)} noise floors with {it}, {times(gap.retuned)} without."
             )
         nearest = next((one for one in diagnosis.candidates if one.effect not in ("none", "unexplained")), None)
@@ -55,7 +55,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         sentences.append(f"{first.where} {first.text}." + (f" So in {others}." if others else ""))
     if gap.runs and math.isfinite(gap.nominal):
         sentences.append(
-            f"On {', '.join(gap.runs)}, kept aside, rig and model are {times(gap.nominal)} noise floors apart as described, and "
+            f"On {', '.join(gap.runs)}, held out, rig and model are {times(gap.nominal)} noise floors apart as described, and "
             f"{times(gap.retuned)} after refitting the rig's numbers inside their tolerances; 1 is a perfect model."
             + (
                 " So the gap shows in the fitted runs alone."
@@ -87,25 +87,25 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         kept = ", ".join(gap.runs)
         if gap.shrinkage is not None and gap.with_effect > gap.retuned:
             sentences.append(
-                f"On {kept}, kept aside, the gap grows from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
+                f"On {kept}, held out, the gap grows from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
                 "nothing of it is closed there."
             )
         elif gap.shrinkage is not None:
             low, high = gap.interval_90 or (math.nan, math.nan)
             between = f" (90 %: {percent(low)} to {percent(high)})" if math.isfinite(low) else ""
             sentences.append(
-                f"On {kept}, kept aside, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
+                f"On {kept}, held out, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
                 f"{percent(gap.shrinkage)} of what could be closed{between}."
             )
         elif diagnosis.effects:
-            sentences.append(f"On {kept}, kept aside, there is no gap to close: new data have not tested the name.")
+            sentences.append(f"On {kept}, held out, there is no gap to close: new data have not tested the name.")
         if diagnosis.effects and gap.with_effect > MORE_THAN_RIGHT:
             sentences.append(
                 f"A right explanation leaves about 1 there, not {times(gap.with_effect)}: something else acts as well, if only "
                 "a surface rougher than ground steel, or the cause is another one."
             )
     else:
-        why = f"In {', '.join(gap.runs)}, kept aside, nothing can be compared" if gap.runs else "No run was kept aside"
+        why = f"In {', '.join(gap.runs)}, held out, nothing can be compared" if gap.runs else "No run was held out"
         sentences.append(f"{why}: how far the gap closes on new data is not known.")
     if diagnosis.verdict != "no-gap" or diagnosis.next_experiment.gain is not None:
         sentences.append(f"Next: {diagnosis.next_experiment.what}")

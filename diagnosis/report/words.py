@@ -56,7 +56,7 @@ def answer(diagnosis: Diagnosis) -> str:
     """The answer in one line, without the word of the verdict."""
     if diagnosis.verdict == "no-gap":
         if cannot_tell(diagnosis):
-            return f"these runs cannot tell, what was kept aside is {times(diagnosis.gap.retuned)} noise floors off"
+            return f"these runs cannot tell, the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
         return "the rig as described explains these runs"
     if diagnosis.verdict == "unexplained":
         return "these runs differ from the rig as described, and no known effect accounts for it"

@@ -190,7 +190,7 @@ def test_what_scatters_at_random_says_what_else_would(form, said):
 def test_words_fit_what_the_runs_kept_aside_say():
     made = made_up.diagnosis()
     far = made._replace(verdict="no-gap", effects=(), gap=made.gap._replace(retuned=3.4))
-    assert "these runs cannot tell, what was kept aside is 3.4 noise floors off" in in_words.headline(far)
+    assert "these runs cannot tell, the held-out runs are 3.4 noise floors off" in in_words.headline(far)
     worse = made._replace(gap=made.gap._replace(retuned=2.9, with_effect=3.6, shrinkage=-0.37))
     assert "the gap grows from 2.9 to 3.6 noise floors" in " ".join(summary(worse))
     two = ("coulomb-level", "drive-backlash")
@@ -202,11 +202,11 @@ def test_words_fit_what_the_runs_kept_aside_say():
 
 
 @pytest.mark.parametrize(("retuned", "said"), [(0.97, True), (1.3, False)])
-def test_a_gap_that_the_runs_kept_aside_do_not_show_is_said_to_be_in_the_others(retuned, said):
+def test_a_gap_that_the_held_out_runs_do_not_show_is_said_to_be_in_the_others(retuned, said):
     made = made_up.diagnosis()
     gap = made.gap._replace(retuned=retuned)
     told = " ".join(summary(made._replace(verdict="unexplained", effects=(), gap=gap)))
-    assert f"kept aside, rig and model are {gap.nominal:g} noise floors apart" in told
+    assert f"held out, rig and model are {gap.nominal:g} noise floors apart" in told
     assert ("So the gap shows in the fitted runs alone." in told) is said
 
 
@@ -291,7 +291,7 @@ def test_a_name_that_the_runs_kept_aside_do_not_test_says_so(tmp_path):
     made = made_up.diagnosis()
     untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
     assert any(
-        "kept aside, there is no gap to close: new data have not tested the name" in one for one in summary(untested)
+        "held out, there is no gap to close: new data have not tested the name" in one for one in summary(untested)
     )
     page = text_of(page_of(untested, tmp_path))
     assert "There is no gap to close on these runs: they do not test what is named." in page
