@@ -1,4 +1,4 @@
-"""What could be measured next on a rig with a spring drive: a few runs, sized by the speeds and vibrations already used."""
+"""Runs that could be measured next on a rig with a spring drive, sized by the speeds and vibrations already used."""
 
 from typing import NamedTuple
 
@@ -13,14 +13,17 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.model.segment_starts import entries_of
 
-_LONGEST_S = 45.0
-_SHORTEST_S = 4.0
-_CYCLES = 5.0  # stick-slip cycles that a run should show
+_LONGEST_S = 45.0  # no longer run is proposed; larger: more slow speeds, and more time to predict and to measure them
+_SHORTEST_S = 4.0  # a drag lasts at least so long, where `_FARTHEST_M` leaves room; smaller: few features at high speed
+# Stick-slip cycles that a drag shows. Fewer: features of a cycle scatter. More: longer runs.
+_CYCLES = 5.0
+# Longest travel that a drag is planned for. Larger: a slide may not have the room. Smaller: fewer cycles at high speed.
 _FARTHEST_M = 0.02
-_LEAST_S = 1.0  # of a run that can be diagnosed
-_HOLDS_S = (1.0, 10.0, 30.0)
-_WATCHED_S = 10.0
-_SHIFT_M = 3.7e-3  # no whole number of anything on a machine
+_LEAST_S = 1.0  # shortest run that can be diagnosed
+_HOLDS_S = (1.0, 10.0, 30.0)  # rests of the drive, far apart so that ageing of the contact shows
+_WATCHED_S = 10.0  # effort, in seconds of a run, that a run far outside the used speeds counts in addition
+# Shift of the start along the track; no multiple of a usual pitch, so that the run meets a periodic track in another phase.
+_SHIFT_M = 3.7e-3
 
 
 class Step(NamedTuple):
@@ -35,19 +38,19 @@ class Step(NamedTuple):
 class Plan(NamedTuple):
     """One run that could be measured."""
 
-    what: str
+    what: str  # the instruction for a person
     steps: tuple[Step, ...]
-    shift_m: float = 0.0  # of the start, from where an earlier run began
-    beyond: bool = False  # far outside the speeds that were used, where the rig may do something new
+    shift_m: float = 0.0  # start of the run, from the start of an earlier run
+    beyond: bool = False  # whether the speed is far outside those used, so that the rig may behave in a new way
 
     @property
     def effort_s(self) -> float:
-        """How long it takes, and a little more where the rig has to be watched."""
+        """Duration of the run, and `_WATCHED_S` more where a person has to watch the rig."""
         return sum(step.seconds for step in self.steps) + (_WATCHED_S if self.beyond else 0.0)
 
 
 def plans(problem: Problem) -> list[Plan]:
-    """At most ten runs within the reach that the evidence shows."""
+    """At most ten runs within the reach of the rig that the evidence shows; none where the drive never moved."""
     used = [segment for run in problem.runs for segment in run.commands.segments if segment.drive_velocity_mps != 0.0]
     if not used:
         return []
@@ -97,7 +100,7 @@ def _others(usual: float, some_s: float, cycle_m: float) -> list[Plan]:
 
 
 def _vibrations(used: list[Segment], usual: float, each_s: float) -> list[Plan]:
-    """Other frequencies, and other amplitudes, where the rig has an exciter."""
+    """Runs at other frequencies and at other amplitudes of vibration; none where no run was vibrated."""
     shaken = [segment for segment in used if segment.frequency_Hz > 0.0]
     if not shaken:
         return []
@@ -121,7 +124,10 @@ def _vibrations(used: list[Segment], usual: float, each_s: float) -> list[Plan]:
 
 
 def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
-    """The plan as a run whose measurement is what the model at `point` predicts, with the channels of the richest run."""
+    """The plan as a prepared run that measures what the model at `point` predicts.
+
+    Its channels are those of the measured run that has most, with an exciter if the plan needs one.
+    """
     with_exciter = any(step.frequency_Hz > 0.0 for step in plan.steps)
     template = max(
         problem.runs, key=lambda run: (with_exciter and bool(run.commands.frequency_Hz.any()), len(run.signals))
@@ -149,13 +155,13 @@ def as_run(problem: Problem, plan: Plan, point: Point) -> Prepared:
 def _cycle_m(rig: RigTable, scales: Scales) -> float:
     """Drive travel of one stick-slip cycle: the force falls by twice the difference of static and sliding friction.
 
-    At a tenth of the static friction, or a run for cycles of next to nothing would be too short for anything else.
+    At least the travel for a tenth of the static friction, as otherwise a run with tiny cycles would be too short to compare.
     """
     return max(2.0 * (rig.static_force_N - rig.coulomb_force_N), 0.1 * rig.static_force_N) / scales.stiffness_N_per_m
 
 
 def _travel_m(scales: Scales, cycle_m: float) -> float:
-    """Travel that loads the spring and shows some cycles."""
+    """Drive travel that loads the spring and then shows `_CYCLES` cycles."""
     return 0.5 * scales.force_N / scales.stiffness_N_per_m + _CYCLES * cycle_m
 
 

@@ -1,7 +1,7 @@
-"""Which run to measure next: the shortest that surely separates the two leading explanations, else the one that separates most.
+"""Which run to measure next: the shortest that surely separates the two leading explanations, or the one that separates most.
 
-Both predict every run that could be measured. The difference counts in floors, and only as far as neither explanation could
-imitate the other by moving what the present runs leave uncertain: its rig numbers, its sensors and its own parameters.
+Both explanations predict every run that could be measured. The difference counts in noise floors, and only the part that
+neither explanation can imitate by moving what the present runs leave uncertain: rig numbers, sensors and its own parameters.
 """
 
 import math
@@ -23,26 +23,43 @@ from diagnosis.result import Experiment
 from plant.effects.library import EFFECTS
 
 Floats = npt.NDArray[np.floating[Any]]
-_FEW, _SOME = 2, 6  # replicates for a first look, and for a judgement
-_DECISIVE = 10.0  # standard deviations: more is not more certain, only longer
-_PROMISING = 1.5  # times that, at first look, where nothing is imitated yet
-_JUDGED = 3  # experiments that are judged where none is promising, best first
-_SEPARATES = 2.0  # standard deviations, below which nothing is worth an hour at the rig
-_CERTAIN = 0.05  # tolerances: what the present runs know so well imitates nothing
+# Replicates for a first look, and for a judgement. Fewer: the floor of the imagined run is uncertain. More: time.
+_FEW, _SOME = 2, 6
+# Separation, in standard deviations, that is enough. Smaller: an unsure run is proposed. Larger: longer runs for no more
+# certainty.
+_DECISIVE = 10.0
+# A first look must exceed the decisive separation by this factor, as it subtracts nothing that could be imitated.
+# Smaller: more runs are judged in vain. Larger: a decisive short run is passed over.
+_PROMISING = 1.5
+_JUDGED = 3  # runs that are judged where no run is decisive, the best first look first
+# Separation, in standard deviations, below which no run is proposed. Smaller: an hour at the rig for little. Larger: a check by
+# hand where a run would help.
+_SEPARATES = 2.0
+# Standard deviation, in tolerances or scales, below which a coordinate counts as known and imitates nothing. Larger: separations
+# look too large. Smaller: more derivatives for the same answer.
+_CERTAIN = 0.05
+# Steps for derivatives: of nuisances in tolerances, of an effect's coordinates in their units. Small against curvature.
 _STEP, _STEP_OF_EFFECT = 0.5, 0.15
-_MISSING = 4.0  # floors, where one explanation slips and the other does not
+# Difference, in floors, of a feature that only one explanation shows, such as a slip. Larger: slips at the edge decide.
+_MISSING = 4.0
 
 
 class _Look(NamedTuple):
-    """How one experiment separates two explanations."""
+    """How well one run separates two explanations."""
 
     plan: Plan
     separation: float  # standard deviations
-    feature: Feature | None  # that differs most
+    feature: Feature | None  # the feature that differs most; None in a first look
 
 
 def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) -> Experiment:
-    """The best next run for the first two leaders; a check by hand where no run separates them."""
+    """The best next run for the first two leaders; a check by hand where no run separates them.
+
+    Args:
+        problem, nuisances: the fitted runs, and the numbers of the rig and its sensors.
+        leaders: the leading fits, the named fit or the baseline first.
+
+    """
     if len(leaders) < 2 or leaders[0].hypothesis.effects == leaders[1].hypothesis.effects:
         text = "Only one explanation is left: a run under conditions that were not measured yet would test it hardest."
         return Experiment("Repeat a run at another drive speed, from another start.", text, None)
@@ -51,7 +68,7 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
     both = f"{_name(first)} and {_name(second)}"
     if problem.rig.drive == "force":
         return Experiment(advice(names, "force"), f"Of what was tried, {both} explain these runs best.", None)
-    # how far the two are apart in the present runs, with everything fitted
+    # how far the two fits are apart in the present runs
     present = float(np.linalg.norm(first.residual - second.residual))
     best = _best(problem, nuisances, first, second)
     if best is None or best.separation < _SEPARATES or best.feature is None:
@@ -77,12 +94,12 @@ def next_experiment(problem: Problem, nuisances: Nuisances, leaders: list[Fit]) 
 
 
 def _best(problem: Problem, nuisances: Nuisances, first: Fit, second: Fit) -> _Look | None:
-    """The first decisive plan, shortest first; where none is, the one that separates most."""
+    """The shortest decisive plan; where no plan is decisive, the plan that separates most."""
     left: list[_Look] = []
     judged: list[_Look] = []
     possible = sorted(plans(problem), key=lambda plan: plan.effort_s)
     if any(EFFECTS[name].acts_on == "piezo" for fit in (first, second) for name in fit.hypothesis.effects):
-        # without vibration the two differ only in what one of them had to put into other numbers
+        # without vibration an effect of the piezo acts only through other numbers that the fit has moved
         possible = [plan for plan in possible if any(step.frequency_Hz > 0.0 for step in plan.steps)]
     for plan in possible:
         look = _first_look(problem, nuisances, plan, first, second)
@@ -104,7 +121,7 @@ def _name(fit: Fit) -> str:
 
 
 class _Imagined:
-    """One experiment as if it had been measured under the first explanation, with its floor."""
+    """One plan as a run that is measured under the first explanation, with its noise floor."""
 
     def __init__(self, problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit, count: int) -> None:
         self._nuisances = nuisances
@@ -117,15 +134,16 @@ class _Imagined:
         """How far the second explanation is from the first, in floors [compared]."""
 
     def _expected(self, points: list[Point]) -> list[Floats]:
-        """Expected features, in floors [compared] each."""
+        """The expected features at every point, in floors [compared]."""
         found = self.problem.predicted_many(points)
         return [(self.floor.expected(one) / self.floor.scatter)[self.floor.compared] for one in found]
 
     def columns(self, fit: Fit, which: npt.NDArray[np.int64]) -> Floats:
-        """How the expectation changes with each coordinate, in floors, [compared, which].
+        """Derivatives of the expected features with respect to some parameters of a fit, in floors [compared, which].
 
         Args:
-            which: indices into nuisances, then the form's axes.
+            fit: the point of the derivatives.
+            which: indices into nuisances, then the hypothesis' coordinates.
 
         """
         own = len(fit.deviations)
@@ -141,7 +159,7 @@ class _Imagined:
 
 
 def _first_look(problem: Problem, nuisances: Nuisances, plan: Plan, first: Fit, second: Fit) -> _Look | None:
-    """An upper bound: nothing is imitated."""
+    """An upper bound of the separation, as nothing that could be imitated is subtracted; None where no feature compares."""
     imagined = _Imagined(problem, nuisances, plan, first, second, _FEW)
     if not imagined.floor.compared.any():
         return None
