@@ -34,7 +34,7 @@ bench: $(VENV)/.ready-bench
 	@$(BIN)/python -m tests.bench
 
 blind: $(READY) ## hours; what has a result is not done again: make blind CASES=20 SEED=1 OUT=runs/blind GENERATOR=plant
-	@test -e $(BLIND) || $(BIN)/stickslip blind make --cases $(CASES) --seed $(SEED) --out $(BLIND) \
+	@test -e $(BLIND) || $(BIN)/python -m tests.blind make --cases $(CASES) --seed $(SEED) --out $(BLIND) \
 		--key $(BLIND).key.json --generator $(GENERATOR)
 	@$(BIN)/stickslip blind run $(BLIND)
 	@$(BIN)/stickslip blind score $(BLIND) --key $(BLIND).key.json --baselines --json $(BLIND).json --report $(BLIND).html

@@ -1,26 +1,24 @@
-"""`stickslip blind ...`: make a set of rigs with sealed answers, diagnose it without them, open and score it."""
+"""`stickslip blind ...`: diagnose a set of rigs with sealed answers without them, open and score it."""
 
-import signal
 import sys
 import time
 from contextlib import closing
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bridge.faults import Fault
-from cockpit.run.child_process import guarded
+from cockpit.run.child_process import end_like_ctrl_c, guarded
 from cockpit.run.writable import check_writable, writing
 
 if TYPE_CHECKING:
     from diagnosis.blind.opening import OpenedSet
 
 blind_app = typer.Typer(
-    help="How good is the diagnosis? Sealed cases made, diagnosed without the answers, scored.", no_args_is_help=True
+    help="How good is the diagnosis? Sealed cases, diagnosed without the answers, scored.", no_args_is_help=True
 )
-SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `blind make` made.")]
+SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `python -m tests.blind make` made.")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")]
 Key = Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")]
 AsJson = Annotated[
@@ -34,49 +32,18 @@ AsJson = Annotated[
 Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one HTML file.")]
 
 
-class GeneratorName(StrEnum):
-    """Where the rigs come from."""
-
-    independent = "independent"
-    plant = "plant"
+_LEFT_TO_THE_COMMAND = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 
-@blind_app.command("make")
-def blind_make(
-    cases: Annotated[int, typer.Option(help="How many; 200 or more tell something.")],
-    seed: Annotated[
-        int,
-        typer.Option(min=0, help="The same seed makes the same evidence, under other names; once opened it is spent."),
-    ],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The set: a new folder.")],
-    key: Key,
-    generator: Annotated[
-        GeneratorName, typer.Option(help="Formulas of their own, or those that the diagnosis itself tries.")
-    ] = GeneratorName.independent,
-    jobs: Jobs = None,
-) -> None:
-    """Make evidence folders whose names tell nothing, and a key with the answers.
-
-    That takes half a minute to a minute a case and core. It can be stopped and taken up again.
-    """
+@blind_app.command("make", hidden=True, add_help_option=False, context_settings=_LEFT_TO_THE_COMMAND)
+def blind_make() -> None:
+    """Say which command makes a set: the generators of cases are part of the tests, which are not installed."""
 
     def work() -> None:
-        from joblib import cpu_count
-
-        from cockpit.commands.diagnose_output import watched
-
-        try:
-            from tests.blind.making import make_set
-        except ModuleNotFoundError as error:
-            if not (error.name or "").startswith("tests"):
-                raise
-            line = "blind make: the generators of cases are not installed; run it in a checkout of the source tree"
-            raise Fault("CONFIG", line) from None
-        _end_like_ctrl_c()
-        check_writable("--key", key)
-        with writing(), watched() as progress:
-            make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
-        print(f"{cases} cases    {out}\nkey         {key}\nnext        stickslip blind run {out}")
+        line = (
+            "blind make: is not part of stickslip; in a checkout of the source tree, write python -m tests.blind make"
+        )
+        raise Fault("CONFIG", line)
 
     sys.exit(guarded(work))
 
@@ -91,7 +58,7 @@ def blind_run(folder: SetArgument, jobs: Jobs = None) -> None:
         from cockpit.commands.diagnose_output import in_a_line, watched
         from diagnosis.blind.running import missing, run
 
-        _end_like_ctrl_c()
+        end_like_ctrl_c()
         todo = len(missing(folder))
         began = time.monotonic()
         with writing(), watched() as progress, closing(run(folder, jobs or cpu_count())) as outcomes:
@@ -123,7 +90,7 @@ def blind_score(
         from cockpit.commands.diagnose_output import watched
         from diagnosis.blind.opening import open_set, with_baselines
 
-        _end_like_ctrl_c()
+        end_like_ctrl_c()
         _check_file("--json", as_json)
         _check_file("--report", report)
         with writing(), watched() as progress:
@@ -174,11 +141,6 @@ def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | No
     print(table(methods, found.sealed))
     if report is not None:
         print(f"\nreport     {report}")
-
-
-def _end_like_ctrl_c() -> None:
-    """Killed politely is like Ctrl-C: the workers end too."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _check_file(option: str, path: Path | None) -> None:

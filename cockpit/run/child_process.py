@@ -41,6 +41,11 @@ def stop_event(parent: int = 0) -> threading.Event:
     return stop
 
 
+def end_like_ctrl_c() -> None:
+    """Let SIGTERM end the command as Ctrl-C does: it stops its workers, keeps whole files only, and says INTERRUPTED."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
 def report(fault: Fault, as_json: bool) -> int:
     """Print a fault, one line on stderr or a JSON object on stdout; its exit status."""
     if as_json:

@@ -88,10 +88,12 @@ def _read(path: Path, wanted: str, fields: tuple[str, ...]) -> dict[str, dict[st
         table = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise Fault(
-            "BAD_SET", f"{path}: cannot be read: {error.strerror}; `stickslip blind make` writes such a file"
+            "BAD_SET", f"{path}: cannot be read: {error.strerror}; `python -m tests.blind make` writes such a file"
         ) from None
     except ValueError as error:
-        raise Fault("BAD_SET", f"{path}: is not JSON ({error}); take the file that `blind make` wrote") from None
+        raise Fault(
+            "BAD_SET", f"{path}: is not JSON ({error}); take the file that `python -m tests.blind make` wrote"
+        ) from None
     found = table.get("format") if isinstance(table, dict) else None
     if found != wanted:
         raise Fault("BAD_SET", f"{path}: format = {found!r}: must be {wanted!r}; is it the right file?")
@@ -100,7 +102,7 @@ def _read(path: Path, wanted: str, fields: tuple[str, ...]) -> dict[str, dict[st
         isinstance(row, dict) and row.keys() == set(fields) for row in cases.values()
     ):
         rule = f"must be a table of cases with {' and '.join(fields)} each"
-        raise Fault("BAD_SET", f"{path}: cases: {rule}; take the file that `blind make` wrote")
+        raise Fault("BAD_SET", f"{path}: cases: {rule}; take the file that `python -m tests.blind make` wrote")
     return cases
 
 

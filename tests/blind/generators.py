@@ -28,7 +28,7 @@ class Plan(NamedTuple):
 
 
 class Generator(Protocol):
-    """What `blind make` needs of a generator."""
+    """What `python -m tests.blind make` needs of a generator."""
 
     library: tuple[str, ...]  # effects that the diagnosis knows
     outside: tuple[str, ...]  # effects that it does not know

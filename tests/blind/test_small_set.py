@@ -7,12 +7,13 @@ from typer.testing import CliRunner
 
 from cockpit.cli import app
 from tests.blind import making, strata
+from tests.blind.__main__ import app as making_app
 from tests.blind.independent_cases import Independent
 from tests.blind.small_set import CASES, RUNS, SEED, known
 
 
-def blind(*arguments):
-    result = CliRunner().invoke(app, ["blind", *map(str, arguments)])
+def succeeds(command, *arguments):
+    result = CliRunner().invoke(command, [*map(str, arguments)])
     assert result.exit_code == 0, result.output
 
 
@@ -24,9 +25,10 @@ def tool(tmp_path_factory):
         patch.setattr(making, "generator", lambda _name: Independent(RUNS))
         patch.setattr(making, "sized", known)
         patch.setattr(strata, "_real_faults", lambda: 0)  # measured logs have tests of their own
-        blind("make", "--cases", CASES, "--seed", SEED, "--out", sealed, "--key", key, "--jobs", 1)
-    blind("run", sealed)
-    blind("score", sealed, "--key", key, "--json", scores)
+        asked = ("--cases", CASES, "--seed", SEED, "--out", sealed, "--key", key, "--jobs", 1)
+        succeeds(making_app, "make", *asked)
+    succeeds(app, "blind", "run", sealed)
+    succeeds(app, "blind", "score", sealed, "--key", key, "--json", scores)
     found = json.loads(scores.read_text())
     assert found["sealed"] is True
     return found["methods"]["diagnosis"]

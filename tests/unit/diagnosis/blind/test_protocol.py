@@ -18,6 +18,7 @@ from diagnosis.blind import sealing
 from diagnosis.blind.version import tool_version
 from tests import made_up
 from tests.blind import making, strata
+from tests.blind.__main__ import app as making_app
 from tests.blind.sizes import read_sizes
 from tests.blind.stand_ins import StandIn, StandInBench
 
@@ -42,7 +43,8 @@ def blind(*arguments):
 
 def make(folder: Path, **other):
     options = {"cases": CASES, "seed": 20011, "out": folder / "set", "key": folder / "key.json", "jobs": 1} | other
-    return blind("make", *(part for name, value in options.items() for part in (f"--{name}", value)))
+    arguments = [str(part) for name, value in options.items() for part in (f"--{name}", value)]
+    return CliRunner().invoke(making_app, ["make", *arguments])
 
 
 @pytest.fixture
@@ -206,11 +208,12 @@ def test_that_a_set_was_published_is_sealed_too(made, tmp_path):
     assert blind("score", made / "set", "--key", tmp_path / "other.json").exit_code == FAULTS["SEAL_BROKEN"].exit_status
 
 
-def test_without_the_source_tree_one_line_says_so(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "tests.blind.making", None)
-    result = make(tmp_path)
+@pytest.mark.parametrize("options", [(), ("--cases", 200, "--seed", 1, "--out", "set"), ("--help",)])
+def test_one_line_says_what_makes_a_set(options):
+    result = blind("make", *options)
     assert result.exit_code == 2
-    assert "checkout of the source tree" in result.stderr
+    assert "write python -m tests.blind make" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
 
 
 def test_a_run_is_taken_up_again(made):

@@ -1,0 +1,65 @@
+"""`python -m tests.blind make`: a set of rigs with sealed answers, for `stickslip blind run` and `score`."""
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cockpit.run.child_process import end_like_ctrl_c, guarded
+from cockpit.run.writable import check_writable, writing
+
+app = typer.Typer(
+    help="Sealed cases for the diagnosis.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
+)
+
+
+class GeneratorName(StrEnum):
+    """Where the rigs come from."""
+
+    independent = "independent"
+    plant = "plant"
+
+
+@app.callback()
+def commands() -> None:
+    """Make sealed cases that `stickslip blind run` diagnoses and `stickslip blind score` opens."""
+
+
+@app.command("make")
+def make(
+    cases: Annotated[int, typer.Option(help="How many; 200 or more tell something.")],
+    seed: Annotated[
+        int,
+        typer.Option(min=0, help="The same seed makes the same evidence, under other names; once opened it is spent."),
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The set: a new folder.")],
+    key: Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")],
+    generator: Annotated[
+        GeneratorName, typer.Option(help="Formulas of their own, or those that the diagnosis itself tries.")
+    ] = GeneratorName.independent,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
+) -> None:
+    """Make evidence folders whose names tell nothing, and a key with the answers.
+
+    That takes half a minute to a minute a case and core. It can be stopped and taken up again.
+    """
+
+    def work() -> None:
+        from joblib import cpu_count
+
+        from cockpit.commands.diagnose_output import watched
+        from tests.blind.making import make_set
+
+        end_like_ctrl_c()
+        check_writable("--key", key)
+        with writing(), watched() as progress:
+            make_set(out, key, generator.value, cases, seed, jobs or cpu_count(), progress)
+        print(f"{cases} cases    {out}\nkey         {key}\nnext        stickslip blind run {out}")
+
+    sys.exit(guarded(work))
+
+
+if __name__ == "__main__":
+    app(prog_name="python -m tests.blind")
