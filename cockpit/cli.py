@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import sys
 from collections.abc import Generator
 from pathlib import Path
@@ -321,4 +322,7 @@ app.add_typer(blind_app, name="blind")
 
 def main() -> None:
     """Entry point of the `stickslip` command."""
+    # for joblib, which starts its workers with `python -m`: the folder of the person who calls would be searched first, and
+    # may hold a plant.py or numpy.py of that person's own
+    os.environ["PYTHONSAFEPATH"] = "1"
     app()

@@ -137,7 +137,7 @@ def _csv(path: Path, dialect: Dialect) -> dict[str, Any]:
 def _loaded(path: Path) -> dict[str, Any]:
     """The variables of a MATLAB file. SciPy's compiled reader trusts what a file says of itself: a changed byte may end it."""
     trial = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"
-    status = subprocess.run([sys.executable, "-c", trial, str(path)], capture_output=True, check=False).returncode
+    status = subprocess.run([sys.executable, "-P", "-c", trial, str(path)], capture_output=True, check=False).returncode
     if status < 0:
         raise ValueError(f"it is damaged: its reader died of signal {-status}")
     try:

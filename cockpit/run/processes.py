@@ -27,7 +27,8 @@ class Child:
         self.role = role
         # a session of its own: Ctrl-C reaches the parent alone, which ends the children in order
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "cockpit", role, *arguments, "--child", str(os.getpid())],
+            # -P: else the folder of the person who calls is searched first, with a plant.py of that person's own
+            [sys.executable, "-P", "-m", "cockpit", role, *arguments, "--child", str(os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
