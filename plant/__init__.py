@@ -19,7 +19,8 @@ and, for what a real rig adds to that:
 
 `config` is what a rig file says and `config_limits` what no rig does, `pairs` the friction pairs, `effects` what a real rig does
 and the nominal one does not, `records` the derived numbers and the state. `contact` is one step of friction and slide, `core` one
-block of all that with the piezo and the sensors' filters (`advance`, the nominal rig, and `advance_disturbed`), `sensors` what
-the channels make of that, `step` the whole block with its messages, `simulate` a run without a bus, `stability` the linearised
-slider, `node` the rig as a participant of the bus, `app` the process.
+block of all that with the piezo and the sensors' filters (`advance`, the nominal rig, and `advance_disturbed`), `four_rigs` the
+same for four rigs at once, `four_rigs_step` one step of them, `sensors` what the channels make of a block, `step` the whole block
+with its messages, `simulate` a run without a bus, `stability` the linearised slider, `node` the rig as a participant of the bus,
+`app` the process.
 """

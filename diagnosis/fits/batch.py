@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.model.four_rigs_step import LANES
 from diagnosis.model.rig import Effects
+from plant.four_rigs_step import LANES
 
 Floats = npt.NDArray[np.floating[Any]]
 R = TypeVar("R")

@@ -16,7 +16,6 @@ from diagnosis.features.grid import BLOCK_S, averaged, without_vibration
 from diagnosis.features.segments import Commands
 from diagnosis.features.spring_drive import spring_features
 from diagnosis.gap.prepare import Prepared
-from diagnosis.model.four_rigs_step import LANES
 from diagnosis.model.per_run import in_run, of_run
 from diagnosis.model.predict import predict_many
 from diagnosis.model.rig import AGE_BEFORE_S, AGE_SPREAD, Effects, Entry, Roughness, Start, rig_config
@@ -25,6 +24,7 @@ from diagnosis.model.sensor_chain import SENSOR_EFFECTS, Chain, sensed, true_for
 from diagnosis.model.true_force import relative, true_commands
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
+from plant.four_rigs_step import LANES
 
 Floats = npt.NDArray[np.floating[Any]]
 AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # an effect, and the contact's age when a run begins

@@ -2,7 +2,6 @@
 
 rig                            the rig that is predicted: numbers, effects, start, surface
 predict                        one run, or four at once, by the plant's equations
-four_rigs, four_rigs_step      four rigs through a run together; one step of them
 segment_starts                 force and state with which every segment of the model begins
 sensor_chain                   what sensors make of a prediction: faults, and ordinary lags
 true_force                     the true input of a force-driven axis, freed of what its sensor did to it

@@ -1,6 +1,6 @@
 """The model beside the rig: one run predicted under the run's own commands, reduced to the 1 ms grid.
 
-The equations are the plant's own: with a force drive in its kernel, with a spring in `side_by_side`, many rigs at once. Its
+The equations are the plant's own: with a force drive in its kernel, with a spring in `plant.four_rigs`, many rigs at once. Its
 sensors' bandwidths are opened wide, since a manifest states none. Without vibration 70 us a step are enough: no feature differs
 by a third of a floor from 10 us (tests/truth/test_gap.py). With it, 16 steps a period: as near to 60 as 20 are (0.35 floors rms,
 as the phase decides when a slip comes), 14 are further (0.58).
@@ -20,11 +20,11 @@ from bridge.kernel import Record, kernel
 from bridge.wire.messages import CHANNELS
 from diagnosis.features.grid import BLOCK_S, SIGNALS
 from diagnosis.features.segments import Commands
-from diagnosis.model.four_rigs import advance_lanes
-from diagnosis.model.four_rigs_step import LANES
 from diagnosis.model.rig import Entry, Rig, Start, built
 from plant.config import RigConfig
 from plant.core import advance_disturbed
+from plant.four_rigs import advance_lanes
+from plant.four_rigs_step import LANES
 from plant.records import TRUTH
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -96,7 +96,7 @@ def _side_by_side(rigs: Sequence[Rig], commands: Commands, entries: Sequence[Seq
     forces_N = [[entry.force_N for entry in own] for own in entries]
     out = np.empty((LANES, len(SIGNALS), len(commands.drive)))
     advance_lanes(
-        np.concatenate([rig.params for rig in rigs]), np.concatenate([rig.state for rig in rigs]),
+        np.concatenate([rig.params for rig in rigs]), np.concatenate([rig.state for rig in rigs]), BLOCK_S,
         commands.drive, commands.frequency_Hz, commands.amplitude_m, rigs[0].steps,
         blocks, np.array(forces_N).T.copy(), np.array(ages_s).T.copy(), out,
     )  # fmt: skip

@@ -14,11 +14,11 @@ from bridge.wire.messages import CHANNELS
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.features.segments import Commands
-from diagnosis.model.four_rigs_step import LANES
 from diagnosis.model.predict import predict_many
 from diagnosis.model.rig import Start, built
 from diagnosis.synthetic.folder import Case, make_evidence
 from plant.config import RigConfig
+from plant.four_rigs_step import LANES
 from plant.records import TRUTH
 from plant.simulate import run_blocks
 from tests.bench import case as paper

@@ -12,14 +12,14 @@ from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.trials import trials
 from diagnosis.model import predict as twin
-from diagnosis.model.four_rigs import advance_lanes
-from diagnosis.model.four_rigs_step import LANES, gone
 from diagnosis.model.per_run import as_in_rig_file
 from diagnosis.model.predict import predict, predict_many
 from diagnosis.model.rig import Entry, Roughness, Start, built, rig_config
 from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 from plant.core import advance, advance_disturbed
 from plant.effects.library import EFFECTS
+from plant.four_rigs import advance_lanes
+from plant.four_rigs_step import LANES, gone
 from plant.records import TRUTH
 from tests.prepared import prepared
 

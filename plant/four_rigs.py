@@ -1,7 +1,7 @@
 """Four rigs through one run in the time of two (`make bench`): a refit asks for one run of many slightly different rigs.
 
-They get the same commands in the same steps, so that `lanes` does each step for all of them at once. What its loops cannot
-hold, a sine of the place or a power of an age, has loops of its own here, which run only where a rig has such an effect.
+They get the same commands in the same steps, so that `four_rigs_step` does each step for all of them at once. What its loops
+cannot hold, a sine of the place or a power of an age, has loops of its own here, which run only where a rig has such an effect.
 
 What is right is what `plant.core` does: tests/truth/test_side_by_side.py holds every form of every effect against it.
 """
@@ -13,10 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
-from diagnosis.features.grid import BLOCK_S
-from diagnosis.model import four_rigs_step as at
-from diagnosis.model.four_rigs_step import LANES
+from plant import four_rigs_step as at
 from plant.effects.formulas import TWO_PI, ageing_N, extension_m, level, wave
+from plant.four_rigs_step import LANES
 from plant.piezo import delivered_share
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -26,6 +25,7 @@ Floats = npt.NDArray[np.floating[Any]]
 def advance_lanes(
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],
+    block_s: float,
     drive: Floats,
     frequency_Hz: Floats,
     amplitude_m: Floats,
@@ -39,10 +39,12 @@ def advance_lanes(
 
     Args:
         params, state: records of `plant.records`, one a rig; the state is where the run begins.
+        block_s: length of a block, over which the commands hold.
         drive, frequency_Hz, amplitude_m, steps: of the run, [blocks].
         entry_blocks: where each slide is put where its spring has a given force, [entries];
         entry_force_N, entry_age_s: that force, and the age of the contact or NaN where it slides on, [entries, LANES].
-        out: filled with the signals of `diagnosis.reduced`, [LANES, signals, blocks].
+        out: filled with the means over every block of the five signals CHANNELS, then with how much the accelerations of mass
+            and base shake within a block, rms, [LANES, 7, blocks].
 
     """
     w = np.zeros(at.ROWS * LANES)
@@ -105,7 +107,7 @@ def advance_lanes(
             _enter(w, params, drive[block], entry_force_N[entry], entry_age_s[entry])
             entry += 1
         samples = steps[block]
-        dt = BLOCK_S / samples
+        dt = block_s / samples
         z_dt = dt
         if first:
             z_dt, first = 0.5 * dt, False
@@ -126,7 +128,7 @@ def advance_lanes(
             p = params[i]
             share = delivered_share(p, frequency_Hz[block]) if vibrating else 1.0
             if p.sag_settling_s > 0.0:
-                share *= 1.0 - p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * BLOCK_S) / p.sag_settling_s))
+                share *= 1.0 - p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * block_s) / p.sag_settling_s))
             w[at.SHARE + i] = w[at.DELIVERED + i] = share
             w[at.DRIVE + i] = drive[block]
             if dt != dt_before:
@@ -184,7 +186,7 @@ def advance_lanes(
 
         if vibrating:
             phi = (phi + omega * dt * samples) % TWO_PI
-            vibrating_s += BLOCK_S
+            vibrating_s += block_s
         for i in range(LANES):
             for row in range(5):
                 out[i, row, block] = w[at.SUM_FORCE + row * LANES + i] / samples

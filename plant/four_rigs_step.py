@@ -4,7 +4,7 @@ What makes vectors of it: loops over the lanes alone, without a branch and with 
 additions and multiplications. What a step waits for is the way from one velocity to the next: two exponentials and two divisions
 after one another. What can be computed beside that way is: 2.2 times the plant's kernel instead of 1.6 (`make bench`).
 
-The equations are those of `plant.contact`, `plant.disturb` and `plant.core`.
+The equations are those of `plant.contact`, `plant.effects` and `plant.core`.
 """
 
 import math
@@ -60,7 +60,7 @@ def gone(a: float) -> float:
 
 @kernel
 def _spring_N(w: Floats, i: int, extension_m: float) -> float:
-    """As `plant.disturb.spring_N`, without its branches."""
+    """As `plant.effects.formulas.spring_N`, without its branches."""
     slack_m, yield_m, knee_m = w[SLACK + i], w[YIELD + i], w[KNEE + i]
     e = extension_m - min(max(extension_m, -slack_m), slack_m)
     e = min(max(e, -yield_m), yield_m)
