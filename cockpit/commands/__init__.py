@@ -1,6 +1,11 @@
-"""The commands that are more than a few lines; `cli` has the others.
+"""What each command of `stickslip` takes and prints; `cockpit.cli` puts them together.
 
+run                         plant, controller and recorder in one go
+processes                   one of them alone: plant, controller, record; stop
+replay                      a log through today's controller, simulated again, or back on the bus
+pictures                    plot, map, reproduce
+log, blind                  groups of commands
 diagnose, diagnose_output   evidence to a diagnosis; its progress and its words on a terminal
-blind, log, replay          groups of commands
+explain, scenarios          what there is to know without a run
 options                     what several commands have
 """

@@ -1,0 +1,90 @@
+"""`stickslip plot`, `map` and `reproduce`: a run, a rig and the paper as pictures."""
+
+import contextlib
+import json
+import sys
+from collections.abc import Generator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.faults import Fault
+from cockpit.commands.options import DEFAULT_SCENARIO, Json
+from cockpit.run.child_process import guarded
+from cockpit.run.writable import check_writable, writing
+
+
+@contextlib.contextmanager
+def _written(out: Path) -> Generator[None]:
+    """The work that ends with writing `out`. Raises Fault LOG_WRITE where it cannot, at its start if that is known then."""
+    check_writable("--out", out)
+    if out.is_dir():
+        raise Fault("LOG_WRITE", f"--out {out}: is a folder; give the name of a file in it")
+    with writing(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        yield
+
+
+def plot(
+    log: Annotated[Path, typer.Argument(help="A run log, .mcap.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The picture, a PNG file; without it, beside LOG under its name.", show_default=False),
+    ] = None,
+) -> None:
+    """Draw the run in a log: drive force, v_a against v_d, and what the controller did."""
+
+    def work() -> None:
+        from cockpit.judge.run_plot import plot_run
+
+        picture = out or log.parent / f"{log.stem}.png"
+        if picture.resolve() == log.resolve():
+            raise Fault("CONFIG", f"--out {picture}: is the log, which the picture would replace; choose another file")
+        with _written(picture):
+            plot_run(log, picture)
+        print(f"picture  {picture}")
+
+    sys.exit(guarded(work))
+
+
+def stability(
+    rig: Annotated[str, typer.Option(help="Name of a rig in deploy/rigs, or a .toml file.")] = DEFAULT_SCENARIO,
+    settings: Annotated[
+        list[str],
+        typer.Option(
+            "--set", help="Change one value of the rig: key=value, e.g. contact.static_force_N=18. Repeatable."
+        ),
+    ] = [],  # noqa: B006
+    out: Annotated[Path, typer.Option(help="The picture, a PNG file.")] = Path("runs/map.png"),
+    as_json: Json = False,
+) -> None:
+    """Draw where a rig sticks and slips, over drive velocity, stiffness and vibration."""
+
+    def work() -> None:
+        from cockpit.judge.stability_map import stability_map
+        from cockpit.run.scenario import load_rig
+
+        made = load_rig(rig, settings)
+        with _written(out):
+            result = stability_map(made, out)
+        print(json.dumps(result._asdict()) if as_json else f"{result.answer}\npicture  {out}")
+
+    sys.exit(guarded(work, as_json))
+
+
+def reproduce(
+    out: Annotated[Path, typer.Option(help="The report, one HTML file.")] = Path("runs/reproduce.html"),
+    as_json: Json = False,
+) -> None:
+    """Redo the paper: its figures, tables and claims, each with its number and whether it holds."""
+
+    def work() -> int:
+        from cockpit.paper.page import reproduce as redo
+
+        with _written(out):
+            result = redo(out, progress=True)
+        print(json.dumps(result.as_json()) if as_json else f"{result.verdict}\nreport   {out}")
+        return 0 if result.passed else 1
+
+    sys.exit(guarded(work, as_json))

@@ -1,0 +1,50 @@
+"""`stickslip run`: plant, controller and recorder to the end of a scenario."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from cockpit.commands.options import (
+    DEFAULT_SCENARIO,
+    Endpoint,
+    Json,
+    Lockstep,
+    LogFile,
+    Prefix,
+    ScenarioName,
+    Seed,
+    Settings,
+    as_settings,
+)
+from cockpit.run.child_process import guarded
+
+
+def run(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    rig: Annotated[
+        str | None,
+        typer.Option("--rig", help="In place of the scenario's rig: a name in deploy/rigs, or a .toml file."),
+    ] = None,
+    settings: Settings = [],  # noqa: B006 (typer reads the default and never changes it)
+    seed: Seed = None,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    lockstep: Lockstep = False,
+    in_process: Annotated[
+        bool, typer.Option("--in-process", help="Lockstep in one process, without a bus: fastest.")
+    ] = False,
+    log: LogFile = None,
+    as_json: Json = False,
+) -> None:
+    """Run plant, controller and recorder to the end of a scenario and say what came of it."""
+
+    def work() -> int:
+        from cockpit.run.run import run_scenario
+        from cockpit.run.scenario import rig_setting
+
+        other = [rig_setting(rig)] if rig is not None else []
+        changed = [*other, *as_settings(settings, seed, endpoint, prefix)]
+        return run_scenario(scenario, changed, lockstep, in_process, log, as_json)
+
+    sys.exit(guarded(work, as_json))
