@@ -12,8 +12,8 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 Floats = npt.NDArray[np.floating[Any]]
 _BIN_S = 1e-3
-# Standard deviation of the smoothing. Too small: noise; too large: slips are lost. A slip on the paper's spring takes about 40 ms,
-# and 4 ms leave most of its acceleration.
+# Standard deviation of the smoothing. Too small: noise; too large: slips are lost. A slip on the paper's spring takes about
+# 40 ms, and 4 ms leave most of its acceleration.
 _SMOOTH_BINS = 4.0
 _BESIDE_BINS = 61  # around a vibration that are left out: its remainder in a mean over 1 ms is as large as a slip
 _FEWEST_BINS = 500  # that a run needs; a stiffness from fewer bins is noise

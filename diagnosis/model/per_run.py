@@ -1,9 +1,8 @@
 """Parameters of an effect that differ from run to run: `NAME of FILE`, for the fitted runs. No rig file has them.
 
-Waves over time whose phase differs from run to run: a load that turns does not wait for the log to begin.
-
-Such a form has a phase for every fitted run, `phase_rad` for the first and `phase_rad of FILE` for the others. What the phase is
-in a run that was kept aside nobody knows: there a draw has any, and a prediction has none of the wave, which is its mean.
+One kind is the phase of a wave over time: a turning load has any phase when a log begins. Such a form has a phase for every
+fitted run, `phase_rad` for the first and `phase_rad of FILE` for the others. The phase in a held-out run is unknown: a draw has a
+random phase there, and a prediction leaves the wave out, as its mean over all phases is 0.
 """
 
 import math
@@ -17,47 +16,55 @@ _OF = " of "
 
 
 def of_run(name: str, file: str) -> str:
-    """The name of a parameter in one run."""
+    """The name of the parameter `name` in the run `file`."""
     return name + _OF + file
 
 
 def is_of_run(name: str, parameter: str = "") -> bool:
-    """Whether a name is of one run, of any parameter or of this one."""
+    """Whether a name belongs to one run; with `parameter`, whether it is this parameter in one run."""
     return name.startswith(parameter + _OF) if parameter else _OF in name
 
 
 def name_and_run(name: str) -> tuple[str, str]:
-    """The parameter, and the file of its run or nothing."""
+    """The parameter, and the file of its run; empty for a parameter of all runs."""
     parameter, _, file = name.partition(_OF)
     return parameter, file
 
 
 def as_in_rig_file(table: Table) -> dict[str, float | str]:
-    """The effect without what is of single runs."""
+    """The effect without the parameters of single runs."""
     return {name: value for name, value in table.items() if not is_of_run(name)}
 
 
 PHASE = "phase_rad"
-OTHER_PHASE = "other_phase_rad"  # of a second wave
+OTHER_PHASE = "other_phase_rad"  # phase of a second wave
 
 
 def phase_of(file: str) -> str:
-    """The name of the phase in one of the runs after the first."""
+    """The name of the phase in the run `file`, which is not the first."""
     return of_run(PHASE, file)
 
 
 def is_phase(name: str) -> bool:
-    """Whether a parameter is a phase, in whichever run."""
+    """Whether a parameter is a phase, of all runs or of one run."""
     return name in {PHASE, OTHER_PHASE} or is_of_run(name, PHASE)
 
 
 def has_own_phases(table: Collection[str]) -> bool:
-    """Whether an effect begins in another phase in every run."""
+    """Whether an effect has a phase for each run."""
     return any(is_of_run(name, PHASE) for name in table)
 
 
 def in_run(table: Table, file: str, kept_aside: bool, seed: int | None) -> dict[str, float | str] | None:
-    """An effect as it is in one run, with a drawn phase where there is a seed and no phase is known; None: its mean."""
+    """An effect with the parameters that it has in the run `file`; None where only its mean, 0, is known.
+
+    Args:
+        table: the effect.
+        file: of the run.
+        kept_aside: whether the run is held out, so that its phase is unknown.
+        seed: of the draw that takes an unknown phase; None in a prediction.
+
+    """
     plain = as_in_rig_file(table)
     if not has_own_phases(table):
         return plain

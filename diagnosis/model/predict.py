@@ -1,12 +1,11 @@
-"""The model beside the rig: one run predicted under the run's own commands, reduced to the 1 ms grid.
+"""Prediction of one run under the commands of that run, reduced to the 1 ms grid.
 
-The equations are the plant's own: with a force drive in its kernel, with a spring in `plant.four_rigs`, many rigs at once. Its
-sensors' bandwidths are opened wide, since a manifest states none. Without vibration 70 us a step are enough: no feature differs
-by a third of a floor from 10 us (tests/truth/test_gap.py). With it, 16 steps a period: as near to 60 as 20 are (0.35 floors rms,
-as the phase decides when a slip comes), 14 are further (0.58).
+The equations are the plant's own: `plant.core` with a force drive, `plant.four_rigs` with a spring drive. The bandwidths of the
+plant's sensors are set very wide, since a manifest states none.
 
-Every segment begins with the force that was measured there. In what phase of its cycle the slide is when the vibration changes is
-chance; it decides for seconds how the force settles where nothing slips any more, and how many slips a segment has.
+Every segment of the model begins with the force that was measured there. The phase of the stick-slip cycle at which the vibration
+changes is chance. For seconds this phase decides how the force settles where nothing slips, and how many slips a segment has; a
+model that began with its own phase would differ by chance.
 """
 
 import math
@@ -29,16 +28,27 @@ from plant.records import TRUTH
 
 Floats = npt.NDArray[np.floating[Any]]
 
-# A force-driven model is held to the measured motion by a spring and a damper: this natural frequency, damped critically. Faster
-# follows the noise of the encoder, slower smears a reversal: errors of the friction show up to 10 Hz.
+# Natural frequency of the critically damped spring that holds a force-driven model to the measured motion (10 Hz).
+# Too small: reversals are smeared; friction errors show up to this frequency only. Too large: the encoder's noise becomes force.
 _HOLDING_RAD_PER_S = 2.0 * math.pi * 10.0
-_RATE_FILTER_S = 3e-3  # of the damper: keeps 0.1 um of encoder noise to 0.2 N, turns the phase at 10 Hz by 11 degrees
+# Time constant of the damper's low-pass. Too small: noise; too large: the damper acts too late to damp.
+# 3 ms keep 0.1 um of encoder noise to 0.2 N and turn the phase at 10 Hz by 11 degrees.
+_RATE_FILTER_S = 3e-3
 
 
 def predict(
     config: RigConfig, force_driven: bool, commands: Commands, start: Start, entries: Sequence[Entry] = ()
 ) -> dict[str, Floats]:
-    """Signals by name, [blocks] each, free of noise. With a force drive the motion says where the slide is, and no entry."""
+    """Noise-free signals by name, [blocks] each, SI units, before the sensors.
+
+    Args:
+        config: the rig.
+        force_driven: whether a force drives the rig; it is then led along the measured motion of `commands`.
+        commands: of the run.
+        start: state at the first block.
+        entries: states at the start of the segments; with a force drive there are none.
+
+    """
     (found,) = predict_many([config], force_driven, commands, [start], [entries])
     assert found is not None, "what is wanted is predicted"  # noqa: S101
     return found
@@ -52,9 +62,9 @@ def predict_many(
     entries: Sequence[Sequence[Entry]],
     wanted: int | None = None,
 ) -> list[dict[str, Floats] | None]:
-    """As `predict` for each of many rigs in the same run; their entries are in the same blocks.
+    """Signals as from `predict` for each of many rigs in the same run; the entries of all rigs are at the same blocks.
 
-    With `wanted` the first so many are predicted, and of the others those that fill lanes left empty; the rest is None.
+    With `wanted`, the first `wanted` rigs are predicted, and of the others those that fill empty lanes; the rest is None.
     """
     rigs = [built(config, force_driven, commands, start) for config, start in zip(configs, starts, strict=True)]
     if force_driven:
@@ -73,7 +83,7 @@ def predict_many(
 
 
 def _led(rig: Rig, commands: Commands) -> Floats:
-    """A rig with a force drive along the measured motion, [signals, blocks]."""
+    """Signals of a rig with a force drive, led along the measured motion, [signals, blocks]."""
     assert commands.motion is not None, "a force drive without a motion is refused when it is read"  # noqa: S101
     params, state, steps = rig
     p: Any = params[0]
@@ -90,7 +100,7 @@ def _led(rig: Rig, commands: Commands) -> Floats:
 
 
 def _side_by_side(rigs: Sequence[Rig], commands: Commands, entries: Sequence[Sequence[Entry]]) -> Floats:
-    """`LANES` rigs with the same steps through a run, [LANES, signals, blocks]."""
+    """Signals of `LANES` rigs with the same steps, [LANES, signals, blocks]."""
     blocks = np.array([entry.block for entry in entries[0]], np.int64)
     ages_s = [[math.nan if entry.age_s is None else entry.age_s for entry in own] for own in entries]
     forces_N = [[entry.force_N for entry in own] for own in entries]
@@ -151,7 +161,7 @@ def _follow(
     stiffness: float,
     damping: float,
 ) -> None:
-    """As `_predict`, along a measured motion: the force of `out` is the one that keeps the model on it."""
+    """As `_predict`, along a measured motion; the force in `out` is the force that keeps the model on this motion."""
     s: Record = state[0]
     own = np.empty((out.shape[0], 1))
     force = np.empty(1)

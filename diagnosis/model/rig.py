@@ -1,4 +1,4 @@
-"""The rig that is predicted: its numbers, its effects, its start, its surface."""
+"""The rig to predict: its numbers, its effects, its start, its surface."""
 
 import math
 from typing import Any, NamedTuple
@@ -15,51 +15,57 @@ from plant.records import build
 
 Floats = npt.NDArray[np.floating[Any]]
 Effects = dict[str, dict[str, float | str]]
-# How old a contact is when a run begins, and the spread of its logarithm: from a stick that was under way to a quarter of an hour
+# Age of the contact when a run begins, and the standard deviation of its logarithm in replicates: three of them reach from a
+# stick under way to a quarter of an hour. A smaller spread makes the first breakaway a gap; a larger one hides ageing.
 AGE_BEFORE_S, AGE_SPREAD = 10.0, 1.5
+# Longest step without vibration. Larger: features change. Smaller: only slower. Counted: docs/method/model.md.
 _COARSEST_STEP_S = 7e-5
+# Steps in a period of the vibration. Fewer: features change. More: only slower. Counted: docs/method/model.md.
 _STEPS_PER_PERIOD = 16
-_CONTACT_STEP = 0.5  # of 1 / natural frequency of the mass on the contact stiffness
-_LED_STEP_S = 1e-4  # its features are equal to 1e-3 N to those at 10 us
+_CONTACT_STEP = 0.5  # longest step, in 1 / natural frequency [rad/s] of the mass on the contact: stability
+_LED_STEP_S = 1e-4  # longest step with a force drive: features are equal to 1e-3 N to those at 10 us
 
 
 class Start(NamedTuple):
-    """State of the rig at the first block; time counts from there, whatever the clock of the log says."""
+    """State of the rig at the first block, where the time of the model begins."""
 
-    force_N: float  # in the drive, spring-driven; in the contact otherwise
+    force_N: float  # in the drive's spring; with a force drive, in the contact
     position_m: float
     velocity_mps: float = 0.0
-    age_s: float = AGE_BEFORE_S
-    drive_m: float | None = None  # as the drive's own sensor has it, whose zero is not that of the slide's
+    age_s: float = AGE_BEFORE_S  # of the contact
+    drive_m: float | None = None  # position that the drive's own sensor shows; its zero differs from the slide sensor's
 
 
 class Entry(NamedTuple):
-    """How a segment begins."""
+    """State of the rig at the start of a segment."""
 
     block: int
     force_N: float  # in the drive's spring
-    age_s: float | None  # of the contact, where the slide sticks; None: it slides on
-    from_before: bool = False  # it has stuck since before the run began: the age at the start comes on top
+    age_s: float | None  # of the contact, where the slide sticks; None: the slide is sliding
+    from_before: bool = False  # the slide has stuck since before the run: the age at the start is added
 
 
 class Rig(NamedTuple):
-    """Parameters and state at the start, as the plant's kernel wants them, and steps in every block."""
+    """Records for the plant's kernel."""
 
-    params: npt.NDArray[Any]
-    state: npt.NDArray[Any]
-    steps: npt.NDArray[np.int64]
+    params: npt.NDArray[Any]  # [1]
+    state: npt.NDArray[Any]  # [1], at the start of the run
+    steps: npt.NDArray[np.int64]  # steps in each block, [blocks]
 
 
 class Roughness(NamedTuple):
-    """A rough surface, one of many by its seed."""
+    """A rough surface."""
 
-    ratio: float
-    length_m: float
+    ratio: float  # scatter of the friction along the track, as a share of the friction
+    length_m: float  # over which the friction stays alike
     seed: int
 
 
 def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughness: Roughness | None) -> RigConfig:
-    """The plant's configuration for a described rig with `values` in place of the described ones."""
+    """The plant's configuration for a rig table, with `values` in place of the described numbers.
+
+    Raises pydantic.ValidationError when the plant cannot simulate such a rig.
+    """
     value = {name: known for name, known in rig.values().items() if known is not None} | values
     contact: dict[str, Any] = {
         "stiffness_N_per_m": value["contact_stiffness_N_per_m"],
@@ -82,13 +88,13 @@ def rig_config(rig: RigTable, values: dict[str, float], effects: Effects, roughn
             "stiffness_N_per_m": value["drive_stiffness_N_per_m"],
             "damping_Ns_per_m": value["drive_damping_Ns_per_m"],
         }
-    # the exciter of the evidence does as commanded, at once; an exciter that does not is a gap
+    # the exciter of the model follows its command at once and without limit; an exciter that does not is a gap
     table["piezo"] = {"amplitude_max_m": 1.0, "amplitude_slew_m_per_s": 0.0}
     return RigConfig.model_validate(table)
 
 
 def built(config: RigConfig, force_driven: bool, commands: Commands, start: Start) -> Rig:
-    """A rig as the kernels want it, where a run begins."""
+    """Records of a rig for the kernels, at the start of a run, and the steps in each of its blocks."""
     params, state = build(config)
     p: Any = params[0]
     p.force_keep = p.accel_keep = p.position_keep = 0.0
@@ -99,7 +105,7 @@ def built(config: RigConfig, force_driven: bool, commands: Commands, start: Star
     _set_start(p, state[0], start, force_driven)
     contact_rad_per_s = math.sqrt(p.k_t / p.m)
     coarsest_s = min(_LED_STEP_S if force_driven else _COARSEST_STEP_S, _CONTACT_STEP / contact_rad_per_s)
-    if p.base_m_per_N > 0.0:  # the bristle between slide and base: stable up to twice this
+    if p.base_m_per_N > 0.0:  # the contact spring between slide and base is stable up to twice this step
         base_kg = 1.0 / (p.base_m_per_N * (2.0 * math.pi * p.base_Hz) ** 2)
         coarsest_s = min(coarsest_s, math.sqrt(base_kg / p.k_t))
     steps = np.maximum(

@@ -1,4 +1,4 @@
-"""The measured force with which every segment begins, for the model to begin with as well (`model.predict` says why)."""
+"""The measured force with which every segment begins; the model begins with the same (reason: `diagnosis.model.predict`)."""
 
 from itertools import pairwise
 from typing import Any
@@ -14,11 +14,16 @@ from diagnosis.features.slips import find_slips
 from diagnosis.model.rig import Entry
 
 Floats = npt.NDArray[np.floating[Any]]
-_MOST, _FEWEST = 40, 10  # blocks of the line that is read: takes noise of 30 mN a block to 10 mN
+# Most and fewest blocks of the line through the force whose begin is read. Fewer: noise; more: the line runs into the slip.
+# 40 blocks reduce noise of 30 mN a block to 10 mN.
+_MOST, _FEWEST = 40, 10
 
 
 def entries_of(signals: Signals, commands: Commands, scales: Scales) -> tuple[Entry, ...]:
-    """Of settled segments that slide evenly or begin in a stick; none without a force or with a force drive."""
+    """State at the start of each settled segment that slides evenly or begins in a stick, in time order.
+
+    Empty without a measured force, and with a force drive. `signals` are [blocks] each.
+    """
     if "drive_force_N" not in signals:
         return ()
     found: list[Entry] = []
@@ -34,13 +39,13 @@ def entries_of(signals: Signals, commands: Commands, scales: Scales) -> tuple[En
 
 
 def misread(entry: Entry, noise: Noise, random: np.random.Generator) -> Entry:
-    """The entry as another run's noise would have it read."""
+    """The entry with the reading error that a draw of the force's noise makes."""
     error_N, _ = _line(noise.drawn("drive_force_N", _MOST, random))
     return entry._replace(force_N=entry.force_N + error_N)
 
 
 def _renewed(signals: Signals, commands: Commands, scales: Scales) -> npt.NDArray[np.int64]:
-    """The blocks at which the contact was new: where slips and even sliding ended."""
+    """Blocks at which the contact was new, because a slip or even sliding ended there; in time order."""
     slid = [segment.last for segment in commands.segments if segment.still]
     sign = np.sign(commands.drive)
     turns = [0, *(np.flatnonzero(np.diff(sign)) + 1).tolist(), len(sign)]
@@ -59,12 +64,12 @@ def _stuck(segment: Segment, cut: Signals, scales: Scales, renewed: npt.NDArray[
     force_N, rate_N = _line(measured_N[:blocks])
     if len(renewed) == 0:
         return [Entry(segment.first, segment.sign * force_N, segment.first * BLOCK_S, from_before=True)]
-    if rate_N <= 0.0 or force_N < float(measured_N[slips.bottoms].mean()):  # in a slip
+    if rate_N <= 0.0 or force_N < float(measured_N[slips.bottoms].mean()):  # the segment begins in a slip
         return []
     return [Entry(segment.first, segment.sign * force_N, (segment.first - int(renewed[-1])) * BLOCK_S)]
 
 
 def _line(values: Floats) -> tuple[float, float]:
-    """A line through values: where it begins, and its slope a block."""
+    """A line through `values` [blocks]: its value at the start, and its slope per block."""
     slope, begin = np.polyfit(np.arange(len(values)) + 0.5, values, 1)
     return float(begin), float(slope)

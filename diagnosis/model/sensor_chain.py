@@ -1,7 +1,7 @@
-"""What the sensors make of predicted signals: the faults of the library, and the small lags that no manifest states.
+"""Predicted signals as the sensors show them: with the sensor effects of the library, and small lags that no manifest states.
 
-The plant's kernel has the same effects, sample by sample; here they act on the 1 ms grid, after the kernel, so that a fault of a
-sensor costs no simulation. A slip lasts tens of blocks, so the grid resolves a lag far below 1 ms.
+The plant's kernel has the same effects, sample by sample. Here they act on the 1 ms grid after the kernel, so a trial of a sensor
+effect needs no simulation. A slip lasts tens of blocks, so the grid resolves a lag far below 1 ms.
 """
 
 import math
@@ -21,19 +21,27 @@ SENSOR_EFFECTS = tuple(name for name, effect in EFFECTS.items() if effect.acts_o
 
 
 class Chain(NamedTuple):
-    """Unstated but ordinary: what every measuring chain does a little."""
+    """Small deviations of an ordinary measuring chain; a manifest does not state them."""
 
     force_delay_s: float = 0.0
     position_delay_s: float = 0.0
     position_scale: float = 1.0
-    drive_slope: float = 0.0  # of the drive's displacement sensor against the slide's, at zero,
-    drive_bow_per_m: float = 0.0  # and how it changes along the track
-    accel_lowest_Hz: float = 0.0  # corner of the high-pass that every piezoelectric accelerometer is
-    accel_rolled_off: float = 0.0  # its gain is 1 / sqrt(1 + this (f / 10 kHz)^2)
+    drive_slope: float = 0.0  # relative error of the drive's displacement sensor against the slide's, at position 0
+    drive_bow_per_m: float = 0.0  # change of this error along the track
+    accel_lowest_Hz: float = 0.0  # corner of the high-pass that every piezoelectric accelerometer has
+    accel_rolled_off: float = 0.0  # the accelerometer's gain is 1 / sqrt(1 + accel_rolled_off (f / 10 kHz)^2)
 
 
 def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chain) -> Signals:
-    """Predicted signals as a chain with these faults would show them; new arrays, the input stays."""
+    """Predicted signals as a chain with these sensor effects would show them; new arrays, [blocks] each.
+
+    Args:
+        signals: all of the grid's signals, [blocks] each.
+        frequency_Hz: of the commanded vibration, [blocks].
+        effects: only the sensor effects among them act.
+        chain: of the measurement.
+
+    """
     result = dict(signals)
     force_N = result["drive_force_N"]
     t_s = (np.arange(len(force_N)) + 0.5) * BLOCK_S
@@ -69,7 +77,7 @@ def sensed(signals: Signals, frequency_Hz: Floats, effects: Effects, chain: Chai
 
 
 def true_force_N(reading_N: Floats, effects: Effects, t_s: Floats) -> Floats:
-    """What the force was when the sensor read this at the times `t_s`, of one shape; as if it had been constant before."""
+    """True force [N] for the readings `reading_N` at the times `t_s`, all of one shape; without lags and delays."""
     return (reading_N - _force_offset_N(effects, t_s)) / _force_gain(effects)
 
 
@@ -78,7 +86,7 @@ def _force_gain(effects: Effects) -> float:
 
 
 def _force_offset_N(effects: Effects, t_s: Floats) -> Floats:
-    """What the force sensor adds at the times `t_s`, of its shape."""
+    """Bias and drift [N] of the force sensor at the times `t_s`, same shape."""
     offset_N = np.full_like(t_s, float(effects.get("force-sensor-bias", {}).get("bias_N", 0.0)))
     if "force-sensor-drift" in effects:
         table = effects["force-sensor-drift"]
@@ -90,10 +98,10 @@ def _force_offset_N(effects: Effects, t_s: Floats) -> Floats:
 
 
 def delayed(values: Floats, delay_s: float) -> Floats:
-    """Shifted by a time of any sign, a cubic through the four blocks about each instant; level beyond the ends.
+    """`values` [blocks] later by `delay_s` (of any sign): a cubic through four blocks; constant beyond the ends.
 
-    A straight line between blocks would smooth as well, like a slow sensor: up to 0.125 ms2 of `spring bend`, where a delay and
-    two equal low-passes of 1 ms differ by 0.25.
+    Linear interpolation would also smooth, as a slow sensor does: by up to 0.125 ms2 of `spring bend`. A delay and two equal
+    low-passes with a total of 1 ms differ by only 0.25 ms2.
     """
     if delay_s == 0.0:
         return values
@@ -113,14 +121,14 @@ def delayed(values: Floats, delay_s: float) -> Floats:
 
 
 def low_pass(values: Floats, lag_s: float) -> Floats:
-    """First-order low-pass by the trapezoidal rule, which is right up to the second derivative.
+    """First-order low-pass of `values` [blocks] by the trapezoidal rule, which is exact up to the second derivative.
 
-    One that is exact for straight lines between blocks smooths by them as well: another 0.08 ms2 of `spring bend`.
+    A low-pass that is exact for straight lines between blocks would also smooth: by another 0.08 ms2 of `spring bend`.
     """
     if lag_s < 1e-9:
         return values
     turns = 2.0 * lag_s / BLOCK_S
     now, keep = 1.0 / (1.0 + turns), (turns - 1.0) / (turns + 1.0)
-    # state: at rest on the first value
+    # the filter starts at rest on the first value
     result, _ = lfilter([now, now], [1.0, -keep], values, zi=np.array([values[0] * (1.0 - now)]))
     return np.asarray(result)

@@ -1,6 +1,6 @@
-"""What really acted on a force-driven axis: there the force sensor's faults, and the chain's delays, hide the input.
+"""The true force on a force-driven axis, where the force sensor's effects and the chain's delays hide the input.
 
-The measured force is what `sensing.sensed` makes of the true one; here the way back.
+`sensor_chain.sensed` turns a true force into a measured one; this file goes the other way.
 """
 
 from typing import Any
@@ -15,16 +15,17 @@ from diagnosis.model.rig import Effects
 from diagnosis.model.sensor_chain import Chain, delayed, true_force_N
 
 Floats = npt.NDArray[np.floating[Any]]
-_DERIVATIVE_S = 2e-3  # over which the force is smoothed for what a low-pass has taken
+# Standard deviation of the smoothing before the force's rate undoes a low-pass. Too small: noise; too large: smeared reversals.
+_DERIVATIVE_S = 2e-3
 
 
 def relative(chain: Chain) -> Chain:
-    """The same chain in the time of its position sensor: along a measured motion only the difference of the delays shows."""
+    """The same chain with all delays relative to the position sensor: along a measured motion only their difference shows."""
     return chain._replace(force_delay_s=chain.force_delay_s - chain.position_delay_s, position_delay_s=0.0)
 
 
 def true_commands(commands: Commands, effects: Effects, chain: Chain) -> Commands:
-    """The commands with the true force and the true motion; `chain` as from `relative`."""
+    """The commands of a force-driven run with the true force [N] and the true motion; `chain` is from `relative`."""
     motion = commands.motion
     assert motion is not None, "a force drive has a motion"  # noqa: S101
     motion = motion._replace(position_m=motion.position_m / chain.position_scale)
