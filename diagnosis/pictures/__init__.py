@@ -1,9 +1,9 @@
-"""What a person looks at before believing a verdict.
+"""Pictures by which a person can check a verdict.
 
-choice               which pictures
-cycles               cycles laid over their predictions
-residuals, axes      residuals over what explains them; which residual over which variable
+choice               which pictures a diagnosis shows
+cycles               measured cycles laid over predicted ones
+residuals, axes      residuals over the variable that explains them; which residual over which variable
 channel_relations    relations between channels that need no simulation
-derivatives          the motion and the derivatives that those need
-breakaways           breakaways, and what each could depend on
+derivatives          the motion and the derivatives that the relations need
+breakaways           breakaways, and the variables that each could depend on
 """

@@ -1,4 +1,4 @@
-"""Where a force breaks away and sticks again within a segment, and what each breakaway could depend on."""
+"""Breakaways and re-sticks within a segment, and the variables that each breakaway could depend on."""
 
 from typing import Any
 
@@ -24,9 +24,9 @@ def slips_of(signals: Signals, segment: Segment, scales: Scales) -> Slips:
 
 
 def breakaways(rig: RigTable, run: Prepared, scales: Scales) -> tuple[Floats, dict[str, Floats]]:
-    """Breakaway forces above the rig's static friction [N], and what they could depend on, by name; [breakaways] each.
+    """Breakaway forces less the rig's static friction [N], and the variables that they could depend on; [breakaways] each.
 
-    Only without vibration, which lowers the breakaway by itself.
+    The variables go by name with unit. Segments under vibration are left out, as vibration lowers the breakaway force.
     """
     above: list[float] = []
     at: list[int] = []
@@ -37,7 +37,7 @@ def breakaways(rig: RigTable, run: Prepared, scales: Scales) -> tuple[Floats, di
             if segment.frequency_Hz > 0.0 or segment.drive_velocity_mps == 0.0:
                 continue
             slips = slips_of(run.signals, segment, scales)
-            # the dwell before the first breakaway of a segment is not the segment's
+            # the dwell before the first breakaway begins before the segment, so this breakaway is left out
             for before, top in zip(slips.bottoms[:-1].tolist(), slips.tops[1:].tolist(), strict=True):
                 above.append(segment.sign * float(run.signals["drive_force_N"][top]) - rig.static_force_N)
                 at.append(top)

@@ -1,7 +1,7 @@
-"""Relations between channels that hold whatever the friction is, and one with the friction law: no fit, no simulation.
+"""Relations between channels that hold for any friction, and one relation with the friction law; no fit, no simulation.
 
-A relation that fails names the link of the chain that is not as described; the variable over which it fails names the effect.
-Every residual is given in units of its noise: the measured noise of the channels, and what ordinary sensors promise.
+A relation that fails shows which part of the rig or of the measurement is not as described. The variable over which it fails
+shows the effect. Every residual comes with its noise: the measured noise of the channels, and the errors of ordinary sensors.
 """
 
 import math
@@ -26,19 +26,20 @@ from diagnosis.pictures.derivatives import (
 )
 
 Floats = npt.NDArray[np.floating[Any]]
-# What an ordinary chain does to a relation, as a share of the signal's rms: displacement sensors are straight to 0.2 to 0.4 %
-# in slope, a force channel lags by 40 us (0.35 % of a slip on the paper's spring), a displacement by up to 200 us (1.8 %), and
-# an accelerometer that begins at 0.5 Hz loses 1 % of a slip.
+# Error that an ordinary measuring chain makes in each relation, as a share of the signal in the relation (rms, or peak to peak in
+# `_spring`). Too small: good sensors stand out; too large: an effect does not. Displacement sensors are linear to 0.2 to 0.4 % in
+# slope, a force channel lags by 40 us (0.35 % of a slip on the paper's spring), a displacement channel by up to 200 us (1.8 %),
+# and an accelerometer that begins at 0.5 Hz loses 1 % of a slip.
 _SPRING_SHARE = 0.002
 _CURVATURE_SHARE = 0.012
 _MOTION_SHARE = 0.04
 _DRIVE_SHARE = 0.002
-_ROUGH_SHARE = 0.006  # of the friction: what a surface scatters along the track
+_ROUGH_SHARE = 0.006  # of the friction: scatter of a rough surface along the track
 _EXCITER_SHARE = 0.01
-_ROLLED_OFF = 0.5  # of accelerometers that end somewhere above 10 kHz, see `diagnosis.nuisance`
-_VIBRATION_BLOCKS = 20
-_SLIDES_FROM = 2.0  # Stribeck velocities: slower, the bristle and not the curve decides
-_AWAY = 3.0  # sigmas of the smoothing, away from the edges of a slip
+_ROLLED_OFF = 0.5  # roll-off of ordinary accelerometers, see `accel_rolled_off` in `diagnosis.model.sensor_chain`
+_VIBRATION_BLOCKS = 20  # blocks that make one point of the exciter's relation
+_SLIDES_FROM = 2.0  # Stribeck velocities from which the friction law holds; below, presliding decides the force
+_AWAY = 3.0  # standard deviations of the smoothing, kept away from the edges of a slip
 
 
 class Residual(NamedTuple):
@@ -47,7 +48,7 @@ class Residual(NamedTuple):
     name: str  # spring, curvature, motion, exciter, drive, friction
     values: Floats  # 0 where the relation holds, in the unit of the relation
     noise: float  # one standard deviation
-    over: dict[str, Floats]  # what could explain it, by name with unit
+    over: dict[str, Floats]  # variables that could explain it, by name with unit
 
     @property
     def rms(self) -> float:
@@ -56,7 +57,7 @@ class Residual(NamedTuple):
 
 
 def parity_residuals(rig: RigTable, run: Prepared) -> tuple[Residual, ...]:
-    """The residuals that the channels of a run allow, with the numbers of `rig` (best: the retuned ones)."""
+    """The residuals that the channels of a run allow, with the rig numbers of `rig` (best: those of the baseline)."""
     found: list[Residual | None] = []
     if rig.drive == "spring":
         found += [_spring(rig, run), _curvature(rig, run), _exciter(run), _drive(rig, run)]
@@ -65,7 +66,7 @@ def parity_residuals(rig: RigTable, run: Prepared) -> tuple[Residual, ...]:
 
 
 def _noise_signals(run: Prepared) -> Signals:
-    """As much noise as the run is long, by channel, as measured."""
+    """Measured noise of every channel, [blocks of the run] each."""
     random = np.random.default_rng(1)
     blocks = len(run.commands.drive)
     return {name: run.noise.drawn(name, blocks, random) for name in run.signals}
@@ -80,7 +81,18 @@ def _made(
     more: float,
     without_vibration: bool = False,
 ) -> Residual:
-    """A residual of every block, without the blocks beside changes of command. `more`: noise that the pieces do not hold."""
+    """A residual without the blocks beside changes of command.
+
+    Args:
+        name: of the relation.
+        rig: for the variables of `over`.
+        run: for the commands and the variables.
+        values: of the residual, [blocks].
+        noise: the relation applied to measured noise, [blocks].
+        more: errors of ordinary sensors that the measured noise does not hold, one standard deviation.
+        without_vibration: whether blocks under vibration are left out too.
+
+    """
     kept = kept_blocks(run)
     if without_vibration:
         kept &= run.commands.frequency_Hz == 0.0
@@ -98,7 +110,7 @@ def _spring(rig: RigTable, run: Prepared) -> Residual | None:
         rate_mps = derivative(extension_m, 2.0)
         spring_N = (rig.drive_stiffness_N_per_m or 0.0) * extension_m + (rig.drive_damping_Ns_per_m or 0.0) * rate_mps
         left = signals["drive_force_N"] - spring_N
-        return left - left.mean()  # the zero of two displacement sensors is not known
+        return left - left.mean()  # the zero between the two displacement sensors is not known
 
     force_N = run.signals["drive_force_N"]
     return _made(
@@ -155,11 +167,11 @@ def _drive(rig: RigTable, run: Prepared) -> Residual | None:
         at = np.arange(segment.first, segment.last)[kept[segment.first : segment.last]]
         if len(at) > 100:
             path_m = run.signals["drive_position_m"][at]
-            # a bow belongs to the displacement sensor
+            # a parabola takes out the bow of the displacement sensor
             values[at] = path_m - np.polynomial.Polynomial.fit(at, path_m, 2)(at)
     noise = _noise_signals(run)["drive_position_m"]
     travel_m = float(np.median(np.abs(run.commands.drive)))  # in a second
-    # a position that stands still in the log has no noise but the rounding of its sums
+    # a drive that stands still in the log has no noise but rounding: `RESOLVED_M`
     return _made("drive", rig, run, values, noise, max(_DRIVE_SHARE * travel_m, RESOLVED_M))
 
 
@@ -196,7 +208,7 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
     if "drive_force_N" not in has or not {"mass_accel_mps2", "mass_position_m"} & has:
         return None
 
-    # an accelerometer shows the edges of a slip as they are; a displacement differentiated twice needs smoothing
+    # an accelerometer shows the edges of a slip; a displacement that is differentiated twice needs smoothing
     smooth = 1.0 if "mass_accel_mps2" in has else smoothing_blocks(rig)
 
     def relation(signals: Signals) -> Floats:
@@ -211,10 +223,10 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
         return None
     velocity_mps = over["velocity_mps"]
     values = relation(run.signals) - friction_law(rig, velocity_mps)
-    # at rest a contact bears any force below its static friction; close to rest the bristle decides and not the curve
+    # at rest the contact bears any force below the static friction; close to rest presliding decides, not the friction law
     sliding = np.abs(velocity_mps) > _SLIDES_FROM * rig.stribeck_velocity_mps
     inner = minimum_filter1d(sliding, 2 * math.ceil(_AWAY * max(smooth, 0.4 * smoothing_blocks(rig))) + 1)
-    # a friction law of a shaken contact would be a model, no relation
+    # under vibration the friction law does not hold
     used = kept_blocks(run) & (run.commands.frequency_Hz == 0.0) & inner
     noise = relation(_noise_signals(run))
     spread = float(np.sqrt(np.mean(noise**2) + (_ROUGH_SHARE * rig.coulomb_force_N) ** 2))
@@ -223,7 +235,7 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
 
 
 def friction_law(rig: RigTable, velocity_mps: Floats) -> Floats:
-    """The friction force of steady sliding [N] as a manifest has it, without a tail, at velocities of any sign."""
+    """The friction force [N] of steady sliding at velocities of any sign, same shape; the manifest's law without a tail."""
     falling_N = (rig.static_force_N - rig.coulomb_force_N) * np.exp(-((velocity_mps / rig.stribeck_velocity_mps) ** 2))
     viscous_N = rig.viscous_damping_Ns_per_m * velocity_mps
     return np.sign(velocity_mps) * (rig.coulomb_force_N + falling_N) + viscous_N

@@ -1,21 +1,24 @@
-"""The pictures of a diagnosis: cycles laid over their predictions, and residuals over what explains them."""
+"""The pictures of a diagnosis: measured cycles over predicted ones, and residuals over the variable that explains them."""
 
 from diagnosis.gap.problem import Point, Problem
 from diagnosis.pictures.cycles import Told, Version, force_picture, most_telling, slip_picture, slips_apart
 from diagnosis.pictures.residuals import Overlay, residual_pictures
 from diagnosis.result import Picture
 
-_MOST_RUNS = 5
-_SLIP_DIFFERS = 0.03  # of the slip: closer, a close-up shows nothing
+_MOST_RUNS = 5  # runs with a picture of a cycle
+_SLIP_DIFFERS = 0.03  # relative difference of two mean slips from which a close-up is drawn; below, it shows nothing
 
 
 def pictures(
     problem: Problem, nominal: Point, retuned: Point, named: Point | None, effects: tuple[str, ...]
 ) -> tuple[Picture, ...]:
-    """At most ten pictures: of every run its most telling segment, slips close up where they differ, residuals.
+    """At most ten pictures: the most telling segment of each run, slips in close-up where they differ, residuals.
 
     Args:
-        named: the model with the named effects; None when none was named.
+        problem: the runs to show.
+        nominal: the rig as described.
+        retuned: the baseline.
+        named: the model with the named effects; None when no effect was named.
         effects: the named effects.
 
     """

@@ -1,4 +1,4 @@
-"""Measured cycles laid over predicted ones: of each run the segment in which they differ most."""
+"""Measured cycles laid over predicted ones, for the segment of each run in which they differ most."""
 
 from typing import Any, Literal, NamedTuple
 
@@ -15,12 +15,12 @@ from diagnosis.result import Curve, Picture
 
 Floats = npt.NDArray[np.floating[Any]]
 Style = Literal["measured", "nominal", "retuned", "effect"]
-_POINTS = 700
+_POINTS = 700  # of a curve
 _AXES = {"drive_force_N": "drive force [N]", "mass_accel_mps2": "acceleration of the mass [m/s²]"}
 
 
 class Version(NamedTuple):
-    """The signals of one run as measured or as one model predicts them."""
+    """The signals of one run, [blocks] each, as measured or as one model predicts them."""
 
     label: str
     style: Style
@@ -28,7 +28,7 @@ class Version(NamedTuple):
 
 
 class Told(NamedTuple):
-    """A segment of a run and how far measurement and retuned rig are apart there, in static friction forces."""
+    """A segment of a run, and the difference of measurement and baseline there, in static friction forces."""
 
     run: Prepared
     segment: Segment
@@ -37,12 +37,12 @@ class Told(NamedTuple):
 
 
 def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -> Told:
-    """The segment of a run in which measured and retuned (or, without, nominal) differ most."""
+    """The segment of a run in which measurement and baseline (without a baseline, the last version) differ most."""
     against = next((one for one in versions if one.style == "retuned"), versions[-1])
     best = Told(run, run.commands.segments[0], versions, -1.0)
     for segment in run.commands.segments:
         apart = _apart(versions[0].signals, against.signals, segment, scales)
-        # where details decide whether anything slips, or when, a difference says little
+        # where any detail decides whether or when the slide slips, a difference says little
         if segment.at_the_edge or not _cycles_there(versions[0].signals, segment, scales):
             apart *= 0.3
         if apart > best.apart:
@@ -55,7 +55,7 @@ def _mean_of(cycles: int) -> str:
 
 
 def _cycles_there(signals: Signals, segment: Segment, scales: Scales) -> bool:
-    """Whether nothing slips, or something twice."""
+    """Whether the segment has no slip, or two or more."""
     return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
 
 
@@ -67,7 +67,7 @@ def _apart(measured: Signals, predicted: Signals, segment: Segment, scales: Scal
 
 
 def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
-    """Breakaway, re-stick and mean level, in static friction forces, and a tenth of the logarithm of the period."""
+    """Breakaway, re-stick and mean level in static friction forces, and a tenth of the logarithm of the period; [4]."""
     force_N = signals["drive_force_N"]
     slips = slips_of(signals, segment, scales)
     level_N = segment.sign * float(force_N[segment.first : segment.last].mean())
@@ -80,9 +80,9 @@ def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
 
 
 def force_picture(told: Told, scales: Scales) -> Picture:
-    """The whole cycle, slip to slip, where every version has one; else the signal over time."""
+    """The mean cycle, from slip to slip, where every version has one; else the signal over time."""
     name = "drive_force_N" if "drive_force_N" in told.run.signals else "mass_accel_mps2"
-    # with a force drive the force is no saw tooth and its phase is not free
+    # with a force drive the force is not a saw tooth, and its phase is that of the measured motion
     if name == "drive_force_N" and told.segment.drive_velocity_mps != 0.0:
         slips = [slips_of(version.signals, told.segment, scales) for version in told.versions]
         if all(len(one.middles) >= 2 for one in slips):
@@ -92,7 +92,7 @@ def force_picture(told: Told, scales: Scales) -> Picture:
         if all(len(one.middles) == 1 for one in slips) or (
             told.segment.first and all(len(one.middles) for one in slips)
         ):
-            # the phase of stick-slip is free
+            # the phase of stick-slip is chance, so the first slips are aligned
             zeros = [float(one.middles[0]) for one in slips]
             title = f"{_place(told)}: first slips laid on each other"
             curves = [_over_time(version, name, told, zero) for version, zero in zip(told.versions, zeros, strict=True)]
@@ -102,7 +102,7 @@ def force_picture(told: Told, scales: Scales) -> Picture:
 
 
 def slip_picture(told: Told, name: str, scales: Scales) -> Picture | None:
-    """The mean slip close up; None where a version does not slip."""
+    """The mean slip in close-up; None where a version does not slip."""
     curves: list[Curve] = []
     reach = np.arange(-1.5, 2.5, 0.02, dtype=np.float64) * scales.slip_s / BLOCK_S
     count = 0
@@ -121,7 +121,7 @@ def slip_picture(told: Told, name: str, scales: Scales) -> Picture | None:
 
 
 def slips_apart(told: Told, name: str, scales: Scales) -> float:
-    """How far measured and retuned differ in the mean slip, relative to the slip itself; 0 where one does not slip."""
+    """Difference of measurement and baseline in the mean slip, relative to the slip; 0 where one of them does not slip."""
     picture = slip_picture(told, name, scales)
     if picture is None:
         return 0.0
@@ -131,7 +131,7 @@ def slips_apart(told: Told, name: str, scales: Scales) -> float:
 
 
 def _whole_cycle(version: Version, slips: Slips) -> Curve:
-    """Every cycle stretched to the mean period, so that the slips at its ends stay sharp, and averaged."""
+    """The mean of all cycles, each stretched to the mean period so that the slips at its ends stay sharp."""
     values = version.signals["drive_force_N"]
     periods = np.diff(slips.middles)
     share = np.linspace(-0.12, 1.12, _POINTS)
@@ -144,7 +144,7 @@ def _whole_cycle(version: Version, slips: Slips) -> Curve:
 
 
 def _over_time(version: Version, name: str, told: Told, zero: float | None) -> Curve:
-    """A whole segment, over time in the run [s] or after block `zero` [ms]."""
+    """A whole segment over time: in the run [s], or with `zero` after this block [ms]."""
     segment = told.segment
     values = version.signals[name][segment.first : segment.last]
     block = max(len(values) // _POINTS, 1)

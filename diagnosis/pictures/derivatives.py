@@ -1,4 +1,4 @@
-"""How the mass and the spring of a reduced run move, from whatever channels it has; smooth derivatives on the 1 ms grid."""
+"""Motion of the mass and the spring of a reduced run, from the channels that it has; smooth derivatives on the 1 ms grid."""
 
 from typing import Any
 
@@ -13,29 +13,34 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.model.sensor_chain import low_pass
 
 Floats = npt.NDArray[np.floating[Any]]
-_SMOOTH_SHARE = 0.14  # sigma, of a slip: 5 ms on the paper's spring, where a slip keeps 90 % of its acceleration
-_SMOOTH_FREE = 5.0  # blocks, where no spring gives a time scale
-_BRISK = 0.4  # of it, for a first derivative
-_EDGE_BLOCKS = 100  # around a change of command, where a drive or a piezo may still be on its way
-_END_BLOCKS = 20
-_SLOW_S = 0.08  # accelerometers do not see what is slower than 0.5 Hz: compared above 2 Hz
-_MOVES_MPS = 2e-3
+# Standard deviation of the smoothing, as a share of a slip. Too small: noise of the second derivative; too large: slips are cut.
+# 0.14 is 5 ms on the paper's spring, where a slip keeps 90 % of its acceleration.
+_SMOOTH_SHARE = 0.14
+_SMOOTH_FREE = 5.0  # blocks, with a force drive, where no slip gives a time scale
+_BRISK = 0.4  # share of this smoothing for a first derivative, which needs less
+_EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle
+_END_BLOCKS = 20  # left out at the ends of a run
+_SLOW_S = 0.08  # time constant of a high-pass at 2 Hz: accelerometers do not show what is slower than 0.5 Hz
+_MOVES_MPS = 2e-3  # speed above which the mass has moved; a slip of the paper's rig reaches 22 mm/s
 
 
 def smoothing_blocks(rig: RigTable) -> float:
-    """Sigma by which signals are smoothed before they are compared."""
+    """Standard deviation [blocks] of the smoothing before signals are compared."""
     if rig.drive == "force":
         return _SMOOTH_FREE
     return float(np.clip(_SMOOTH_SHARE * scales_of(rig).slip_s / BLOCK_S, 1.0, 50.0))
 
 
 def derivative(values: Floats, smooth_blocks: float) -> Floats:
-    """Per s, smoothed."""
+    """Smoothed first derivative of `values` [blocks], in their unit per s."""
     return np.asarray(np.gradient(gaussian_filter1d(values, smooth_blocks), BLOCK_S), np.float64)
 
 
 def second_derivative(values: Floats, smooth_blocks: float) -> Floats:
-    """Per s2, smoothed. By differences: the truncated kernel of a derivative does not forget an offset of 0.5 m."""
+    """Smoothed second derivative of `values` [blocks], in their unit per s2; 0 at the ends.
+
+    By differences: the truncated kernel of a smoothed derivative would keep a part of an offset of 0.5 m.
+    """
     smooth = gaussian_filter1d(values, smooth_blocks, mode="nearest")
     result = np.zeros_like(smooth)
     result[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) / BLOCK_S**2
@@ -43,12 +48,12 @@ def second_derivative(values: Floats, smooth_blocks: float) -> Floats:
 
 
 def without_slow(values: Floats) -> Floats:
-    """What is faster than 2 Hz."""
+    """`values` [blocks] without the part slower than 2 Hz."""
     return values - low_pass(values, _SLOW_S)
 
 
 def kept_blocks(run: Prepared) -> npt.NDArray[np.bool_]:
-    """Blocks away from changes of command and from the ends of the run, [blocks]."""
+    """Marks the blocks away from changes of command and from the ends of the run, [blocks]."""
     commands = run.commands
     changes = np.zeros(len(commands.drive))
     if any(segment.drive_velocity_mps != 0.0 for segment in commands.segments):
@@ -68,7 +73,7 @@ def with_drive_path(run: Prepared) -> Signals:
 
 
 def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
-    """What a residual can be drawn over, by name with unit, [blocks] each; what the channels do not tell is not there."""
+    """Variables that a residual can be drawn over, by name with unit, [blocks] each; those that the channels allow."""
     signals = run.signals
     blocks = len(run.commands.drive)
     over: dict[str, Floats] = {"time_s": (np.arange(blocks, dtype=np.float64) + 0.5) * BLOCK_S}
@@ -87,7 +92,7 @@ def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
             extension_m = drive_m - position_m
             force_N = signals.get("drive_force_N")
             if force_N is not None:
-                # the zero is not known: as if the spring were right on average
+                # the zero of the extension is not known: chosen so that the spring law holds on average
                 extension_m = extension_m - extension_m.mean() + force_N.mean() / (rig.drive_stiffness_N_per_m or 1.0)
             over["extension_m"] = extension_m
             over["extension_rate_mps"] = derivative(extension_m, brisk)
@@ -99,7 +104,7 @@ def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
 
 
 def _since(velocity_mps: Floats) -> Floats:
-    """Time since the mass last moved faster than 2 mm/s [s]; a slip of the paper's rig reaches 22."""
+    """Time since the mass last moved faster than 2 mm/s, [blocks], s."""
     at = np.arange(len(velocity_mps), dtype=np.float64)
     last = np.maximum.accumulate(np.where(np.abs(velocity_mps) > _MOVES_MPS, at, 0.0))
     return (at - last) * BLOCK_S

@@ -1,4 +1,4 @@
-"""Residuals drawn over the variable that explains them: which one, follows from the effect that was named."""
+"""Residuals drawn over the variable that explains them; the named effect decides which residual and which variable."""
 
 from typing import Any, NamedTuple
 
@@ -15,15 +15,15 @@ from diagnosis.pictures.cycles import Style
 from diagnosis.result import Curve, Picture
 
 Floats = npt.NDArray[np.floating[Any]]
-_ROUNDING = 1e-3  # of the noise: a drive told to be even is, but for the last bit, of which a picture makes a spike
-_CLOUD = 900
-_BINS = 50
-_BINS_OF_A_TRACK = 160  # of 15 mm, say: a ripple of 1 mm still shows
-_FEWEST = 3  # points of a bin
+_ROUNDING = 1e-3  # rms in units of the noise, up to which a residual is rounding: a drive that was logged as commanded
+_CLOUD = 900  # points of a measured cloud
+_BINS = 50  # of a mean line
+_BINS_OF_A_TRACK = 160  # of a mean line over a position: on a track of 15 mm a ripple of 1 mm still shows
+_FEWEST = 3  # points that a bin needs
 
 
 class Overlay(NamedTuple):
-    """What the measured residual is compared with: predicted signals by file."""
+    """A model to compare the measured residual with: its predicted signals by file."""
 
     label: str
     style: Style
@@ -39,11 +39,14 @@ class _Series(NamedTuple):
 def residual_pictures(
     rig: RigTable, runs: list[Prepared], scales: Scales, models: list[Overlay], effects: tuple[str, ...]
 ) -> list[Picture]:
-    """One or two pictures for every named effect; without one, the two residuals that stand out most.
+    """One or two pictures for each named effect, then those of the residuals with the largest rms; without effects, two.
 
     Args:
-        rig: the retuned one.
-        models: what to compare with, of every run.
+        rig: with the numbers of the baseline.
+        runs: measured.
+        scales: of the rig.
+        models: predictions to compare with, for every run.
+        effects: the named effects.
 
     """
     wanted: list[Over] = []
@@ -87,7 +90,7 @@ def _series(rig: RigTable, run: Prepared, scales: Scales, over: Over) -> _Series
 
 
 def _without_levels(values: Floats, frequency_Hz: Floats) -> Floats:
-    """Less the mean at each frequency, which would hide what goes with the force."""
+    """`values` less their mean at each frequency, which would hide a dependence on the force."""
     result = values.copy()
     for told_Hz in np.unique(frequency_Hz):
         at = frequency_Hz == told_Hz
@@ -101,7 +104,7 @@ def _picture(rig: RigTable, runs: list[Prepared], scales: Scales, models: list[O
     title = TITLES[name]
     measured = _all(rig, runs, scales, over)
     if variable == "time_s" or name == "spring":
-        # every run starts at time zero, and the zero of an extension is its own: of several runs only the most telling one
+        # time and the zero of an extension are of one run: only the run with the largest residual is drawn
         worst = max(range(len(runs)), key=lambda i: measured[i].rms)
         runs, measured = [runs[worst]], [measured[worst]]
         title += f" ({runs[0].file.rsplit('.', 1)[0]})"
@@ -123,7 +126,7 @@ def _joined(series: list[_Series]) -> tuple[Floats, Floats]:
 
 
 def _line(label: str, style: Style, x: Floats, y: Floats, over: Over) -> Curve:
-    """The mean in bins of x, a hole where several bins are empty."""
+    """The mean of y in bins of x, interrupted where several bins are empty."""
     name, variable = over
     if len(x) < 2:
         return Curve(label, np.zeros(0), np.zeros(0), style)
