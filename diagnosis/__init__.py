@@ -1,20 +1,20 @@
-"""From an evidence folder to where the gap between rig and model lies, and why.
+"""From an evidence folder to the place and the cause of the gap between rig and model.
 
 diagnose        the whole way, in order             result      the answer and its JSON
 diagnose_many   many folders, on cores or Dask      processes   the same work in any number of processes
 
-On the way, each room on what stands before it:
+The packages, each built on those before it:
 
 evidence/      a folder of measured runs, read strictly
-features/      a run as numbers that do not depend on when it slips
-model/         one run predicted under the run's own commands, as its sensors would show it
-gap/           measured against predicted, in noise floors
-hypotheses/    what is tried: nuisances, effects in every form, where they start
+features/      a run as numbers that do not depend on the instants of its slips
+model/         prediction of one run under the commands of that run, as its sensors would show it
+gap/           measured features against predicted features, in noise floors
+hypotheses/    nuisances, effects in every form, and the points where their fits start
 fits/          refits: one, many at once, the search over all
-verdict/       is there a gap, which effect, how sure, and what the held-out runs say
+verdict/       whether there is a gap, which effect closes it, how sure that is, and the check on held-out runs
 experiments/   what to measure next, what to check by hand
-pictures/      measured beside predicted as curves; residuals over what explains them
+pictures/      measured beside predicted as curves; residuals over the variable that explains them
 report/        the answer in words, as a page, as a rig file
 synthetic/     evidence made from the plant
-blind/         how good all of it is: sealed cases
+blind/         how often a diagnosis is right: sealed cases
 """

@@ -1,4 +1,7 @@
-"""The whole way from an evidence to a diagnosis: retune, alarm, name, group, judge on held-out runs, say what to do next."""
+"""The whole way from an evidence to a diagnosis.
+
+Fit the baseline, look for a gap, find the effects, check them on held-out runs, put the answer together.
+"""
 
 import time
 from collections.abc import Sequence
@@ -17,9 +20,15 @@ from diagnosis.verdict.selection import Contest, Progress
 
 
 def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
-    """Diagnose one evidence. `progress` is told, in words, what is known and the share of the work that is done.
+    """Diagnose one evidence. The answer does not depend on `jobs`.
 
-    The answer does not depend on `jobs`. Raises Fault BAD_EVIDENCE when nothing can be compared.
+    Raises Fault BAD_EVIDENCE when nothing can be compared.
+
+    Args:
+        evidence: the rig as described and the measured runs.
+        progress: called with a text on the state of the work, and the share that is done (0 to 1).
+        jobs: processes.
+
     """
     with one_thread():
         return _diagnosed(evidence, progress, jobs)
@@ -41,7 +50,15 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
 
 
 def with_what_vibrates(verdict: Verdict, runs: Sequence[Run]) -> Verdict:
-    """What becomes of a verdict where runs vibrate as no model does: in the force signal, or at other frequencies."""
+    """The verdict in view of vibration that no model makes: in the force signal, or of the base at other frequencies.
+
+    With such a vibration, "no gap" becomes "unexplained"; with a base at other frequencies, so does an effect of the piezo alone.
+
+    Args:
+        verdict: from the features, which do not show such vibration.
+        runs: all runs of the evidence.
+
+    """
     if any(run.distortion for run in runs):
         return although_outside(verdict, PIEZO_EFFECTS)
     return although_outside(verdict) if any(run.pick_up for run in runs) else verdict

@@ -1,6 +1,6 @@
-"""Many evidence folders at once: on the cores of this machine, or on a Dask cluster, by the same code.
+"""Diagnosis of many evidence folders: on the cores of one computer, or on a Dask cluster, with the same code.
 
-A worker reads its folder itself, by the absolute path: the workers of a cluster need the same disk and the same version.
+A worker reads its folder by the absolute path, so the workers of a cluster need the same disk and the same version.
 """
 
 import re
@@ -24,18 +24,18 @@ from diagnosis.result import Diagnosis
 
 Progress = Callable[[str, float], None]
 Diagnose = Callable[[Evidence, Progress, int], Diagnosis]
-_CLUSTER_WAIT_S = 5  # for the scheduler to answer, and again for a first worker
+_CLUSTER_WAIT_S = 5  # time for the scheduler to answer, and again for a first worker; too short fails on a busy network
 
 
 class EvidenceFolder(NamedTuple):
-    """An evidence folder and the name it goes by in results; no two have the same name."""
+    """An evidence folder, and its name in the results; no two folders have the same name."""
 
     name: str
     folder: Path
 
 
 class FolderResult(NamedTuple):
-    """What became of one folder: a diagnosis, or the code and the line of a fault."""
+    """The result of one folder: a diagnosis, or the code and the line of a fault."""
 
     source: EvidenceFolder
     diagnosis: Diagnosis | None
@@ -43,7 +43,7 @@ class FolderResult(NamedTuple):
 
 
 def find_sources(folders: list[Path]) -> list[EvidenceFolder]:
-    """The evidence folders among `folders` and, where one has no manifest, right below it; each once, in order."""
+    """The evidence folders among `folders`, each once, in order. A folder without a manifest stands for those in it."""
     found: dict[Path, None] = {}
     for folder in folders:
         try:
@@ -51,7 +51,7 @@ def find_sources(folders: list[Path]) -> list[EvidenceFolder]:
             inside = sorted(path.parent.resolve() for path in folder.glob(f"*/{MANIFEST}"))
         except OSError:
             holds, inside = False, list[Path]()
-        # a folder without any evidence stays: reading it says what is missing
+        # a folder without any evidence stays in the list: reading it raises a fault that says what is missing
         given = [folder.resolve()] if holds or not inside else inside
         found.update(dict.fromkeys(given))
     names = [folder.name for folder in found]
@@ -60,7 +60,7 @@ def find_sources(folders: list[Path]) -> list[EvidenceFolder]:
 
 
 def real_diagnose(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
-    """The real diagnosing function; imported where it works, since it compiles kernels."""
+    """`diagnosis.diagnose.diagnose`; imported in the worker, as the import compiles kernels."""
     from diagnosis.diagnose import diagnose  # noqa: PLC0415
 
     return diagnose(evidence, progress, jobs)
@@ -69,12 +69,19 @@ def real_diagnose(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosi
 def diagnose_many(
     sources: Iterable[EvidenceFolder], jobs: int, cluster: str = "", diagnose: Diagnose = real_diagnose
 ) -> Generator[FolderResult]:
-    """Yield the outcome of every source, as they come.
+    """Yield the result of every source, in the order in which they finish.
 
-    With `cluster`, the address of a Dask scheduler, its workers do it and `jobs` does not matter. `diagnose` must be a
-    function of a module, so that it can travel. A folder that cannot be diagnosed, or that kills its worker again and
-    again, is an outcome and stops nothing. Raises Fault NO_PEER or CONFIG for the cluster. Closing the generator, or
-    Ctrl-C, ends the workers of this machine; a cluster drops what it has not begun.
+    A folder that cannot be diagnosed, or that kills its worker again and again, yields a fault and stops no other folder. Closing
+    the generator, or Ctrl-C, ends the local workers; a cluster drops the folders that it has not begun.
+
+    Raises Fault NO_PEER or CONFIG for the cluster.
+
+    Args:
+        sources: from `find_sources`.
+        jobs: processes on this computer; without effect with `cluster`.
+        cluster: address of a Dask scheduler; empty: none.
+        diagnose: a function at the top level of a module, so that it can be sent to a worker.
+
     """
     waiting = {source.name: source for source in sources}
     with _workers(jobs, cluster) as workers:
@@ -86,7 +93,7 @@ def diagnose_many(
                     del waiting[outcome.source.name]
                     yield outcome
             except workers.breakdowns:
-                # whose worker died cannot be seen: those that may have been under way are done again, one by one
+                # Which folder killed its worker is not known: all that may have been under way are done again, one by one.
                 for source in list(waiting.values())[: workers.dispatched]:
                     yield _alone(source, diagnose, workers)
                     del waiting[source.name]
@@ -102,23 +109,23 @@ def _alone(source: EvidenceFolder, diagnose: Diagnose, workers: "_Workers") -> F
 
 def _one(source: EvidenceFolder, diagnose: Diagnose) -> FolderResult:
     try:
-        # a worker of the one level is no dispatcher of another: Dask would spread what is inside once more
+        # sequential inside a worker: Dask would spread the work of one folder over its workers again
         with parallel_config("sequential"):
             return FolderResult(source, diagnose(load_evidence(source.folder), lambda _text, _share: None, 1), None)
     except Fault as fault:
         return FolderResult(source, None, (fault.kind.code, fault.line))
-    except Exception as error:  # hours of other folders must not end with this one
+    except Exception as error:  # an error in one folder must not end the work on the others
         at = traceback.extract_tb(error.__traceback__)[-1]
         line = f"{type(error).__name__}: {error} ({Path(at.filename).name}, line {at.lineno})"
         return FolderResult(source, None, ("DIAGNOSIS_BROKE", line))
 
 
 class _Workers(NamedTuple):
-    """Who works."""
+    """A pool of workers, local or on a cluster."""
 
-    pool: Callable[[int], Any]  # a joblib.Parallel that has so many tasks under way at most
-    dispatched: int
-    breakdowns: tuple[type[Exception], ...]  # what is raised when a worker died for good
+    pool: Callable[[int], Any]  # a joblib.Parallel with at most this number of tasks under way
+    dispatched: int  # largest useful number of tasks under way
+    breakdowns: tuple[type[Exception], ...]  # the exceptions that are raised when a worker has died for good
 
 
 @contextmanager
@@ -147,7 +154,7 @@ def _workers(jobs: int, cluster: str) -> Generator[_Workers]:
         from joblib._dask import DaskDistributedBackend  # noqa: PLC0415
 
         class Cluster(DaskDistributedBackend):
-            """Joblib does the work itself where a back-end has one core: the last worker left would stand idle."""
+            """A back-end that never reports one core: joblib would then do the work itself and leave the last worker idle."""
 
             def effective_n_jobs(self, n_jobs: int) -> int:
                 return max(2, super().effective_n_jobs(n_jobs))
@@ -160,12 +167,12 @@ def _workers(jobs: int, cluster: str) -> Generator[_Workers]:
 
 
 def _pool(config: dict[str, Any], dispatched: int) -> Any:
-    # one task at a time: a task takes seconds, and all that a dead worker had begun is done again
+    # one task in a batch: a task takes seconds, and every task in the batch of a dead worker is done again
     with parallel_config(**config):
         return Parallel(return_as="generator_unordered", batch_size=cast(Any, 1), pre_dispatch=cast(Any, dispatched))
 
 
 def _leave_interrupt_to_parent() -> None:
-    """Ctrl-C reaches every process of the terminal; the parent ends its workers, which say nothing themselves."""
+    """Let a worker ignore Ctrl-C, which reaches every process of the terminal; the parent ends its workers."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""The same work on many items, in as many processes as one wants, with the same result in any number of them."""
+"""The same work on many items, in several processes; the result does not depend on the number of processes."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -14,7 +14,7 @@ R = TypeVar("R")
 def one_thread() -> threadpool_limits:
     """A context in which linear algebra has one thread.
 
-    More add up in another order, and fits are jagged: README's example came to 12.6, 13.3 or 13.5 N s/m by the threads at hand.
+    More threads add in another order, and a fit amplifies a change in the last bit (docs/method/fits.md).
     """
     return threadpool_limits(limits=1)
 
@@ -25,9 +25,12 @@ def _alone(function: Callable[[S, T], R], shared: S, item: T) -> R:
 
 
 def each(jobs: int, function: Callable[[S, T], R], shared: S, items: Sequence[T]) -> list[R]:
-    """What a function makes of something shared and every item, in `jobs` processes."""
+    """`function(shared, item)` for every item, in the order of the items, in `jobs` processes.
+
+    With more than one process, `function`, `shared` and the items are pickled.
+    """
     if jobs == 1:
         return [function(shared, item) for item in items]
-    # memory maps of the evidence, which joblib makes of arrays beyond 1 MB, take 0.1 s a call; to send it takes 0.02 s
+    # max_nbytes=None: joblib makes memory maps of arrays above 1 MB, which takes 0.1 s a call; sending them takes 0.02 s
     results: list[R] = Parallel(n_jobs=jobs, max_nbytes=None)(delayed(_alone)(function, shared, item) for item in items)  # pyright: ignore[reportAssignmentType]
     return results

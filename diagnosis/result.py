@@ -1,4 +1,4 @@
-"""What a diagnosis says, and its JSON form (`diagnosis/1`, fixed by the evidence contract)."""
+"""The answer of a diagnosis, and its JSON form (`diagnosis/1`, a fixed contract)."""
 
 from pathlib import PurePath
 from typing import Any, Literal, NamedTuple
@@ -13,7 +13,7 @@ FORMAT = "diagnosis/1"
 
 
 class Estimate(NamedTuple):
-    """A fitted number and the interval that holds it with 90 % probability."""
+    """A fitted number, and the interval that holds the true number with 90 % probability."""
 
     value: float
     interval_90: tuple[float, float]
@@ -24,9 +24,9 @@ class Candidate(NamedTuple):
 
     effect: str
     probability: float
-    form: str = ""  # which formula of the effect fitted best
+    form: str = ""  # the formula of the effect that fitted best
     parameters: dict[str, Estimate] = {}  # names carry their units
-    chi2: float | None = None  # of its fit alone, the nuisances' priors included; None: not refitted
+    chi2: float | None = None  # of the fit with this effect alone, with the priors of the nuisances; None: not refitted
 
 
 class Cell(NamedTuple):
@@ -40,7 +40,10 @@ class Cell(NamedTuple):
 
 
 class Shrinkage(NamedTuple):
-    """How far one explanation closes the gap on held-out runs: (retuned - gap) / (retuned - floor)."""
+    """Share of the gap on held-out runs that one explanation closes: (retuned - gap) / (retuned - floor).
+
+    `retuned` is the gap of the baseline.
+    """
 
     who: str  # the effect or effects, "parameters alone", "flexible residual"
     gap: float
@@ -53,31 +56,31 @@ class Gap(NamedTuple):
 
     definition: str
     runs: tuple[str, ...]  # files of the held-out runs
-    nominal: float
-    retuned: float
+    nominal: float  # of the rig as described
+    retuned: float  # of the baseline
     with_effect: float
     floor: float
     shrinkage: float | None
     interval_90: tuple[float, float] | None
     compared: tuple[Shrinkage, ...]  # best effect, runner-up, parameters alone, flexible residual
-    refuted: tuple[str, ...] = ()  # what the fitted runs would have named, and these do not bear out
+    refuted: tuple[str, ...] = ()  # effects that the fitted runs show and the held-out runs do not confirm
 
 
 class RigNumber(NamedTuple):
-    """A number of the rig table: as described, and as refitted inside its tolerance."""
+    """A number of the rig table: as described, and refitted within its tolerance."""
 
     name: str
     described: float
-    retuned: float
+    retuned: float  # in the baseline
     tolerance: float  # one standard deviation, relative, or absolute where 0 is described; 0: known exactly
 
 
 class Experiment(NamedTuple):
-    """What to measure next."""
+    """The experiment to do next."""
 
     what: str
     why: str
-    gain: float | None  # how far apart the leading candidates would then be, in standard deviations
+    gain: float | None  # distance of the leading candidates after it, in standard deviations
 
 
 class Curve(NamedTuple):
@@ -90,7 +93,7 @@ class Curve(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """One picture of the report. `kind`: a cycle laid over its prediction, or a residual over what explains it."""
+    """One picture of the report. `kind`: cycle: measured over predicted; residual: over the variable that explains it."""
 
     kind: Literal["cycle", "residual"]
     title: str
@@ -100,7 +103,7 @@ class Picture(NamedTuple):
 
 
 class Diagnosis(NamedTuple):
-    """The whole answer."""
+    """The whole answer of a diagnosis."""
 
     verdict: Literal["effect", "no-gap", "unexplained"]
     effects: tuple[str, ...]
@@ -113,19 +116,19 @@ class Diagnosis(NamedTuple):
     rig: tuple[RigNumber, ...]
     findings: tuple[Finding, ...]
     pictures: tuple[Picture, ...]
-    compared_features: int  # of the fitted runs: what every chi2 is a sum over
+    compared_features: int  # number of compared features of the fitted runs, over which every chi2 is a sum
     elapsed_s: float
 
 
 def _name(run: str) -> str:
-    """A run's file, with its folder inside the evidence, without its suffix."""
+    """The file of a run, relative to the evidence folder, without its suffix."""
     return str(PurePath(run).with_suffix(""))
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The JSON object of the contract, with `summary`, `rig` and `findings` besides; without the pictures.
+    """The JSON object of the contract `diagnosis/1`; the pictures are left out.
 
-    A run goes by its file's name without the suffix, as in the contract.
+    A run goes by the name of its file without the suffix.
     """
     return {
         "format": FORMAT,

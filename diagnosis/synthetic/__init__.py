@@ -1,6 +1,6 @@
-"""Evidence made from the plant: a described rig, and a drawn one that is measured.
+"""Synthetic evidence, made from the plant: a rig is described, and another rig, drawn within the tolerances, is measured.
 
-folder          the folder, for a case
-runs, sensors   one run of it; what its measuring chain adds
-protocols       which runs are measured, by name
+folder          the evidence folder of a case
+runs, sensors   one run of the drawn rig; noise and errors of its measuring chain
+protocols       the runs of an evidence folder, by name
 """

@@ -1,7 +1,7 @@
-"""Evidence folders made from the plant: a rig as its owner describes it, and what was measured on the one that is there.
+"""Evidence folders made from the plant: a rig as its owner describes it, and measurements of the drawn rig.
 
-The two differ by what any rig differs: parameters within their tolerances, a rough surface, a measuring chain, where and
-how a run starts; and by the effects of the case. The folder tells the first and the measurements, never the rest.
+The two rigs differ as any rig differs from its description: rig numbers within their tolerances, a rough surface, a measuring
+chain, the start of a run; and by the effects of the case. The folder holds the description and the measurements, nothing else.
 """
 
 import math
@@ -31,15 +31,16 @@ TOLERANCES: Mapping[str, float] = {  # relative, one standard deviation; a dampi
     "static_force_N": 0.03,
     "stribeck_velocity_mps": 0.10,
 }
-_MOST_DEVIATION = 3.0  # tolerances: what goes further is a gap
-_LEAST_STATIC = 1.02  # times the Coulomb force: below, nothing sticks
-_PAPER_STATIC_N = 17.38
-_FASTEST_BLOCK_HZ = 4000.0  # below, a block of 1 ms holds too few samples: faster ones are averaged
-_OVERSAMPLED_HZ = 20_000.0
+_MOST_DEVIATION = 3.0  # tolerances that a rig number is drawn away at most; a larger deviation is a gap
+_LEAST_STATIC = 1.02  # least static friction, in Coulomb forces; below, the slide does not stick
+_PAPER_STATIC_N = 17.38  # static friction of the paper's first pair, to which the noise of the force belongs
+# A slower record would give the plant too few samples in a block of 1 ms: the plant then runs faster and is averaged.
+_FASTEST_BLOCK_HZ = 4000.0
+_OVERSAMPLED_HZ = 20_000.0  # rate of the plant in that case
 
 
 class Case(NamedTuple):
-    """What to make."""
+    """A synthetic evidence to make."""
 
     protocol: str = "ladder"
     effects: Mapping[str, Numbers] = {}  # as `[effects]` of a rig file
@@ -48,8 +49,8 @@ class Case(NamedTuple):
     leave_out: tuple[str, ...] = ()  # columns
     rate_Hz: float = 20_000.0  # a force-driven axis is sampled with its control, at 1 kHz
     drawn: bool = True  # False: the true parameters are the described ones
-    spread: float = 1.0  # times the tolerances; no parameter is drawn beyond three of them
-    rough: bool = True  # False: the same friction everywhere on the track
+    spread: float = 1.0  # standard deviation of the drawn rig numbers, in tolerances; none is drawn beyond three
+    rough: bool = True  # False: the friction is the same everywhere on the track
 
 
 def paper_rig() -> RigConfig:
@@ -58,10 +59,10 @@ def paper_rig() -> RigConfig:
 
 
 def axis_rig() -> RigConfig:
-    """A linear axis that a motor force moves."""
+    """A linear axis that is moved by a motor force."""
     contact = {
         "stiffness_N_per_m": 2e6,
-        "damping_Ns_per_m": 2.0 * math.sqrt(2e6 * 95.0),  # the bristle critically damped, as in the paper
+        "damping_Ns_per_m": 2.0 * math.sqrt(2e6 * 95.0),  # critical damping of the presliding motion, as in the paper
         "viscous_damping_Ns_per_m": 200.0,
         "coulomb_force_N": 20.0,
         "static_force_N": 22.0,
@@ -79,7 +80,10 @@ def axis_rig() -> RigConfig:
 
 
 def make_evidence(folder: Path, case: Case, seed: int) -> None:
-    """Make a folder; the same case and seed give the same bytes. Raises ValueError when the case cannot be."""
+    """Make an evidence folder; the same case and seed give the same bytes.
+
+    Raises ValueError when the protocol is unknown or the rate does not fit, and Fault CONFIG when the rig cannot be.
+    """
     if case.protocol not in {*PROTOCOLS, FORCE_PROTOCOL}:
         known = ", ".join((*PROTOCOLS, FORCE_PROTOCOL))
         raise ValueError(f"protocol = {case.protocol!r}: unknown; known: {known}")
@@ -112,7 +116,7 @@ def make_evidence(folder: Path, case: Case, seed: int) -> None:
 
 
 def _later(rig: MadeRig, before_s: float) -> MadeRig:
-    """The rig after so long a time in earlier runs."""
+    """The rig after `before_s` seconds of earlier runs."""
     effects = rig.config.effects
     if "before_s" not in effects.get("friction-drift", {}):
         return rig
@@ -144,7 +148,7 @@ def _draw_rig(random: np.random.Generator, described: RigConfig, table: RigTable
     average = round(rate_Hz / case.rate_Hz)
     if abs(average * case.rate_Hz - rate_Hz) > 1e-6 or abs(rate_Hz / 1000.0 % 1.0) > 1e-9:
         raise ValueError(f"rate_Hz = {case.rate_Hz:g}: must be whole kHz, or divide {_OVERSAMPLED_HZ:g} Hz")
-    # drawn by name whether they are used or not: the rest of the rig stays the same with other tolerances
+    # drawn for every name, used or not, so that other tolerances do not change the rest of the rig
     drawn = {name: random.standard_normal() for name in TOLERANCES}
     true = dict(table.values())
     for name, share in table.tolerance.items():

@@ -1,17 +1,17 @@
-"""What is measured: the runs of an evidence folder that is made from the plant, by name of the protocol.
+"""Protocols: the runs of a synthetic evidence folder, by name.
 
-Two lengths rule a stick-slip run with the paper's pair: turning the spring from +17 N to -17 N takes 2.9 mm of drive
-travel, and one period takes about 0.5 mm. So a dwell lasts 0.25 s at 2 mm/s, 1 s at 0.5 mm/s and 5 s at 0.1 mm/s.
+Two lengths of drive travel decide a stick-slip run with the paper's pair: the spring turns from +17 N to -17 N over 2.9 mm, and
+one period takes about 0.5 mm. So a dwell lasts 0.25 s at 2 mm/s, 1 s at 0.5 mm/s and 5 s at 0.1 mm/s.
 """
 
 from typing import Final, NamedTuple
 
-_RAMP_S = 0.05  # a drive that is told another velocity
-_AMPLITUDE_M = 2e-8  # the paper's
+_RAMP_S = 0.05  # duration of a change of velocity
+_AMPLITUDE_M = 2e-8  # of the vibration, as in the paper
 
 
 class Vibration(NamedTuple):
-    """What the piezo is told from a time on; an amplitude of 0 is off."""
+    """Command to the piezo from a time on; an amplitude of 0 is off."""
 
     from_s: float
     frequency_Hz: float
@@ -19,9 +19,9 @@ class Vibration(NamedTuple):
 
 
 class RunPlan(NamedTuple):
-    """One run."""
+    """One run with a spring drive."""
 
-    velocity: tuple[tuple[float, float], ...]  # [s, m/s], linear in between; one point: constant
+    velocity: tuple[tuple[float, float], ...]  # points [s, m/s], linear in between; one point: constant
     vibration: tuple[Vibration, ...] = ()
     duration_s: float = 10.0
     holdout: bool = False
@@ -29,7 +29,7 @@ class RunPlan(NamedTuple):
 
 
 class AxisPlan(NamedTuple):
-    """One run of a force-driven axis: a sum of sines to follow, [amplitude m, frequency Hz]."""
+    """One run of a force-driven axis: the position follows a sum of sines, [amplitude m, frequency Hz] each."""
 
     sines: tuple[tuple[float, float], ...]
     duration_s: float = 12.0
@@ -37,7 +37,7 @@ class AxisPlan(NamedTuple):
 
 
 def _steps(*steps: tuple[float, float]) -> tuple[tuple[float, float], ...]:
-    """A profile that goes to each velocity at its time, over a short ramp."""
+    """A velocity profile that changes to each velocity at its time, over a short ramp."""
     points = [steps[0]]
     for time_s, velocity_mps in steps[1:]:
         points += [(time_s, points[-1][1]), (time_s + _RAMP_S, velocity_mps)]
@@ -49,17 +49,17 @@ def _constant(velocity_mps: float) -> tuple[tuple[float, float], ...]:
 
 
 def _vibration(*steps: tuple[float, float]) -> tuple[Vibration, ...]:
-    """The paper's amplitude at these frequencies from these times on; a frequency of 0 is off."""
+    """Vibration with the paper's amplitude: [s, Hz] each, from this time on; a frequency of 0 is off."""
     return tuple(Vibration(time_s, f_Hz, _AMPLITUDE_M if f_Hz > 0.0 else 0.0) for time_s, f_Hz in steps)
 
 
 PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
-    # the least that lets ageing, direction, position, piezo and drive be told apart
+    # the shortest protocol that tells ageing, direction, position, piezo and drive apart
     "ladder": (
         RunPlan(_constant(0.0005), track=0),
-        # 3 mm forward, 5 mm back of which 2.1 mm slide, and 0.9 mm of slow drag with dwells of 3 s
+        # 3 mm forward; 5 mm back, of which 2.1 mm slide; 0.9 mm of slow drag with dwells of 3 s
         RunPlan(_steps((0.0, 0.002), (1.5, -0.002), (4.0, -0.00015)), track=1),
-        # frequencies in no order: rising with time, a roll-off would look like an exciter that warms up
+        # frequencies in no order: if they rose with time, a roll-off would look like an exciter that warms up
         RunPlan(_constant(0.0005), _vibration((2.0, 3000.0), (4.0, 1000.0), (6.0, 4500.0), (8.0, 2000.0)), track=2),
         RunPlan(
             _steps((0.0, 0.0007), (5.0, -0.002), (7.2, -0.0002)),
@@ -68,7 +68,7 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
             track=3,
         ),
     ),
-    # the same in a third of the time: dwells of 0.25 to 0.8 s only
+    # "ladder" in a third of the time, with dwells of 0.25 to 0.8 s only
     "short": (
         RunPlan(_steps((0.0, 0.002), (2.5, -0.002)), duration_s=5.0, track=0),
         RunPlan(_constant(0.0006), _vibration((1.5, 3000.0), (2.7, 1200.0), (3.9, 4500.0)), duration_s=5.0, track=1),
@@ -80,7 +80,7 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
         RunPlan(_constant(0.0005), _vibration((2.0, 3000.0)), track=2),
         RunPlan(_constant(0.001), _vibration((2.0, 2000.0)), holdout=True, track=3),
     ),
-    # on the paper's stand the slide goes back to where it started
+    # as on the paper's stand: the slide goes back to the same place before each run
     "paper": (
         RunPlan(_constant(0.0005)),
         RunPlan(_constant(0.0005), _vibration((4.0, 2000.0))),
@@ -96,7 +96,7 @@ PROTOCOLS: Final[dict[str, tuple[RunPlan, ...]]] = {
 }
 
 FORCE_PROTOCOL: Final = "force"
-# fast and long, fast and short, slow with stops of the contact, and a mixture to judge by; peaks of 0.04 to 0.16 m/s
+# fast and long; fast and short; slow, with the contact sticking at the turns; and a mixture, held out. Peaks of 0.04 to 0.16 m/s.
 AXIS_PLANS: Final[tuple[AxisPlan, ...]] = (
     AxisPlan(((0.1, 0.25),)),
     AxisPlan(((0.02, 1.0),)),

@@ -1,4 +1,4 @@
-"""One run of a made-up rig: from a random start, through its plan, to the columns of its file."""
+"""One run of a synthetic rig: from a random start, through its plan, to the columns of its file."""
 
 import math
 from typing import Any, NamedTuple
@@ -19,21 +19,21 @@ from plant.simulate import run_blocks
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, npt.NDArray[Any]]
 
-_SAME_PLACE_M = 2e-5  # how well a slide goes back to where it started
-_PRIMER_M = 1e-15  # an amplitude that nothing notices
+_SAME_PLACE_M = 2e-5  # standard deviation of the place at which a run starts
+_PRIMER_M = 1e-15  # amplitude that turns the exciter's phase without moving the rig
 
 
 class MadeRig(NamedTuple):
-    """The rig that is there."""
+    """The drawn rig, which is measured."""
 
     config: RigConfig
     chain: MadeChain
     rate_Hz: float  # of the simulation
-    average: int  # samples of it that make one of the record
+    average: int  # samples of the simulation that make one sample of the record
 
 
 def spring_run(random: np.random.Generator, rig: MadeRig, plan: RunPlan, start_m: float) -> Columns:
-    """Drag the slide through a spring, from about `start_m` on."""
+    """Drag the slide through a spring, from about `start_m` on; the columns of the run, [samples] each, SI units."""
     params, state = build(rig.config)
     blocks = round(plan.duration_s / BLOCK_S)
     force_N = random.uniform(0.3, 0.95) * float(params[0].F_c)
@@ -59,9 +59,9 @@ def spring_run(random: np.random.Generator, rig: MadeRig, plan: RunPlan, start_m
 
 
 def axis_run(random: np.random.Generator, rig: MadeRig, plan: AxisPlan) -> Columns:
-    """Let a motor with a PD controller move the mass to and fro; every row is a sample of its controller.
+    """Let a motor with a PD controller move the mass to and fro; the columns of the run, [samples of the controller] each.
 
-    The force of a row acts from its time to that of the next one.
+    The force of a sample acts from the time of that sample to the next.
     """
     params, state = build(rig.config)
     p: Any = params[0]
@@ -73,7 +73,7 @@ def axis_run(random: np.random.Generator, rig: MadeRig, plan: AxisPlan) -> Colum
     swing_m = np.zeros(blocks)
     for size_m, frequency_Hz in plan.sines:
         swing_m += size_m * np.sin(2.0 * math.pi * frequency_Hz * t_s + random.uniform(0.0, 2.0 * math.pi))
-    # out of rest without a jerk
+    # the motion starts from rest without a jerk
     wanted_m = middle_m + swing_m * np.square(np.sin(0.5 * math.pi * np.minimum(t_s / 1.5, 1.0)))
     omega = 2.0 * math.pi * 3.0  # of the closed loop, well damped
     stiffness_N_per_m, damping_Ns_per_m = float(p.m * omega * omega), float(1.4 * p.m * omega)
@@ -95,7 +95,7 @@ def axis_run(random: np.random.Generator, rig: MadeRig, plan: AxisPlan) -> Colum
 
 
 def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: float, position_m: float) -> None:
-    """A slide that rests under a spring force, with every memory of the rig where it would then be."""
+    """Set the state to a slide at rest under a spring force, with all other states (springs, sensors, delays) to match."""
     p, s = params[0], state[0]
     s.x, s.z = position_m, force_N / p.k_t
     s.age_s = random.uniform(1.0, 30.0)
@@ -109,7 +109,7 @@ def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: floa
 
 
 def _primed(random: np.random.Generator, frequency_Hz: Floats, amplitude_m: Floats) -> tuple[Floats, Floats]:
-    """What the piezo is told, with one block of next to nothing before each start that turns its phase at random."""
+    """The commands to the piezo, with a block of `_PRIMER_M` before each start, which turns the phase by a random angle."""
     told_Hz, told_m = frequency_Hz.copy(), amplitude_m.copy()
     for start in np.flatnonzero((amplitude_m[1:] > 0.0) & (amplitude_m[:-1] == 0.0)):
         told_Hz[start] = random.uniform(0.5, 1.5) / BLOCK_S

@@ -1,6 +1,6 @@
-"""What the measuring chain of a made-up rig adds besides any effect: noise, hum, a slow drift, range and resolution.
+"""The measuring chain of a synthetic rig: noise, hum, a slow drift, range and resolution, besides any effect.
 
-Drawn at random for every rig, so that a diagnosis that learns the habits of one measuring chain fails on the next one.
+The chain is drawn for every rig, so a diagnosis that is tuned to one measuring chain fails on the next rig.
 """
 
 import math
@@ -21,23 +21,23 @@ class MadeChain(NamedTuple):
 
     sensors: SensorsConfig  # bandwidths, range and resolution
     noise: Floats  # rms [unit of the channel]
-    pink_share: float  # of the noise power, the rest is white
+    pink_share: float  # share of the noise power that is pink (1/f); the rest is white
     hum: Floats  # amplitude [unit of the channel]
     hum_Hz: float
-    drift_N: float  # of the force over a run
+    drift_N: float  # drift of the force over a run
 
 
 def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale: float) -> MadeChain:
-    """Draw a chain; `force_scale` is the friction over that of the paper's pair, to which the force noise belongs."""
+    """Draw a chain; `force_scale` is the static friction over that of the paper's pair, and scales the errors of the force."""
     force_N = force_scale * _log_uniform(random, 0.005, 0.040)
     accel_mps2 = _log_uniform(random, 0.0015, 0.05)
     position_m = _log_uniform(random, 5e-8, 1e-6)
     noise = np.array([force_N, accel_mps2, accel_mps2, position_m, position_m])
-    # on force 0 to 20 mN whatever its noise; elsewhere as much against the noise as there, or less
+    # hum of 0 to 20 mN on the force, for any noise; on the other channels the same ratio to the noise, or less
     hum_share = force_scale * random.uniform(0.0, 0.020) / force_N
     hum = hum_share * noise * np.concatenate([[1.0], random.uniform(0.0, 1.0, 4)])
     wide_open = random.random(3) < 0.5
-    # above the highest sampling rate of 100 kHz a filter of first order no longer shows
+    # a first-order filter far above the highest sampling rate, 100 kHz, has no effect
     open_to = {"force_bandwidth_Hz": 1e6, "accel_bandwidth_Hz": 1e6, "position_bandwidth_Hz": 1e6}
     changed: dict[str, float] = {
         name: f_Hz for (name, f_Hz), is_open in zip(open_to.items(), wide_open, strict=True) if is_open
@@ -54,7 +54,7 @@ def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale:
 
 
 def measured(random: np.random.Generator, chain: MadeChain, analogue: Floats, rate_Hz: float) -> Floats:
-    """Turn analogue signals, [5, samples], into what the chain reports."""
+    """The signals [5, samples] that the chain reports for the analogue signals [5, samples], in the order of `CHANNELS`."""
     samples = analogue.shape[1]
     t_s = np.arange(samples) / rate_Hz
     phase_rad = random.uniform(0.0, 2.0 * math.pi)
@@ -65,7 +65,7 @@ def measured(random: np.random.Generator, chain: MadeChain, analogue: Floats, ra
     share = t_s / t_s[-1]
     slow = random.normal(0.0, 0.5) * share + 0.5 * np.sin(math.pi * share + random.uniform(0.0, 2.0 * math.pi))
     result[0] += chain.drift_N * slow
-    # white noise has a density, not a level: a faster record shows more of it
+    # white noise has a density, not a level: its rms grows with the root of the sampling rate
     level = math.sqrt(rate_Hz / _REFERENCE_HZ)
     for row in range(len(result)):
         result[row] += chain.noise[row] * level * _noise(random, samples, chain.pink_share)
@@ -81,11 +81,11 @@ def measured(random: np.random.Generator, chain: MadeChain, analogue: Floats, ra
 
 
 def _noise(random: np.random.Generator, samples: int, pink_share: float) -> Floats:
-    """Noise of unit rms, white but for a share of the power that falls with 1/f."""
+    """Noise of unit rms, [samples]: white, with a share of the power that falls with 1/f."""
     white = random.standard_normal(samples)
     spectrum: Any = np.fft.rfft(random.standard_normal(samples))
     at = np.arange(len(spectrum), dtype=np.float64)
-    at[0] = np.inf  # no constant: an offset is an effect of its own
+    at[0] = np.inf  # no constant part: an offset is an effect of its own
     pink = np.fft.irfft(spectrum / np.sqrt(at), samples)
     return math.sqrt(1.0 - pink_share) * white + math.sqrt(pink_share) * pink / pink.std()
 
