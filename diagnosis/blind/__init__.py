@@ -1,16 +1,17 @@
 """How good the diagnosis is, measured so that it cannot cheat: sealed answers, one run, one score.
 
-sealing         a set of cases, the hashes of its answers, the key apart, and whether the set was opened
-version         the version that a result belongs to: a hash over what makes a diagnosis
+sealing         a set of cases, the hashes of its answers, the key in another place, and whether the set was opened
+version         the version that a result belongs to: a hash over the definitions that make a diagnosis
 running         every case diagnosed, without the key
 opening         hashes checked, answers opened, all methods scored
-outcomes        one case opened: its answer beside what the tool said
-intervals       rates with Wilson's interval, means and ratios with the bootstrap's
+outcomes        one opened case: its answer beside the result of the diagnosis
+intervals       rates with Wilson's interval, means and ratios with the interval of the bootstrap
 calibration     whether 80 % means 80 %
-locating        whether the gap was found where the effect is
+locating        whether the diagnosis finds the gap where the effect is
 scoring         all scores of one method over one set
-baselines       simpler methods that answer from what the diagnosis computed anyway
-oracle          what the true effect closes, when somebody tells its name
-trees           a tree ensemble on the same features, trained on the twin
+baselines       simpler methods for comparison, which answer from numbers that the diagnosis computes anyway
+oracle          how far the true effects close the gap when their names are known
+trees           a tree ensemble on the same features, trained on simulated rigs
+pooling         kept scores of several sets read and scored together
 table, report   the scores as text; as one HTML file with pictures (template: report.html.j2)
 """

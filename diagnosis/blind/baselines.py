@@ -1,4 +1,4 @@
-"""Simpler methods, answering from what the diagnosis has computed: each turns a result into what it would have said itself."""
+"""Simpler methods for comparison: each turns a result of the diagnosis into the answer that the method would have given."""
 
 import math
 from typing import Any
@@ -6,24 +6,26 @@ from typing import Any
 from diagnosis.blind.outcomes import Opened
 
 Said = dict[str, Any]
-_NO_GAP = 1.25  # of the gap: rigs without one are left with 0.9 to 1.2 on the held-out run
+# Gap that the baseline leaves on held-out runs, in noise floors, from which these methods say that there is a gap.
+# Too small: rigs without a gap get one. Too large: small effects are missed. Counted: docs/method/blind.md.
+_NO_GAP = 1.25
 PARAMETERS, FLEXIBLE = "parameters alone", "flexible residual"
 
 
 def parameters_only(case: Opened) -> Opened:
-    """Tuning, as most do it: what is left of the gap is there, and nobody says what it is."""
+    """Refitting the rig's numbers alone: says whether a gap remains, and names nothing."""
     return _gap_or_none(case, PARAMETERS)
 
 
 def flexible_residual(case: Opened) -> Opened:
-    """A blend of everything, which closes what it can and names nothing."""
+    """A blend of all effects: closes the gap as far as it can, and names nothing."""
     return _gap_or_none(case, FLEXIBLE)
 
 
 def lowest_bic(case: Opened) -> Opened:
     """The single effect, or none, with the lowest Bayesian information criterion: chi2 + parameters x ln(features).
 
-    It knows no `unexplained`. A candidate that was not refitted is out.
+    It never says `unexplained`. A candidate that was not refitted does not take part.
     """
     features = case.said.get("compared_features") or 0
     values = {
@@ -41,7 +43,7 @@ def lowest_bic(case: Opened) -> Opened:
 
 
 def told(case: Opened, shrinkage: float | None) -> Opened:
-    """Somebody who knows the answer: what names and probabilities are worth at most."""
+    """The true answer as a result, with the shrinkage of the true effects: the best score that a method can reach."""
     said = {
         "verdict": case.answer["verdict"],
         "effects": sorted(case.truth) if case.answer["verdict"] == "effect" else [],
@@ -57,7 +59,7 @@ def told(case: Opened, shrinkage: float | None) -> Opened:
 
 
 def from_probabilities(case: Opened, probabilities: dict[str, float]) -> Opened:
-    """Any classifier: the most probable is what it says."""
+    """The result of a classifier: its answer is the candidate with the largest probability."""
     return _saying(case, probabilities, None)
 
 

@@ -1,4 +1,4 @@
-"""Whether the probabilities mean what they say."""
+"""Whether the probabilities are right: of the answers at 80 %, 80 % should be right."""
 
 import math
 from collections.abc import Sequence
@@ -9,17 +9,18 @@ import numpy as np
 from diagnosis.blind.intervals import Score, bootstrapped, mean, rate
 from diagnosis.blind.outcomes import Opened
 
-_BINS = 10
-_FEWEST_IN_BIN = 10
+_BINS = 10  # at most
+_FEWEST_IN_BIN = 10  # cases; fewer: chance alone makes the rate of a bin
 _DRAWS = 1000
-_LEAST_PROBABILITY = 1e-6  # a single certain mistake must not be the whole log score
+# Lowest probability in the log score. Smaller: a single certain mistake is the whole score. Larger: such mistakes cost little.
+_LEAST_PROBABILITY = 1e-6
 
 
 class Bin(NamedTuple):
-    """Cases whose leading candidate was about as probable."""
+    """Cases whose leading candidates have about the same probability."""
 
-    probability: float  # mean
-    right: Score
+    probability: float  # mean over the cases
+    right: Score  # share of the cases whose leading candidate is right
 
 
 def judged(cases: Sequence[Opened]) -> list[tuple[float, bool]]:
@@ -43,17 +44,17 @@ def reliability(pairs: Sequence[tuple[float, bool]]) -> list[Bin]:
 
 
 def calibration_error(pairs: Sequence[tuple[float, bool]]) -> Score | None:
-    """Mean over the cases of how far the rate of right ones in their bin is from the mean probability in it."""
+    """Mean over the cases of the distance, in their bin, from the mean probability to the rate of right answers."""
     found = bootstrapped(pairs, _error)
     if found is None:
         return None
-    # drawn anew the same cases are off by chance once more, so the bootstrap's quantiles are mirrored at the value
+    # Resampled cases are off by chance a second time, so the bootstrap's quantiles are mirrored at the value.
     low, high = 2.0 * found.value - found.high, 2.0 * found.value - found.low
     return found._replace(low=max(low, 0.0), high=max(high, found.value))
 
 
 def error_of_perfect(pairs: Sequence[tuple[float, bool]]) -> Score | None:
-    """The calibration error that as many cases would show if these probabilities were the true ones: mean, and 95 % of draws."""
+    """The calibration error that chance alone gives so many cases if every probability is right: mean, and 95 % of draws."""
     if not pairs:
         return None
     random = np.random.default_rng(1)
@@ -81,7 +82,7 @@ def _error(pairs: Sequence[tuple[float, bool]]) -> float:
 
 
 def _split(pairs: Sequence[tuple[float, bool]]) -> list[list[tuple[float, bool]]]:
-    # by nothing else: right ones sorted behind wrong ones of the same probability made bins of each
+    # by the probability alone: sorting by the answer as well would make bins of right cases and bins of wrong cases
     ordered = sorted(pairs, key=lambda pair: pair[0])
     count = max(1, min(_BINS, len(ordered) // _FEWEST_IN_BIN))
     return [[ordered[i] for i in rows] for rows in np.array_split(np.arange(len(ordered)), count) if len(rows)]

@@ -1,4 +1,4 @@
-"""Numbers with the interval that holds the true one with 95 % probability."""
+"""Scores with the interval that holds the true value with 95 % probability."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,7 +24,7 @@ class Score(NamedTuple):
 
 
 def rate(hits: Sequence[bool]) -> Score | None:
-    """How often, with Wilson's interval; None of none."""
+    """The share of hits, with Wilson's interval; None without cases."""
     n = len(hits)
     if n == 0:
         return None
@@ -36,7 +36,7 @@ def rate(hits: Sequence[bool]) -> Score | None:
 
 
 def bootstrapped(cases: Sequence[T], statistic: Callable[[Sequence[T]], float]) -> Score | None:
-    """Any number of the cases, with the interval of its bootstrap; None of none."""
+    """A statistic of the cases, with the interval of its bootstrap; None without cases."""
     n = len(cases)
     if n == 0:
         return None
@@ -47,12 +47,12 @@ def bootstrapped(cases: Sequence[T], statistic: Callable[[Sequence[T]], float]) 
 
 
 def mean(values: Sequence[float]) -> Score | None:
-    """Mean with the interval of its bootstrap; None of none."""
+    """The mean, with the interval of its bootstrap; None without values."""
     return bootstrapped(values, lambda some: sum(some) / len(some))
 
 
 def ratio(pairs: Sequence[tuple[float, float]]) -> Score | None:
-    """Sum of the first over the sum of the second; NaN where that is 0."""
+    """The sum of the first numbers over the sum of the second; NaN where the second sum is 0, None without pairs."""
 
     def of(some: Sequence[tuple[float, float]]) -> float:
         below = sum(second for _, second in some)

@@ -1,4 +1,4 @@
-"""From a set, its key and its results to the scores of the diagnosis and of the methods it is compared with."""
+"""From a set, its key and its results to the scores of the diagnosis and of the methods for comparison."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,19 +18,19 @@ Progress = Callable[[str, float], None]
 
 
 class OpenedSet(NamedTuple):
-    """What scores are made of."""
+    """The opened cases of a set, and all else that its scores need."""
 
     cases: list[Opened]
-    sealed: bool  # nobody could know an answer when the results were made
-    tool: str  # version that made them
-    oracle: Oracle | None = None  # None: not asked
-    trees: dict[str, dict[str, float]] | None = None  # probabilities of the candidates, by case; None: not asked
+    sealed: bool  # whether nobody could know an answer when the results were made
+    tool: str  # version that made the results
+    oracle: Oracle | None = None  # None: not computed
+    trees: dict[str, dict[str, float]] | None = None  # probabilities of the candidates, by case; None: not computed
 
 
 def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:
     """Check every hash, open the answers and mark the set.
 
-    Raises Fault SEAL_BROKEN, and BAD_SET for missing results unless `partial`; then nothing was opened.
+    Raises Fault SEAL_BROKEN for a wrong hash, and BAD_SET for missing results unless `partial`; a set that raises stays unopened.
     """
     answers = opened_answers(folder, key)
     left = missing(folder)
@@ -47,7 +47,7 @@ def open_set(folder: Path, key: Path, partial: bool) -> OpenedSet:
 
 
 def with_baselines(found: OpenedSet, folder: Path, jobs: int, progress: Progress) -> OpenedSet:
-    """The set with what the two methods say that have to compute it."""
+    """The set with the answers of the two methods that need their own computation: oracle and trees."""
     best = oracle(folder, found.cases, jobs, progress)
     readable = [case.name for case in found.cases if case.verdict != "fault"]
     return found._replace(oracle=best, trees=tree_probabilities(folder, readable, jobs, progress))

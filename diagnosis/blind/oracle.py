@@ -1,7 +1,7 @@
-"""The oracle: told which effects are there, how much of the held-out gap does the library close with them?
+"""The oracle: how much of the held-out gap the library closes when the names of the true effects are known.
 
-Its formulas are the library's, not those of the case, so it closes less than everything. What was computed is kept beside the
-set, since it takes half a minute a case, and computed anew by another version.
+The oracle has the formulas of the library and not those of the case, so it does not close the whole gap. A case takes half a
+minute, so its shrinkage is kept beside the set; another version of the tool computes it again.
 """
 
 import json
@@ -35,12 +35,12 @@ _SCORED = ("one-effect", "two-effects")
 
 
 def oracle(folder: Path, cases: list[Opened], jobs: int, progress: Progress) -> Oracle:
-    """Shrinkage of the true effects of every case that is scored by it, by case. Raises OSError."""
+    """Shrinkage of the true effects, by case, for cases with one or two effects of the library. Raises OSError."""
     found: Oracle = {}
     tool = tool_version()
     todo: list[Opened] = []
     for case in cases:
-        # what ended in a fault would end in it here too
+        # a case whose diagnosis ended in a fault would end in the same fault here
         if case.stratum not in _SCORED or case.verdict == "fault":
             continue
         path = folder / KEPT / f"{case.name}.json"
@@ -64,14 +64,17 @@ def _one(folder: Path, name: str, effects: list[str]) -> tuple[str, float | None
 
 
 def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
-    """How much of the held-out gap an evidence's named effects close; None where there is no gap, or no way to try them."""
+    """The share of the held-out gap that these effects close; None where there is no gap, or no trial of an effect.
+
+    Raises Fault where the evidence cannot be read.
+    """
     evidence = load_evidence(folder)
     runs = prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
     fitter, retuned, roughness, _ = retuned_rig(evidence, problem, _untold)
     tried = trials(problem)
     best: Fit = retuned
-    for effect in effects:  # one after the other, each on top of those before it
+    for effect in effects:  # each effect is added to the fit with the effects before it
         own = [trial for trial in tried if trial.hypothesis.effects == (effect,)]
         origins = [Origin(best, KNEE)]
         if best is retuned:
@@ -85,4 +88,4 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
 
 
 def _untold(_said: str, _share: float) -> None:
-    """Cases are counted, not their steps."""
+    """Progress is told per case, so the steps within a case are not."""

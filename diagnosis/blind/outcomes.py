@@ -1,9 +1,9 @@
-"""One case opened: what is true of it, and what a method said."""
+"""One opened case: the true answer, and the result of a method."""
 
 from typing import Any, NamedTuple
 
 OTHER_NAMES = ("none", "unexplained")
-# what a case that ended in a fault has said: nothing, and nothing is right about it
+# the result of a case that ended in a fault: no answer, so every score counts the case as wrong
 _NOTHING_SAID: dict[str, Any] = {
     "verdict": "fault",
     "effects": [],
@@ -16,7 +16,7 @@ _NOTHING_SAID: dict[str, Any] = {
 
 
 class Opened(NamedTuple):
-    """Answer and result of one case; `said` has the form of `diagnosis/1` or of a part of it."""
+    """Answer and result of one case; `said` has the keys of the format `diagnosis/1`, or some of them."""
 
     name: str
     answer: dict[str, Any]
@@ -24,22 +24,22 @@ class Opened(NamedTuple):
 
     @property
     def stratum(self) -> str:
-        """The kind of case."""
+        """The kind of the case, such as `one-effect`."""
         return self.answer["stratum"]
 
     @property
     def truth(self) -> frozenset[str]:
-        """Names of the effects that are there."""
+        """Names of the effects that the rig of the case has."""
         return frozenset(effect["name"] for effect in self.answer["effects"])
 
     @property
     def detectability(self) -> float:
-        """Of the weakest effect, in detection limits; 0 without effects."""
+        """Size of the weakest effect, in detection limits; 0 without effects."""
         return min((effect["detectability"] or 0.0 for effect in self.answer["effects"]), default=0.0)
 
     @property
     def right_candidate(self) -> str | None:
-        """The one candidate that should have the probability; None where several would be right, or nobody knows."""
+        """The candidate that should have the whole probability; None where several are right, or where nobody knows."""
         if self.stratum in {"indistinguishable", "real-log"}:
             return None
         if self.answer["verdict"] == "effect":
@@ -48,17 +48,17 @@ class Opened(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """What was said: effect, no-gap, unexplained, or fault."""
+        """The verdict of the result: effect, no-gap, unexplained, or fault."""
         return self.said["verdict"]
 
     @property
     def named(self) -> frozenset[str]:
-        """Effects that were named."""
+        """Effects that the result names."""
         return frozenset(self.said["effects"])
 
     @property
     def group(self) -> frozenset[str]:
-        """What was named, with all that was said not to be told apart from it."""
+        """The named effects, and all effects that the result says cannot be told apart from one of them."""
         found = set(self.named)
         for alike in self.said["not_distinguishable"]:
             if self.named & set(alike):
@@ -67,22 +67,22 @@ class Opened(NamedTuple):
 
     @property
     def ranked(self) -> list[tuple[str, float]]:
-        """Candidates and their probabilities, the most probable first."""
+        """Candidates and their probabilities, the largest probability first."""
         found = [(one["effect"], float(one["probability"] or 0.0)) for one in self.said["candidates"]]
         return sorted(found, key=lambda one: -one[1])
 
     def probability(self, name: str) -> float:
-        """Of one candidate; 0 where nothing was said of it."""
+        """Probability of one candidate; 0 where the result does not list it."""
         return dict(self.ranked).get(name, 0.0)
 
     @property
     def set_f1(self) -> float:
-        """Of the named effects against those that are there."""
+        """The F1 score of the named effects against the true effects; 1 where both are empty."""
         together = len(self.named) + len(self.truth)
         return 2.0 * len(self.named & self.truth) / together if together else 1.0
 
     def row(self) -> dict[str, Any]:
-        """What is there and what was said of it, for `--json`."""
+        """The case as a row of `--json`: the true effects, and the result."""
         keys = ("name", "formula", "detectability")
         return {
             "case": self.name,
@@ -99,5 +99,5 @@ class Opened(NamedTuple):
 
 
 def opened(name: str, answer: dict[str, Any], result: dict[str, Any]) -> Opened:
-    """A case with what is in its result file."""
+    """A case from its answer and the content of its result file."""
     return Opened(name, answer, _NOTHING_SAID | result if "fault" not in result else dict(_NOTHING_SAID))

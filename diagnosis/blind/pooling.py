@@ -1,6 +1,6 @@
-"""Scores that are kept: all that they are made of, in one file, so that they can be made again, of several sets together too.
+"""Kept scores: one file with all that the scores of a set are computed from, so that several sets can be scored as one.
 
-A set of hundreds of cases takes hours; two halves, each opened once and diagnosed by the same version, are worth as much.
+A set of hundreds of cases takes hours. Two halves, each opened once and diagnosed by the same version, are worth as much.
 """
 
 import json
@@ -22,20 +22,23 @@ _SCORED_OF_GAP = ("shrinkage", "interval_90", "retuned", "with_effect", "compare
 
 
 def write_scores(path: Path, found: OpenedSet, methods: dict[str, Scores]) -> None:
-    """Write every score, and of every case what is there and what was said. Raises OSError."""
+    """Write every score, and for every case its answer and its result. Raises OSError."""
     about = {"format": FORMAT, "sealed": found.sealed, "tool": found.tool, "methods": as_json(methods)}
     write_json(path, about | {"cases": [_row(found, case) for case in found.cases]})
 
 
 def pooled(paths: Sequence[Path]) -> OpenedSet:
-    """The cases of several files together, as if they were one set. Raises Fault BAD_SET."""
+    """The cases of several files as one set.
+
+    Raises Fault BAD_SET where a file cannot be read, versions differ, or a case is in two files.
+    """
     found = [_read(path) for path in paths]
     tools = {one.tool for one in found}
     if len(tools) > 1:
         files = ", ".join(map(str, paths))
         line = f"{files}: results of the versions {' and '.join(sorted(tools))}: must be of one;"
         raise Fault("BAD_SET", f"{line} score each for itself")
-    seen: dict[int, Path] = {}  # by the seed of a case: made anew it has another name
+    seen: dict[int, Path] = {}  # by the seed of a case, as the same case of another making has another name
     for path, one in zip(paths, found, strict=True):
         for case in one.cases:
             if (other := seen.setdefault(case.answer["counterfactual_seed"], path)) is not path:
@@ -52,7 +55,7 @@ def pooled(paths: Sequence[Path]) -> OpenedSet:
 
 
 def _row(found: OpenedSet, case: Opened) -> dict[str, Any]:
-    """A case for a person, and with it all that scoring asks of it."""
+    """A case as a row for a person, with all that its scores are computed from."""
     row = case.row() | {"answer": case.answer, "said": _scored_of(case.said)}
     if found.oracle is not None:
         row["oracle"] = found.oracle.get(case.name)
@@ -62,7 +65,7 @@ def _row(found: OpenedSet, case: Opened) -> dict[str, Any]:
 
 
 def _scored_of(said: Mapping[str, Any]) -> dict[str, Any]:
-    """Of a result what scores depend on."""
+    """The part of a result that scores depend on."""
     return {key: said[key] for key in _SCORED if key in said} | {
         "candidates": [
             {key: one.get(key) for key in ("effect", "probability", "chi2")}

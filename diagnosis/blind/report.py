@@ -1,4 +1,4 @@
-"""The scores as one HTML file that needs nothing from the network."""
+"""The scores as one HTML file that needs no network."""
 
 import base64
 import io
@@ -77,7 +77,7 @@ def _confusions(scores: Scores) -> "Figure":
         axis.set_yticks(range(len(there)), there, fontsize=7)
         for row, column in np.argwhere(counts > 0):
             count = counts[row, column]
-            color = "white" if count > 0.6 * counts.max() else "black"  # on dark blue black is not seen
+            color = "white" if count > 0.6 * counts.max() else "black"  # black on dark blue cannot be read
             axis.text(column, row, f"{count:.0f}", ha="center", va="center", fontsize=7, color=color)
     axis.set(xlabel="said", ylabel="there")
     return figure

@@ -1,4 +1,4 @@
-"""Every case of a sealed set diagnosed by the product itself, without the key. What has a result is not done again."""
+"""Every case of a sealed set diagnosed by the product itself, without the key. A case with a result is not diagnosed again."""
 
 import json
 from collections.abc import Generator
@@ -23,15 +23,16 @@ def missing(folder: Path) -> list[str]:
 
 
 def result_file(folder: Path, case: str) -> Path:
-    """Where the result of a case is."""
+    """Path of the result of a case."""
     return folder / RESULTS / f"{case}.json"
 
 
 def run(folder: Path, jobs: int) -> Generator[FolderResult]:
-    """Diagnose what has no result yet, one core a case and `jobs` at a time; yield each when its result is written.
+    """Diagnose the cases without a result, one core a case and `jobs` at a time; yield each case when its result is written.
 
-    A case that ends in a fault has that as its result. Closing the generator ends the workers; what is written stays.
-    Raises Fault BAD_SET, also where another version made the results that are there, and OSError where one cannot be written.
+    A case that ends in a fault has this fault as its result. Closing the generator ends the workers; written results stay.
+    Raises Fault BAD_SET where the set cannot be read or another version made some of its results, OSError where a result cannot
+    be written.
     """
     tool = tool_version()
     for name, result in results(folder, list(read_set(folder))).items():
@@ -55,7 +56,7 @@ def _as_json(outcome: FolderResult) -> dict[str, Any]:
 
 
 def results(folder: Path, cases: list[str]) -> dict[str, dict[str, Any]]:
-    """The results that are there, by case. Raises Fault BAD_SET."""
+    """The results of those cases that have one, by case. Raises Fault BAD_SET for a file that is no result."""
     found = {name: result_file(folder, name) for name in cases}
     return {name: _read(path) for name, path in found.items() if path.is_file()}
 

@@ -1,4 +1,4 @@
-"""All scores of one method over one opened set. Rates have Wilson's 95 % interval, everything else the bootstrap's."""
+"""All scores of one method over one opened set. Rates have Wilson's 95 % interval, all other scores that of the bootstrap."""
 
 import math
 from collections import Counter
@@ -12,10 +12,11 @@ from diagnosis.blind.locating import f1
 from diagnosis.blind.outcomes import OTHER_NAMES, Opened
 from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 
-_SURE = 0.8
-_VISIBLE = 2.0  # detection limits
+_SURE = 0.8  # probability beyond which an answer counts as sure
+_VISIBLE = 2.0  # detection limits from which an effect counts as visible
 _DETECTABILITIES = (0.0, 1.0, 2.0, 4.0, math.inf)
-_LEAST_SHRINKAGE = 0.1  # of the oracle: where even the truth closes less there is nothing to compare
+# Shrinkage of the oracle below which a case is not compared with it. Smaller: noise over noise. Larger: fewer cases.
+_LEAST_SHRINKAGE = 0.1
 
 Oracle = dict[str, float | None]  # by case: shrinkage with the true effects
 
@@ -23,24 +24,24 @@ Oracle = dict[str, float | None]  # by case: shrinkage with the true effects
 class Singles(NamedTuple):
     """Scores of cases with one effect of the library."""
 
-    alarm: Score | None
-    top_1: Score | None
-    top_3: Score | None
-    in_group: Score | None
-    group_size: Score | None
-    wrong: Score | None  # something was named, and the truth is not in its group
+    alarm: Score | None  # the verdict is effect or unexplained
+    top_1: Score | None  # the true effect is the first candidate
+    top_3: Score | None  # the true effect is among the first three candidates
+    in_group: Score | None  # the true effect is named, or said to look like a named effect
+    group_size: Score | None  # mean size of the group where an effect is named
+    wrong: Score | None  # an effect is named, and the true effect is not in its group
 
 
 class Unclear(NamedTuple):
     """Scores of cases whose channels cannot tell a group of effects apart."""
 
-    in_group: Score | None  # the true one is named, or said to be not told from what is named
-    group_told: Score | None  # two or more of those that cannot be told apart are given together
-    experiment: Score | None  # and an experiment that would separate the leading explanations
+    in_group: Score | None  # the true effect is named, or said to look like a named effect
+    group_told: Score | None  # the result gives two or more effects of the true group together
+    experiment: Score | None  # the result proposes a run that would separate the leading explanations
 
 
 class Scores(NamedTuple):
-    """What a method amounts to."""
+    """All scores of one method."""
 
     cases: int
     faults: int
@@ -50,27 +51,27 @@ class Scores(NamedTuple):
     by_effect: dict[str, Singles]
     by_backbone: dict[str, Singles]
     false_alarms: Score | None
-    false_alarms_wide: Score | None  # of rigs whose numbers were drawn further off than usual
-    outside_caught: Score | None  # unexplained
+    false_alarms_wide: Score | None  # of rigs whose numbers were drawn from wider tolerances than usual
+    outside_caught: Score | None  # effects outside the library whose verdict is unexplained
     outside_caught_visible: Score | None  # of 2 detection limits or more
     outside_named: Score | None
     sure_of_wrong_name: (
         Score | None
-    )  # an effect that is not there has more than 0.8; not of real logs, which have more in them
-    sure_of_wrong_answer: Score | None  # anything but the right candidate has, none and unexplained included
+    )  # an effect that the rig lacks has more than 0.8; without real logs, whose own effects nobody knows
+    sure_of_wrong_answer: Score | None  # a wrong answer has more than 0.8, "none" and "unexplained" included
     named_wrong: Score | None
     pair_f1: Score | None
     pair_exact: Score | None
     pair_one_right: Score | None
     unclear: Unclear
-    real_logs: Singles  # sensor faults put into measured logs, whose own gaps nobody knows
+    real_logs: Singles  # sensor faults added to measured logs, whose own gaps nobody knows
     log_score: Score | None
     calibration_error: Score | None
-    calibration_error_of_perfect: Score | None  # what chance alone shows in as many cases
+    calibration_error_of_perfect: Score | None  # what chance alone gives so many cases
     reliability: tuple[Bin, ...]
     sensor_or_physics: Score | None
     locating_f1: Score | None
-    shrinkage: Score | None  # where something is named
+    shrinkage: Score | None  # where an effect is named
     shrinkage_of_oracle: Score | None
     interval_coverage: Score | None
     seconds: Score | None
@@ -78,7 +79,7 @@ class Scores(NamedTuple):
 
 
 def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
-    """Score a method; `oracle` may be empty."""
+    """Score a method; `oracle` gives the shrinkage of the true effects by case, and may be empty."""
     single = [case for case in cases if case.stratum == "one-effect"]
     no_gap = [case for case in cases if case.stratum == "no-gap"]
     outside = [case for case in cases if case.stratum == "outside"]
@@ -140,7 +141,7 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
 
 
 def of_singles(cases: Sequence[Opened]) -> Singles:
-    """The scores of cases with one effect."""
+    """The scores of cases with one effect of the library."""
     return Singles(
         alarm=rate([case.verdict in {"effect", "unexplained"} for case in cases]),
         top_1=rate([frozenset(name for name, _ in case.ranked[:1]) == case.truth for case in cases]),
@@ -173,7 +174,7 @@ def _class(names: frozenset[str]) -> frozenset[bool]:
 
 
 def _of_oracle(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
-    """Of the gap that the true effect closes, the part that was closed; naming nothing closes nothing."""
+    """The shrinkage of the named effects over that of the true effects; a result that names nothing closes nothing."""
     return ratio(
         [
             (case.said["gap"].get("shrinkage") or 0.0, best)
@@ -184,9 +185,9 @@ def _of_oracle(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
 
 
 def _coverage(cases: Sequence[Opened], oracle: Oracle) -> Score | None:
-    """How often the 90 % interval of the shrinkage holds what the true effect closes.
+    """How often the 90 % interval of the shrinkage holds the shrinkage of the true effect.
 
-    Parameters cannot be compared, since the true formula is another one.
+    Parameters cannot be compared, as the true formula differs from the library's.
     """
     held: list[bool] = []
     for case in cases:
@@ -212,7 +213,7 @@ def _confusions(cases: Sequence[Opened]) -> tuple[tuple[str, str, int], ...]:
 
 
 def as_json(value: Any) -> Any:
-    """Scores as JSON: every named tuple an object."""
+    """Scores as JSON: a named tuple becomes an object."""
     if isinstance(value, tuple) and hasattr(value, "_asdict"):
         return {key: as_json(inner) for key, inner in value._asdict().items()}  # pyright: ignore[reportAttributeAccessIssue]
     if isinstance(value, dict):

@@ -1,12 +1,12 @@
-"""A sealed set: evidence folders with names that tell nothing, a hash of every answer, and the answers in a key file apart.
+"""A sealed set: evidence folders with meaningless names, a hash of every answer, and the answers in a key file elsewhere.
 
     SET/set.json        format, and per case SHA-256 of its answer with a nonce, and of its evidence
     SET/<case>/         evidence
-    SET/results/        what the tool said, `<case>.json`
-    SET/opened.json     when the set was scored for the first time, and what the results were then
-    KEY                 per case nonce and answer, which also says whether this set, made anew, was published before
+    SET/results/        the result of every case, `<case>.json`
+    SET/opened.json     when the set was scored for the first time, and the hash of the results at that time
+    KEY                 per case nonce and answer; the answer also says whether the seed of this set was published before
 
-Who has the set cannot know an answer; who has the key cannot change one afterwards.
+A person with the set alone cannot know an answer; a person with the key cannot change an answer afterwards.
 """
 
 import hashlib
@@ -26,27 +26,27 @@ SET, RESULTS, OPENED = "set.json", "results", "opened.json"
 
 
 class Sealed(NamedTuple):
-    """The hashes of one case."""
+    """The hashes of one case, hexadecimal."""
 
     answer_sha256: str
     evidence_sha256: str
 
 
 class Secret(NamedTuple):
-    """What the key holds of one case."""
+    """The part of the key for one case."""
 
     nonce: str  # hexadecimal
     answer: Answer
 
 
 def answer_hash(secret: Secret) -> str:
-    """SHA-256 of the nonce and the answer's canonical JSON: sorted keys, no spaces, ASCII."""
+    """SHA-256 of the nonce and the answer's canonical JSON (sorted keys, no spaces, ASCII). Raises ValueError for NaN."""
     canonical = json.dumps(secret.answer, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(f"{secret.nonce}\n{canonical}".encode("ascii")).hexdigest()
 
 
 def evidence_hash(folder: Path) -> str:
-    """SHA-256 over names and contents of a case's files."""
+    """SHA-256 over names and contents of a case's files. Raises OSError."""
     total = hashlib.sha256()
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         with path.open("rb") as file:
@@ -56,7 +56,7 @@ def evidence_hash(folder: Path) -> str:
 
 
 def refuse_key_inside(out: Path, key: Path) -> None:
-    """Raise Fault CONFIG where the key would lie beside what it opens."""
+    """Raise Fault CONFIG where the key would lie inside the set that it opens."""
     if key.resolve().is_relative_to(out.resolve()):
         raise Fault("CONFIG", f"--key {key}: must be outside {out}, or the answers go wherever the set goes")
 
@@ -79,7 +79,7 @@ def read_set(folder: Path) -> dict[str, Sealed]:
 
 
 def read_key(path: Path) -> dict[str, Secret]:
-    """What a key holds. Raises Fault BAD_SET."""
+    """Nonces and answers of a key, by case. Raises Fault BAD_SET."""
     return {name: Secret(**row) for name, row in _read(path, KEY_FORMAT, Secret._fields).items()}
 
 
@@ -126,9 +126,9 @@ def opened_answers(folder: Path, key: Path) -> dict[str, Answer]:
 
 
 def mark_opened(folder: Path) -> bool:
-    """Note that the answers were seen; whether these results were made before that. Raises OSError or Fault BAD_SET.
+    """Mark a set as opened; return whether its results were made before. Raises OSError or Fault BAD_SET.
 
-    Results that differ from those of the first opening were made by somebody who could have looked.
+    Results that differ from those of the first opening count as made by somebody who could know the answers.
     """
     results = evidence_hash(folder / RESULTS)
     path = folder / OPENED

@@ -1,4 +1,4 @@
-"""The scores as text: the answer first, then every score of every method, then where it goes wrong."""
+"""The scores as text: the answer first, then every score of every method, then the cases that went wrong."""
 
 from typing import NamedTuple
 
@@ -10,15 +10,15 @@ _CONFUSIONS = 30
 
 
 class ScoreRow(NamedTuple):
-    """One score: of what, the bar it should pass, and of each method."""
+    """One score of every method, with its bar."""
 
     name: str
-    bar: str
-    scores: tuple[Score | None, ...]
+    bar: str  # such as ">= 0.85" or "0.85-0.95"; empty for a score without a bar
+    scores: tuple[Score | None, ...]  # one a method
 
     @property
     def missed(self) -> bool:
-        """Whether the first method does not reach the bar, not even if only rounding would."""
+        """Whether the first method misses the bar; the value is compared before rounding."""
         first = self.scores[0]
         if not self.bar or first is None:
             return False
@@ -86,7 +86,7 @@ def rows(methods: dict[str, Scores]) -> list[ScoreRow]:
 
 
 def table(methods: dict[str, Scores], sealed: bool) -> str:
-    """Everything for a person; the first method is the one that is judged, the others are for comparison."""
+    """All scores as a text table; the first method is judged by the bars, the others are for comparison."""
     tool = next(iter(methods.values()))
     lines = [headline(tool, sealed)]
     if tool.faults:
@@ -113,7 +113,7 @@ def table(methods: dict[str, Scores], sealed: bool) -> str:
 
 
 def with_interval(score: Score | None) -> str:
-    """A score for people."""
+    """A score with its interval and its number of cases, as text."""
     return "-" if score is None else f"{score.value:.2f} ({score.low:.2f} to {score.high:.2f}) n {score.n}"
 
 

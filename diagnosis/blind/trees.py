@@ -1,8 +1,8 @@
-"""A tree ensemble on the same features: what a classifier makes of them that never refits anything.
+"""A tree ensemble on the same features, for comparison: a classifier that refits nothing.
 
-It is trained on rough and noisy replicates of the twin with the nuisances and the effects of the library drawn at random, under
-the commands of some evidences of the set. A feature is its distance from the described rig, in floors, compressed; those of
-different evidences are matched by name. It knows `none`, and `unexplained` not.
+The ensemble is trained on simulated rigs with rough surfaces and noise, under the commands of some evidences of the set;
+nuisances and effects of the library are drawn at random. An input is the compressed distance of a feature from the described
+rig, in noise floors. Inputs of different evidences are matched by name. The ensemble can say `none`, and never `unexplained`.
 """
 
 from collections.abc import Callable
@@ -26,20 +26,20 @@ from diagnosis.model.rig import Effects
 Floats = npt.NDArray[np.floating[Any]]
 Progress = Callable[[str, float], None]
 Row = dict[str, float]
-_TEMPLATES = 10  # evidences whose commands are used
-_EACH = 4  # rigs a template of every effect, and as many times four without
+_TEMPLATES = 10  # evidences whose commands are used; more: more varied training, and more time
+_EACH = 4  # rigs per template and effect, and four times as many without an effect
 _NONE = "none"
 _TREES = 500
 
 
 class _Bench(NamedTuple):
-    """One evidence, its floor as described, and what its features are called."""
+    """One evidence as a template: its runs, the noise floor of the described rig, and names of the compared features."""
 
     problem: Problem
     nuisances: Nuisances
     floor: Floor
-    described: Floats  # features
-    names: list[str]
+    described: Floats  # prediction of the described rig [features]
+    names: list[str]  # [compared]
 
     def row(self, features: Floats) -> Row:
         floor = self.floor
@@ -49,7 +49,10 @@ class _Bench(NamedTuple):
 
 
 def tree_probabilities(folder: Path, cases: list[str], jobs: int, progress: Progress) -> dict[str, dict[str, float]]:
-    """Probabilities of the candidates of every case, all of which can be read. Raises Fault CONFIG without scikit-learn."""
+    """Probabilities of the candidates, by case; `cases` must be readable.
+
+    Raises Fault CONFIG where scikit-learn is not installed.
+    """
     try:
         from sklearn.ensemble import ExtraTreesClassifier  # noqa: PLC0415  # pyright: ignore[reportMissingImports]
     except ImportError:
@@ -112,14 +115,14 @@ def _training(folder: Path, number: int) -> tuple[list[Row], list[str]]:
             point = bench.nuisances.point(random.standard_normal(len(bench.nuisances)), effects)
             surface = ROUGHNESS._replace(seed=int(random.integers(1_000_000)))
             (features,) = bench.problem.predicted_many([point], [Draw(random, surface)])
-            if np.isfinite(features).any():  # no rig is like that
+            if np.isfinite(features).any():  # otherwise the draw is a rig that cannot be simulated
                 rows.append(bench.row(features))
                 labels.append(name)
     return rows, labels
 
 
 def _drawn(random: np.random.Generator, trial: Trial) -> Effects:
-    """Sizes around the library's scales; coordinates with a sign get either one."""
+    """Tables of an effect with random coordinates around the trial's start, spread by their priors."""
     axes = trial.hypothesis.coordinates
     w = trial.w + np.array([axis.prior for axis in axes]) * random.standard_normal(len(axes))
     return trial.hypothesis.tables(w)

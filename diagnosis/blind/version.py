@@ -1,8 +1,8 @@
 """The version that a kept result or score belongs to: a hash over the definitions that make a diagnosis.
 
-Scores of different versions are never mixed, and a sealed set costs hours. So the hash covers what an answer hangs on and
-nothing else: it changes with a number, a formula or a rule, and stays as it is when a comment, a docstring or an import
-changes, a definition moves to another file, or the words and pictures of the report are improved.
+Scores of different versions are never mixed, and a sealed set costs hours. So the hash covers the definitions that an answer
+depends on and no others: it changes with a number, a formula or a rule, and stays the same when a comment, a docstring or an
+import changes, a definition moves to another file, or the words and pictures of the report are improved.
 """
 
 import ast
@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-# not bridge: how a file is read is held by tests of its own, and the bits of compiled kernels by the golden logs
+# without bridge: its own tests check how files are read, and the golden logs check the bits of compiled kernels
 JUDGED = ("plant", "diagnosis")
-# the scores, the words and pictures of an answer that is there already, and the plant as a process
+# scoring, the words and pictures of a finished answer, and the plant as a process
 NOT_JUDGED = ("diagnosis/blind", "diagnosis/report", "diagnosis/pictures", "plant/app.py", "plant/node.py")
 
 
 def tool_version(*further: str) -> str:
-    """Version of the package with a hash over what diagnoses, and over `further` folders below the project's root."""
+    """Version of the package with a hash over all that makes a diagnosis, and over `further` folders below the root."""
     try:
         number = version("stickslip")
     except PackageNotFoundError:
@@ -30,7 +30,7 @@ def tool_version(*further: str) -> str:
 def definitions_digest(root: Path, judged: tuple[str, ...], not_judged: tuple[str, ...] = ()) -> str:
     """Hash over the top-level statements of all files below `judged`, in sorted order. Raises OSError and SyntaxError.
 
-    A place is a file or a folder, relative to `root`; one that is not there counts as empty.
+    A place is a file or a folder, relative to `root`; a place that does not exist counts as empty.
     """
     left_out = {root / place for place in not_judged}
     files = [path for place in judged for path in _files(root / place)]
@@ -57,7 +57,7 @@ def _without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
 
 
 def _canonical(node: ast.AST) -> str:
-    """A syntax tree as text; empty fields are left out, as every version of Python adds some."""
+    """A syntax tree as text without empty fields, as every version of Python adds some of these."""
     parts: list[str] = []
     definition = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
     for name, field in ast.iter_fields(node):
