@@ -1,6 +1,6 @@
-"""The rig that is not there: a LuGre contact, a compliant drive, a piezo exciter and a sensor chain.
+"""The plant, a stand-in for a rig: a LuGre contact, a compliant drive, a piezo exciter and a sensor chain.
 
-Symbols that appear here and nowhere else, as in the paper (A. Leus et al., longitudinal tangential vibrations):
+Symbols of this package, as in the paper (A. Leus et al., longitudinal tangential vibrations):
 
     k_t  contact stiffness [N/m]            x    position of the slide [m]
     h_t  contact damping [N s/m]            v    velocity of the slide [m/s]
@@ -11,16 +11,21 @@ Symbols that appear here and nowhere else, as in the paper (A. Leus et al., long
     k_d  drive stiffness [N/m]              phi  phase of the vibration [rad]
     h_d  drive damping [N s/m]              g    steady friction force at a velocity [N]
 
-and, for what a real rig adds to that:
+and, for the effects of a real rig:
 
     e      extension of the drive's spring, s_d - q - x [m]      v_lag  v_r as a lagging Stribeck curve sees it [m/s]
     q      displacement of the frame that holds the drive [m]    age    how long the contact has been at rest [s]
-    s_e    where the drive would be without ripple, `even_m` [m]
+    s_e    position of the drive without ripple, `even_m` [m]
 
-`config` is what a rig file says and `config_limits` what no rig does, `pairs` the friction pairs, `effects` what a real rig does
-and the nominal one does not, `records` the derived numbers and the state. `contact` is one step of friction and slide, `core` one
-block of all that with the piezo and the sensors' filters (`advance`, the nominal rig, and `advance_disturbed`), `four_rigs` the
-same for four rigs at once, `four_rigs_step` one step of them, `sensors` what the channels make of a block, `step` the whole block
-with its messages, `simulate` a run without a bus, `stability` the linearised slider, `node` the rig as a participant of the bus,
-`app` the process.
+config, config_limits   a rig file, checked; rigs that a rig file may describe and no real rig can be
+pairs, effects          the friction pairs; the effects that a real rig has and the nominal rig lacks
+records                 the derived numbers (`PARAMS`) and all memory (`STATE`)
+contact, piezo          one step of friction and slide; the motion of the base
+core                    one block of contact, drive, piezo and analogue filters: `advance`, `advance_disturbed` with effects
+four_rigs, four_rigs_step   the same for four rigs at once, in vector registers; one step of them
+sensors                 the digital half of the channels
+step                    one whole block with its messages
+simulate                a run without bus and sensors
+stability               the slider linearised around steady sliding
+node, app               the rig as a participant of the bus; the process
 """

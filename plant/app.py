@@ -15,10 +15,10 @@ from plant.config import RigConfig
 from plant.node import PlantNode
 
 PEER_TIMEOUT_S = 30.0  # a first start compiles the controller's kernels
-_ANSWER_TIMEOUT_S = 5.0
-_GOODBYE_S = 3.0
-_ROUND_TRIPS_KEPT = 1024
-_LATE_NS = 1_000_000
+_ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
+_GOODBYE_S = 3.0  # longest wait for the other processes to leave the bus
+_ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
+_LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 
 
 def run(
@@ -41,7 +41,7 @@ def run(
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
         process = _Process(node, bus)
-        # before the others know: claimed at the first block, the link lapsed and 6 of 20 runs on busy cores lost 15 to 70 blocks
+        # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
         granted = realtime.claim(0)
         bus.announce()
         wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
@@ -52,7 +52,7 @@ def run(
             process.event("START", granted)
             process.realtime(blocks, stop)
         process.event("END", f"blocks={node.block}")
-        bus.wait_until_alone(_GOODBYE_S)  # the others are relayed by this process: it leaves last
+        bus.wait_until_alone(_GOODBYE_S)  # this process relays the messages of the others, so it leaves last
 
 
 def wait_for_peers(bus: Bus, endpoint: str, roles: list[str], stop: threading.Event) -> None:
@@ -82,14 +82,14 @@ class _Process:
         self._answers.push(received)
 
     def event(self, code: str, text: str) -> None:
-        """Tell the bus."""
+        """Publish an event with a code and a text."""
         t_ns = self._node.block * self._node.block_ns
         event = wire.Event(sequence=self._events, t_ns=t_ns, source="plant", code=code, text=text)
         self._events += 1
         self._send_event(event.SerializeToString())
 
     def realtime(self, blocks: int, stop: threading.Event) -> None:
-        """One block a period, under the newest command; after `stop` until the vibration has faded."""
+        """Advance one block a period under the newest command; after `stop`, until the vibration has faded."""
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         sent_ns = [0] * _ROUND_TRIPS_KEPT
         fading = 0
@@ -119,7 +119,7 @@ class _Process:
                 return
 
     def lockstep(self, blocks: int, stop: threading.Event) -> None:
-        """Each block waits for the command that answers the one before it."""
+        """Advance block by block; each block waits for the command that answers the block before."""
         node = self._node
         commands: list[bytes] = []
         while node.block < blocks and not stop.is_set():

@@ -1,4 +1,4 @@
-"""What a rig file may say, in human terms, with the paper's rig as the default of everything but the contact."""
+"""The rig file, in units of people; the paper's rig is the default of everything but the contact."""
 
 import math
 from itertools import pairwise
@@ -13,11 +13,13 @@ from plant.pairs import PAIRS
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-_FEWEST_STEPS_A_PERIOD = 20  # of the vibration, and of the slide on its spring
+# Steps of the solver in a period of the vibration, and of the slide on its spring. Fewer: slips that are not real, and peaks of
+# force that are off. More: sound rigs are refused. Counted: docs/method/plant.md.
+_FEWEST_STEPS_A_PERIOD = 20
 
 
 class ContactConfig(Strict):
-    """The friction pair. `pair` fills in the numbers of a known pair; any of them may be overridden beside it."""
+    """The friction pair. `pair` fills in the numbers of a known pair; each number may be overridden."""
 
     pair: str = ""
     stiffness_N_per_m: Positive
@@ -25,12 +27,12 @@ class ContactConfig(Strict):
     viscous_damping_Ns_per_m: NotNegative = 0.0
     coulomb_force_N: Positive
     static_force_N: Positive
-    stribeck_velocity_mps: Positive = 0.0005  # [15] in the paper; the same for every pair
-    # the Stribeck curve falls with exp(-q^2), q = v / v_s, and with this share of it with 1 / (1 + q^2) (Hess and Soom 1990)
+    stribeck_velocity_mps: Positive = 0.0005  # source [15] of the paper; the same for every pair
+    # share of the Stribeck curve that falls with 1 / (1 + q^2), q = v / v_s (Hess and Soom 1990); the rest falls with exp(-q^2)
     stribeck_tail: Annotated[float, Field(ge=-2, le=2)] = 0.0
     backbone: Literal["lugre", "elasto-plastic"] = "lugre"
     elastic_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.7  # elasto-plastic: elastic up to this share of its reach
-    # a rough surface: friction scatters along the track with this rms, a new value every length, another track every seed
+    # rough surface: rms scatter of friction along the track, over the mean; the length of one value; the seed of the track
     roughness_ratio: Annotated[float, Field(ge=0, le=0.3)] = 0.0
     roughness_length_m: Positive = 2e-4
     roughness_seed: Annotated[int, Field(ge=0, le=1_000_000)] = 0
@@ -61,7 +63,7 @@ class SlideConfig(Strict):
 
 
 class DriveConfig(Strict):
-    """The drive that moves and pulls the slide through a spring. `profile` is [[time_s, velocity_mps], ...], linear between."""
+    """The drive that pulls the slide through a spring. `profile` is [[time_s, velocity_mps], ...], linear in between."""
 
     stiffness_N_per_m: Positive = 11700.0
     damping_Ns_per_m: NotNegative = 0.0
@@ -78,7 +80,7 @@ class DriveConfig(Strict):
 
 
 class PiezoConfig(Strict):
-    """The exciter: its limits, how fast its amplitude may change, and what its mount does to it."""
+    """The exciter: its limits, the rate at which its amplitude may change, and its mount."""
 
     amplitude_max_m: Positive = 1e-7
     frequency_min_Hz: Positive = 500.0
@@ -133,7 +135,7 @@ class RigConfig(Strict):
         str, dict[str, float | str]
     ] = {}  # [effects.NAME] as in plant/effects/library.py; none: the nominal rig
 
-    # before pydantic: for a value that is neither a number nor a word it has two lines
+    # before pydantic, which gives two errors for a value that is neither a number nor a word
     @model_validator(mode="before")
     @classmethod
     def _effects_are_known(cls, table: Any) -> Any:
@@ -167,7 +169,7 @@ class RigConfig(Strict):
                 f"piezo.command_timeout_s = {piezo.command_timeout_s:g}: must hold 2 blocks of solver.block_s = "
                 f"{solver.block_s:g}, or no command is ever fresh; raise it"
             )
-        # k_t dt^2 / m: 1.3 is still right, at 1.9 friction swings by itself, 6.5 shows no stick-slip
+        # k_t dt^2 / m must be at most 1: at 1.9 friction oscillates by itself (docs/method/plant.md)
         lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
         if self.slide.mass_kg < lightest_kg:
             longest_s = math.sqrt(self.slide.mass_kg / self.contact.stiffness_N_per_m)
@@ -179,8 +181,7 @@ class RigConfig(Strict):
 
     @model_validator(mode="after")
     def _drive_is_not_too_stiff(self) -> "RigConfig":
-        # Nothing damps the slide on this spring. Of a swing of 25 N the largest force is 0.2 N too high at 20 steps a period;
-        # of one of 66 N at 8 it is 14 N too low.
+        # Nothing damps the slide on its spring, so too few steps a period change the peaks of the force (docs/method/plant.md).
         k_d, ratio = self.drive.stiffness_N_per_m, self._of("drive-stiffness", "ratio")
         per_step = 2.0 * math.pi / _FEWEST_STEPS_A_PERIOD
         stiffest = self.slide.mass_kg * (per_step / self.solver.step_s) ** 2 / (1.0 + ratio)
@@ -195,7 +196,7 @@ class RigConfig(Strict):
         return self
 
     def _of(self, effect: str, key: str) -> float:
-        """A parameter of an effect, 0 where the rig does not have it."""
+        """A parameter of an effect; 0 where the rig does not have the effect."""
         return float(self.effects.get(effect, {}).get(key, 0.0))
 
     @model_validator(mode="after")
@@ -240,13 +241,13 @@ class RigConfig(Strict):
                 f"{lightest_kg:.2g} kg with solver.step_s = {solver.step_s:g}; lower one of the three"
             )
         ratio, frequency_Hz = self._of("frame-compliance", "ratio"), self._of("frame-compliance", "frequency_Hz")
-        # stiffnesses over that of the frame: the drive's spring, and beside it the one that a relaxing damper hangs on
+        # sum of two stiffnesses over that of the frame: the drive's spring, and the spring in series with a relaxing damper
         stiffer = ratio
         if relaxation_s := self._of("drive-damping", "relaxation_s"):
             k_d = self.drive.stiffness_N_per_m * (1.0 + self._of("drive-stiffness", "ratio"))
             stiffer += ratio * self._of("drive-damping", "damping_Ns_per_m") / (relaxation_s * k_d)
         highest_Hz = 1.0 / (2.0 * math.pi * solver.step_s * math.sqrt(1.0 + stiffer))
-        if frequency_Hz > highest_Hz:  # its leapfrog is stable up to twice this
+        if frequency_Hz > highest_Hz:  # half of the frequency at which the frame's leapfrog becomes unstable
             raise ValueError(
                 f"effects.frame-compliance.frequency_Hz = {frequency_Hz:g}: with ratio = {ratio:g} between the frame and "
                 f"the drive's springs must be at most {highest_Hz:.3g} Hz with solver.step_s = {solver.step_s:g}; lower one"

@@ -1,4 +1,4 @@
-"""What a rig file may say and the model would answer with something that no rig does, quietly."""
+"""Rig files that pass every rule on single numbers, and for which the model would silently do what no rig does."""
 
 import math
 
@@ -7,15 +7,16 @@ import numpy as np
 from plant.config import RigConfig
 from plant.records import build
 
-# h_t dt / m of a vibrated slide: at 4.3 its velocity overshoots threefold, at 2.15 the mean force is off by 0.6 %
+# Largest h_t dt / m. Too large: the step throws a vibrated slide (4.3: threefold velocity; 2.15: mean force off by 0.6 %).
+# Too small: sound rigs are refused. Counted: docs/method/plant.md.
 _MOST_DAMPING = 2.0
-# v / v_s: beyond, the Stribeck curve only rises or falls towards Coulomb
+# v / v_s at which the Stribeck curve is checked; beyond the last one the curve only approaches the Coulomb force
 _VELOCITY_RATIOS = np.linspace(0.0, 10.0, 2001)
 _ANGLES_RAD = np.linspace(0.0, 2.0 * math.pi, 2001)
 
 
 def refuse_what_no_rig_does(rig: RigConfig) -> None:
-    """Raise ValueError: a damper too strong for the step, friction below 0, a drive that reverses."""
+    """Raise ValueError for a damper too strong for the step, for friction below 0, and for a drive that reverses."""
     _contact_damping(rig)
     _stribeck_curve(rig)
     _ripple(rig)

@@ -1,11 +1,11 @@
-"""One step of the LuGre contact and the slide on it.
+"""One step of the LuGre contact and of the slide on it.
 
-A leapfrog: x and z live half a step before v. The bristle's equation z' = v_r - k_t |v_r| z / g(v_r) is solved exactly
-over the step for a held v_r, so it cannot blow up however large k_t |v_r| dt / g is (1.2 at 10 us in the middle of a slip,
-where an explicit step goes silently wrong). The slide's equation is then solved by the implicit midpoint rule with
-F_f = k_t z + h_t (1 - k_t z sgn(v_r) / g) v_r + h_v v_r, whose bracket is carried to the middle of the step from the last
-two steps. Measured on the paper's steel pair: slip times differ from a converged solution by 0.002 ms at 10 us and 0.05 ms
-at 50 us after five slips, the error falls with the square of the step.
+The method is a leapfrog: x and z are known half a step before v. The bristle's equation z' = v_r - k_t |v_r| z / g(v_r) is
+solved exactly over the step for a held v_r, so it stays stable however large k_t |v_r| dt / g is (1.2 at 10 us in the middle
+of a slip, where an explicit step gives a wrong answer without a sign of it). The slide's equation is then solved by the
+implicit midpoint rule with F_f = k_t z + h_t (1 - k_t z sgn(v_r) / g) v_r + h_v v_r; the bracket is extrapolated to the middle
+of the step from the last two steps. Measured on the paper's steel pair: after five slips the slip times differ from a
+converged solution by 0.002 ms at 10 us and by 0.05 ms at 50 us. The error falls with the square of the step.
 """
 
 import math
@@ -35,26 +35,26 @@ def step(
     v_r_before: float,
     g_before: float,
 ) -> tuple[float, float, float]:
-    """Advance one step; all SI.
+    """Advance one step; all numbers in SI units, symbols as in the package's note.
 
     Args:
-        g: steady friction force at the velocity of now, which the bristle moves towards.
-        sliding_share: 1 for LuGre; less, above 0, where the bristle is still elastic, in the elasto-plastic contact.
-        base_give: mean velocity that the base gains over the step for every newton of friction [m/(N s)]; 0 if it is rigid.
-        guarded: friction may change by much of itself within a step, as it does on no rig without effects.
-        z_dt: how far the bristle moves: dt, half of it in the very first step.
-        pull_N: spring force of the drive in the middle of the step.
-        base_velocity_mid: of the base in the middle of the step, without what it gains from friction.
-        v_r, v_r_before, g_before: relative velocity now; it and g in the step before.
+        g: steady friction force at the present velocity [N]; the bristle's force moves towards it.
+        sliding_share: 1 for LuGre; between 0 and 1 where the bristle of the elasto-plastic contact is still elastic.
+        base_give: mean velocity that the base gains over the step for every newton of friction [m/(N s)]; 0 for a rigid base.
+        guarded: whether friction may change by a large share within a step; without effects it never does.
+        dt, z_dt: the step [s]; the time over which the bristle moves [s]: dt, or half of dt in the very first step.
+        pull_N: force of the drive's spring in the middle of the step.
+        base_velocity_mid: velocity of the base in the middle of the step, without the part that friction causes.
+        v_r, v_r_before, g_before: relative velocity now, in the step before, and g in the step before.
 
     Returns:
-        v after the step, its mean over the step, z after.
+        velocity v after the step, mean velocity over the step, deflection z after the step.
 
     """
     g_end = g / sliding_share
     decay = k_t * math.fabs(v_r) / g_end * z_dt
     if decay < 0.03:
-        # exp(-decay) - 1 by its series, to 1e-14 of itself here; in pairs, because the step waits for this line
+        # exp(-decay) - 1 by its series, accurate to 1e-14 here; in pairs of terms, as the rest of the step waits for this line
         square = decay * decay
         pairs = (1.0 - decay / 2) + square * ((1 / 6 - decay / 24) + square * (1 / 120 - decay / 720))
         gone = -decay * pairs
@@ -68,12 +68,12 @@ def step(
     z += moved
     share = 1.0 - per_g_mid * z
     if guarded and decay > 1.0:
-        # the bristle follows g at once: what it has moved, not a small difference of two that are extrapolated
+        # The bristle follows g within the step: use what it has moved, not the small difference of two extrapolated numbers.
         share = moved / (v_r * z_dt)
     damping = h_t * share + h_v
     bristle_N = k_t * z
     if base_give > 0.0:
-        # friction moves the base while it acts: one equation for both, or the stiff damping of the contact would blow up
+        # Friction moves the base within the step. One equation solves both: the contact's stiff damping makes two unstable.
         yielding = 1.0 / (1.0 + damping * base_give)
         bristle_N *= yielding
         damping *= yielding

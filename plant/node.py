@@ -1,4 +1,4 @@
-"""The rig as a participant of the bus: commands in, sensor blocks and what was applied out."""
+"""The rig as a participant of the bus: commands in, sensor blocks and the applied vibration out."""
 
 import math
 
@@ -15,15 +15,15 @@ from plant.simulate import drive_velocity_mps
 from plant.step import step
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
-_BATCH_BLOCKS = 64  # noise and drive velocity are drawn for this many blocks at once
+_BATCH_BLOCKS = 64  # noise and drive velocity are drawn for so many blocks at once; fewer cost more time a block
 
 
 class PlantNode:
     """The rig, advanced block by block.
 
     Args:
-        config: the rig.
-        seed: of the sensor noise; the same seed gives the same bytes.
+        config: the rig file.
+        seed: seed of the sensor noise; the same seed gives the same bytes.
 
     """
 
@@ -52,10 +52,10 @@ class PlantNode:
     def advance(
         self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
     ) -> tuple[Outgoing, Outgoing]:
-        """One block of the rig under the newest of `commands`: the sensor block, then what was applied.
+        """Advance one block under the newest of `commands`; return the sensor block and the applied vibration.
 
-        Raises Fault BAD_MESSAGE when the command cannot be read, CONFIG when the rig cannot be stepped: the state is no
-        number any more.
+        Raises Fault BAD_MESSAGE when the command cannot be read, CONFIG when the state becomes NaN or infinite, so that the
+        rig cannot be stepped.
         """
         if commands:
             self._command = COMMAND_LAYOUT.read(commands[-1], COMMAND.name)
@@ -68,7 +68,7 @@ class PlantNode:
             self._params, self._state, self._velocity_mps[at], self._command, len(commands), self._noise[at],
             commands_late, round_trip_ns, late_ns, self._analogue, self.truth, self._sensors, self._applied,
         )  # fmt: skip
-        if not math.isfinite(self.truth[_VELOCITY, -1]):  # whatever else is not reaches it within a step
+        if not math.isfinite(self.truth[_VELOCITY, -1]):  # NaN anywhere in the state reaches the velocity within a step
             t_s, step_s = (self.block + 1) * self.block_ns * 1e-9, self._config.solver.step_s
             raise Fault(
                 "CONFIG",
@@ -79,7 +79,7 @@ class PlantNode:
         return Outgoing(SENSORS, self._sensors.tobytes()), Outgoing(APPLIED, self._applied.tobytes())
 
     def let_go(self) -> None:
-        """Forget the command in force: the vibration fades to zero at the piezo's own rate."""
+        """Forget the present command, so that the vibration fades to zero at the piezo's own rate."""
         self._state["command_block"] = NO_COMMAND
 
     @property

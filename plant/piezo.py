@@ -1,7 +1,7 @@
-"""What the base does when the piezo is told an amplitude and a frequency.
+"""The motion of the base under a commanded amplitude and frequency of the piezo.
 
 The displacement is u = u0 sin(phi), so u' = u0 phi' cos(phi) + u0' sin(phi): the paper's v_a cos(2 pi f (t - t_on)) once
-the ramp of u0 is over. The phase runs on through a change of frequency; it restarts at 0 only out of complete rest.
+the ramp of u0 is over. The phase continues through a change of frequency; it restarts at 0 only from complete rest.
 """
 
 import math
@@ -11,7 +11,7 @@ from bridge.kernel import Record, kernel
 
 @kernel
 def delivered_share(p: Record, frequency_Hz: float) -> float:
-    """How much of the commanded amplitude reaches the base at this frequency; 1 on a rigid mount."""
+    """The share of the commanded amplitude that reaches the base at this frequency; 1 on a rigid mount without effects."""
     share = p.delivered_ratio
     if p.mount_resonance_Hz > 0.0:
         r = frequency_Hz / p.mount_resonance_Hz
@@ -30,7 +30,7 @@ def delivered_share(p: Record, frequency_Hz: float) -> float:
 
 @kernel
 def accepted(p: Record, frequency_Hz: float, amplitude_m: float) -> tuple[float, float]:
-    """The command within the exciter's own limits."""
+    """The commanded frequency [Hz] and amplitude [m], clipped to the exciter's own limits."""
     return (
         min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz),
         min(max(amplitude_m, 0.0), p.amplitude_max_m),

@@ -26,13 +26,13 @@ def _position(p: Record, true_m: float, noise: float) -> float:
 
 @kernel
 def digitise(p: Record, analogue: npt.NDArray[Any], noise: npt.NDArray[Any], block: Record) -> None:
-    """Turn analogue signals into what the rig's DAQ would report.
+    """Turn analogue signals into the samples that the rig's data acquisition reports.
 
     Args:
         p: record of `plant.records.PARAMS`.
         analogue: float64 [5, samples] from `plant.core.advance`, SI units.
         noise: standard normal numbers, float64 [5, samples].
-        block: record of a sensor block, whose channels are filled, float32 [samples] each.
+        block: record of a sensor block; its channels, float32 [samples] each, are filled.
 
     """
     low_mps2, high_mps2 = -p.accel_range_mps2, p.accel_range_mps2

@@ -15,7 +15,7 @@ Floats = npt.NDArray[np.floating[Any]]
 
 
 class Simulation(NamedTuple):
-    """What a simulated run did; arrays of [samples], SI units, no sensor in between."""
+    """The true signals of a simulated run, without sensors; arrays of [samples], SI units."""
 
     t_s: Floats
     drive_force_N: Floats
@@ -39,7 +39,7 @@ def run_blocks(
 
     Args:
         params, state: one record each of `plant.records.PARAMS` and `STATE`.
-        drive, frequency_Hz, amplitude_m: what `plant.core.advance` takes, one value a block, [blocks].
+        drive, frequency_Hz, amplitude_m: arguments of `plant.core.advance`, one value a block [blocks].
         analogue, truth: filled, [rows, blocks * samples], rows as CHANNELS and TRUTH.
 
     """
@@ -65,8 +65,8 @@ def simulate(
 ) -> Simulation:
     """Run a rig, with a constant vibration from `vibration_from_s` on.
 
-    The ramp of the piezo is the configuration's; the paper's runs switch at once (`amplitude_slew_m_per_s = 0`).
-    The vibration starts with a block; a start inside a block is reached by shortening the blocks.
+    The piezo ramps at the rate of the configuration; the paper's runs switch at once (`amplitude_slew_m_per_s = 0`).
+    The vibration starts at the beginning of a block; shorter blocks allow a start in between.
     """
     params, state = build(config)
     solver = config.solver
@@ -84,6 +84,6 @@ def simulate(
 
 
 def drive_velocity_mps(config: RigConfig, t_s: Floats) -> Floats:
-    """Drive velocity [m/s] at the times `t_s` [s], linear between the points of the profile."""
+    """Drive velocity [m/s] at the times `t_s` [s], linear between the points of the profile, constant outside them."""
     profile = np.array(config.drive.profile)
     return np.interp(t_s, profile[:, 0], profile[:, 1])

@@ -1,15 +1,15 @@
-"""Is steady sliding stable? The slider on its spring, linearised, with and without a fast vibration.
+"""Whether steady sliding is stable: the slider on its spring, linearised, with and without a fast vibration.
 
 States: extension of the drive's spring e [m], velocity of the slide v [m/s], bristle deflection z [m].
-The vibration enters by its cycle mean. Well above the contact resonance, with u0 below the bristle's own
-reach F_s / k_t, the bristle is frozen within a cycle (the paper: 0.02 um against 0.22 um) and only means
-are left:
+The vibration enters by its mean over a cycle. Well above the contact resonance, with u0 below the bristle's
+own reach F_s / k_t, the bristle does not move within a cycle (the paper: 0.02 um against 0.22 um) and only
+means remain:
 
     z' = v - k_t B(v) z        B(v) = < |v_r| / g(v_r) >        v_r = v - v_a cos(theta)
     F  = k_t z + h_t z' + h_v v                                 steady: F(v) = v / B(v) + h_v v
 
-Linear stability speaks of small disturbances. Stick-slip that has started, and every start from rest starts
-it, can outlive it: `self_sustained_velocity_mps`.
+Linear stability holds for small disturbances. Stick-slip that has started can go on where steady sliding is stable, and
+every start from rest starts it: see `self_sustained_velocity_mps`.
 """
 
 import math
@@ -34,7 +34,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 class Contact(NamedTuple):
     """The cycle-averaged contact at steady sliding: dz' = slip dv - relaxation dz. Arrays of one shape."""
 
-    slip: Floats  # share of an extra velocity that stretches the bristle; below 0: friction falls with v
+    slip: Floats  # share of an extra velocity that stretches the bristle; below 0 where friction falls with velocity
     relaxation_per_s: Floats
 
 
@@ -64,13 +64,13 @@ def contact(config: ContactConfig, velocity_mps: Numbers, vibration_velocity_mps
         mean += np.sum(share * v_r / g, axis=-1)
         # B - v dB/dv under one sum: as a difference of the two it would lose slopes below 1e-16
         excess += np.sum(share * (v * v_r * g_slope / g**2 - back / g), axis=-1)
-    # with vibration the sum rounds to 1e-16 where the slope is 0 (F_s = F_c below the edge): that is no slope
+    # with vibration the sum rounds to 1e-16 where the slope is 0 (F_s = F_c below the edge): count it as 0
     rounded = (v_a[..., 0] > 0.0) & (np.abs(excess) < 1e-14 * mean)
     return Contact(np.where(rounded, 0.0, excess / mean), config.stiffness_N_per_m * mean)
 
 
 def with_constant_effects(config: RigConfig) -> RigConfig:
-    """A rig without effects that has the numbers which its effects change for good; what else they do is left out."""
+    """A rig without effects whose numbers are those that its effects change constantly; all else of the effects is left out."""
     p: Any = build(config)[0][0]
     contact = {
         "coulomb_force_N": float(p.F_c),
@@ -130,8 +130,8 @@ def stability_map(
 ) -> Floats:
     """Largest real part of the poles [1/s], above 0 where steady sliding is unstable.
 
-    The arguments broadcast; without a stiffness the rig's is used. Good to about 1e-9 1/s: for the sign of
-    weaker growth ask `hurwitz_margin`.
+    The arguments broadcast; without a stiffness the rig's stiffness is used. Accurate to about 1e-9 1/s; for the
+    sign of weaker growth use `hurwitz_margin`.
     """
     k_d = config.drive.stiffness_N_per_m if drive_stiffness_N_per_m is None else drive_stiffness_N_per_m
     A = _system_matrix(config, contact(config.contact, drive_velocities_mps, vibration_velocity_mps), k_d)
@@ -162,7 +162,10 @@ def hurwitz_margin(
 
 
 def _last_crossing(margin: Callable[[Numbers], Floats], grid: Floats) -> float | None:
-    """Where `margin` last turns positive along the grid: None if below 0 at its end, grid[0] if nowhere."""
+    """The last point of the grid at which `margin` turns positive.
+
+    None if `margin` is below 0 at the end of the grid; grid[0] if it is nowhere below 0.
+    """
     below = np.flatnonzero(margin(grid) < 0.0)
     if below.size == 0:
         return float(grid[0])
@@ -176,11 +179,11 @@ def _last_crossing(margin: Callable[[Numbers], Floats], grid: Floats) -> float |
 def critical_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: float | None = None) -> float | None:
     """Lowest drive velocity above which steady sliding is stable without vibration [m/s].
 
-    0 if it is stable at every velocity; None if at none: with h_d = h_v = 0, as in the paper, nothing
-    opposes a friction that falls with velocity, however little it falls.
+    0 if sliding is stable at every velocity; None if at no velocity: with h_d = h_v = 0, as in the paper,
+    nothing opposes a friction that falls with velocity, however little it falls.
     """
-    # beyond 12 v_s the slope of the Stribeck curve, exp(-144), is below any damping one could mean; that of its tail is 2e-9
-    # of its drop at 1000 v_s
+    # Beyond 12 v_s the slope of the Stribeck curve, exp(-144), is below any real damping. The slope of its tail is 2e-9 of the
+    # drop at 1000 v_s.
     furthest = 12.0 if config.contact.stribeck_tail == 0.0 else 1e3
     grid_mps = config.contact.stribeck_velocity_mps * np.geomspace(1e-4, furthest, 600)
 
@@ -194,7 +197,7 @@ def critical_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: float | No
 def stabilising_vibration_mps(config: RigConfig, drive_velocity_mps: float) -> float | None:
     """Smallest velocity amplitude of the vibration from which on steady sliding is stable [m/s].
 
-    0: none is needed. None: five times the drive velocity does not suffice.
+    0 where sliding is stable without vibration; None where five times the drive velocity does not suffice.
     """
     grid_mps = drive_velocity_mps * np.linspace(0.0, 5.0, 1001)
 
@@ -205,13 +208,13 @@ def stabilising_vibration_mps(config: RigConfig, drive_velocity_mps: float) -> f
 
 
 def self_sustained_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: Numbers | None = None) -> Floats:
-    """Drive velocity up to which stick-slip that has started goes on without vibration [m/s], inf undamped.
+    """Drive velocity up to which stick-slip that has started goes on without vibration [m/s]; inf without damping.
 
     A slip leaves rest at F_s and turns about F_c on the spring. In the frame of the drive it starts with the
     velocity -v_d and the spring velocity s v_d, s = (F_s - F_c) / (v_d sqrt(k_d m)), and is slowest after the
-    angle 2 pi - arctan(s). It rests again if damping leaves v_d of it:
+    angle 2 pi - arctan(s). The slide rests again if damping leaves it at least the velocity v_d there:
     sqrt(1 + s^2) exp(-d (2 pi - arctan(s))) = 1 at the limit, d = zeta / sqrt(1 - zeta^2).
-    Within 10 % of the simulation for zeta up to 0.2 (tests/truth), at 0.4 too low by 20 % or more.
+    The result is within 10 % of the simulation for zeta up to 0.2 (tests/truth), and too low by 20 % or more at 0.4.
     """
     k_d = np.asarray(config.drive.stiffness_N_per_m if drive_stiffness_N_per_m is None else drive_stiffness_N_per_m)
     m = config.slide.mass_kg
@@ -219,9 +222,9 @@ def self_sustained_velocity_mps(config: RigConfig, drive_stiffness_N_per_m: Numb
     drop_N = config.contact.static_force_N - config.contact.coulomb_force_N
     if H == 0.0:
         return np.full(k_d.shape, math.inf if drop_N > 0.0 else 0.0)
-    zeta = np.minimum(H / (2.0 * np.sqrt(k_d * m)), 0.999)  # at 1 there is no turn; s is 1e54 here already
+    zeta = np.minimum(H / (2.0 * np.sqrt(k_d * m)), 0.999)  # the slide does not turn at 1; at 0.999 s is 1e54 already
     d = zeta / np.sqrt(1.0 - zeta**2)
     s = np.full(k_d.shape, np.inf)
-    for _ in range(50):  # ten turns reach 1e-11 for any zeta
+    for _ in range(50):  # ten rounds reach 1e-11 for any zeta
         s = np.sqrt(np.expm1(2.0 * d * (2.0 * np.pi - np.arctan(s))))
     return drop_N / (s * np.sqrt(k_d * m))

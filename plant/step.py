@@ -1,4 +1,4 @@
-"""One block of the rig as the bus sees it: a command in, a sensor block and what was applied out."""
+"""One block of the rig as the bus sees it: a command in, a sensor block and a message of the applied vibration out."""
 
 import math
 from typing import Any
@@ -32,11 +32,11 @@ def step(
     Args:
         params, state: one record each of `plant.records.PARAMS` and `STATE`.
         drive_velocity_mps: held over the block.
-        command: the newest command; not looked at when `commands`, how many came since the last block, is 0.
-        noise: standard normal numbers, [5, samples].
-        commands_late, round_trip_ns, late_ns: noted in `applied`.
+        command, commands: the newest command, and the number of commands since the last block; at 0 `command` is not read.
+        noise: standard normal numbers, float64 [5, samples].
+        commands_late, round_trip_ns, late_ns: copied to `applied`.
         analogue, truth: filled, as `plant.core.advance` says.
-        sensors, applied: one message record each.
+        sensors, applied: one message record each, filled.
 
     """
     p: Record = params[0]
