@@ -1,4 +1,4 @@
-"""The controller process: blocks in, commands out. The command leaves first; everything else follows it."""
+"""The controller process: blocks in, commands out. The command leaves first; all other messages follow."""
 
 import threading
 import time
@@ -13,14 +13,15 @@ from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 
-# A step with its messages takes 0.04 ms (median of Trace.lateness_ns): a backlog of this many blocks is worked off
-# within 11 ms, so none needs to be skipped.
+# Blocks that may wait for the controller. Too small: a short pause loses blocks. Larger: commands answer older blocks.
+# A step with its messages takes 0.04 ms (median of Trace.lateness_ns), so 256 blocks are answered within 11 ms.
 _INBOX_LIMIT = 256
-_PLANT_LOST_S = 1.0
-_TOLD_S = 1.0  # a rig without a token costs this
-_AT_ONCE_S = 0.05
+_PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
+_TOLD_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token costs all of it
+_AT_ONCE_S = 0.05  # time for a second controller of the same moment to appear, and the period of looking again
 _UNSEEN = "is its transducer at the end of its range, or loose? without v_d nothing is vibrated"
-_OTHER_GONE_S = 0.5  # one that was killed is missed after the lease of 0.1 s
+# Wait for another controller to leave. Too small: one that was killed, and whose lease of 0.1 s lasts, still refuses this one.
+_OTHER_GONE_S = 0.5
 
 
 def run(
@@ -41,19 +42,20 @@ def run(
         process = _Process(config, node, bus, lockstep)
         process.prepare()
         _refuse_a_second(bus, bus_config.endpoint)
-        # in lockstep plant and controller take turns: on one core the wake-up of the other costs a tenth
-        granted = realtime.claim(0 if lockstep else 1)  # the rig may begin once it knows
+        # in lockstep plant and controller take turns: on one core waking the other process takes a tenth of the time
+        granted = realtime.claim(0 if lockstep else 1)  # before the announcement, as the rig may begin right after
         bus.announce()
         process.loop(stop, granted)
 
 
 def _refuse_a_second(bus: Bus, endpoint: str) -> None:
-    """Two controllers would pull one piezo to and fro, each inside its own slew limit. Raises Fault ENDPOINT_BUSY.
+    """Raise Fault ENDPOINT_BUSY where another controller is on the bus.
 
-    Two that wait for one rig meet when it comes: the claims, made before, tell each of the other, and the higher one yields.
+    Two controllers would pull one piezo to and fro, each inside its own slew limit. Two controllers that start at the same
+    time see each other's claims: the controller with the higher claim yields.
     """
     mine, others = bus.claim()
-    bus.wait_for(["plant"], _TOLD_S)  # by then it is known who else is there, but for a moment
+    bus.wait_for(["plant"], _TOLD_S)  # by then the bus has told of all others, apart from those of the same moment
     time.sleep(_AT_ONCE_S)
     since_s = time.monotonic()
     while (rivals := others()) or bus.alive("controller"):
@@ -78,7 +80,7 @@ class _Process:
         self._unreadable = False
 
     def prepare(self) -> None:
-        """Take one's place on the bus."""
+        """Open the publishers and listen to plant and operator."""
         for topic in (COMMAND, TRACE, STATE, SNAPSHOT, CONTROLLER_EVENT):
             self._send[topic.name] = self._bus.publisher(topic)
         self._bus.listen(SENSORS, self._inbox.push)
@@ -86,15 +88,15 @@ class _Process:
             self._bus.listen(topic, self._inbox.keep)
 
     def event(self, code: str, text: str) -> None:
-        """Tell the bus."""
+        """Publish an event with a code and a text."""
         event = wire.Event(sequence=self._events, t_ns=self._node.t_ns, source="controller", code=code, text=text)
         self._events += 1
         self._send[CONTROLLER_EVENT.name](event.SerializeToString())
 
     def loop(self, stop: threading.Event, granted: str) -> None:
-        """Consume blocks in order and answer each; the plant takes the newest answer it has.
+        """Consume blocks in order and answer each block; the plant applies the newest answer that it has.
 
-        `granted`: the priority of this process, told when the run begins.
+        `granted`: the priority of this process, published when the run begins.
         """
         try:
             self._answer(stop, granted)
@@ -105,14 +107,14 @@ class _Process:
 
     def _answer(self, stop: threading.Event, granted: str) -> None:
         heard_s = time.monotonic()
-        due_s = heard_s + self._stale_after_s  # when the command ramps down unless a new block comes
+        due_s = heard_s + self._stale_after_s  # the command ramps down then, unless a new block comes
         started = False
         stale = False
         while not stop.is_set() and not self._ended:
             received = self._inbox.get(max(due_s - time.monotonic(), 0.0))
             if received is not None:
                 heard_s = time.monotonic()
-                if self._consume(received):  # nothing else is fresh: a rig that hangs may repeat its last block
+                if self._consume(received):  # only a new block is fresh: a rig that hangs may repeat its last block
                     due_s = heard_s + self._stale_after_s
                     if stale:
                         self.event("FRESH", "blocks arrive again")
@@ -120,7 +122,7 @@ class _Process:
                 if received.topic is SENSORS and not started:
                     started = True
                     if not self._lockstep:
-                        # not before: the plant waits with its first block until the recorder listens
+                        # now, as the plant sends its first block only when the recorder listens
                         self.event("START", granted)
             if time.monotonic() < due_s:
                 continue
@@ -131,7 +133,7 @@ class _Process:
                     self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
                 stale = True
                 self._ramp(silent_blocks)
-            # the slew limit is one a step: once stale, a step every block ramps as fast as with blocks
+            # The slew limit counts a step: once stale, one step a block period ramps as fast as with blocks.
             due_s = time.monotonic() + (self._block_s if stale else self._stale_after_s)
 
     def _ramp(self, silent_blocks: int) -> None:
@@ -139,13 +141,13 @@ class _Process:
         self._send_rest(0)
 
     def _fade_out(self) -> None:
-        """Leave no vibration behind, whatever the reason to leave: not every rig lets go of its last command by itself."""
+        """Ramp to zero before leaving, for any reason: not every rig ends its last command by itself."""
         while self._node.amplitude_m > 0.0 and not (self._lockstep or self._ended):
             self._ramp(1)
             time.sleep(self._block_s)
 
     def _consume(self, received: Received) -> bool:
-        """Take one message. Returns whether it was a block that got an answer."""
+        """Take one message; return whether it was a block that got an answer."""
         node = self._node
         if received.topic is SENSORS:
             command = node.block(received.payload)
@@ -183,7 +185,7 @@ class _Process:
             self.event("FRESH", "every sample is a number again")
 
     def _obey(self, payload: bytes) -> None:
-        """Take an operator's word; one that makes no sense must not stop the control."""
+        """Take an operator's message; an unreadable message must not stop the control, so it is ignored and told."""
         try:
             word = parsed(wire.Operator, payload, OPERATOR.name)
             name = wire.Operator.Action.Name(word.action)

@@ -1,4 +1,4 @@
-"""What a controller file may say."""
+"""The controller file, in units of people."""
 
 import math
 from typing import Annotated
@@ -10,31 +10,36 @@ from bridge.config import Strict, Two
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(gt=0, le=1)]
-LONGEST_WINDOW_BLOCKS = 128
-FEWEST_WINDOW_BLOCKS = 8  # below this a slope is noise: 8 blocks of 6 mN give 0.9 N/s against 5.85 N/s
-MOST_BANDS = 8
-_FEWEST_SILENT_BLOCKS = 2
+LONGEST_WINDOW_BLOCKS = 128  # length of the rings of force and position
+# Blocks in a window of a slope. Fewer: the slope is noise. 8 blocks with 6 mN of noise give 0.9 N/s, a stick climbs 5.85 N/s.
+FEWEST_WINDOW_BLOCKS = 8
+MOST_BANDS = 8  # forbidden bands of frequency
+_FEWEST_SILENT_BLOCKS = 2  # in `stale_after_s`; with fewer every block would come too late
 
 
 class OnsetConfig(Strict):
     """How stick, slip and smooth sliding are told apart."""
 
-    # five sigma of a fitted slope: (300 sigma^2 / (f_s (k_d v_d)^2))^(1/3) = 9 ms at 20 mN and 5.85 N/s; twice that
+    # Window of the slope of the force. Shorter: noise looks like stick. Longer: stick is seen late.
+    # A slope is five sigma in (300 sigma^2 / (f_s (k_d v_d)^2))^(1/3) = 9 ms at 20 mN and 5.85 N/s; the default is twice that.
     window_s: Positive = 0.02
-    velocity_window_s: Positive = 0.04
-    stick_force_rate: Annotated[float, Field(gt=0, lt=1)] = 0.5
-    slip_drop_N: Positive = 0.15  # over 3 ms; a slip of the paper's rig drops 0.5 N, noise 0.01 N
-    slip_burst_mps2: Positive = 0.2  # a slip of the paper's rig reaches 2.6
-    standstill_mps: Positive = 2e-5
-    breakaway_force_N: NotNegative = 0.0  # 0: learnt from the slips that are seen
+    velocity_window_s: Positive = 0.04  # window of the slope of the drive position, v_d
+    stick_force_rate: Annotated[float, Field(gt=0, lt=1)] = 0.5  # share of k_d v_d above which the contact sticks
+    # Fall of the force over 3 ms that makes a slip: 0.5 N on the paper's rig. Smaller: noise (0.01 N) counts. Larger: small slips
+    # do not.
+    slip_drop_N: Positive = 0.15
+    slip_burst_mps2: Positive = 0.2  # rms of the slide's acceleration that confirms a slip; the paper's rig reaches 2.6
+    standstill_mps: Positive = 2e-5  # drive velocity up to which the drive stands
+    breakaway_force_N: NotNegative = 0.0  # 0: learnt from the measured slips
 
 
 class PolicyConfig(Strict):
-    """When to vibrate and when to stop. Times from the start of the run."""
+    """When to vibrate and when to stop."""
 
-    enabled_from_s: NotNegative = 0.0
-    gentle_ratio: Annotated[float, Field(ge=1.05, le=1.5)] = 1.12
-    # of the breakaway force; on the paper's rig a vibration that starts above 0.85 F_s causes the slip it should prevent
+    enabled_from_s: NotNegative = 0.0  # from the start of the run
+    gentle_ratio: Annotated[float, Field(ge=1.05, le=1.5)] = 1.12  # v_a / v_d while breakaway is near
+    # Shares of the breakaway force from which a vibration starts gently, or not at all. Larger: the vibration causes the slip
+    # that it should prevent (above 0.85 on the paper's rig). Smaller: the controller waits out more slips.
     gentle_from: Share = 0.8
     too_late_from: Share = 0.85
     probe_every_s: Positive = 30.0  # doubles with every probe that finds the vibration still needed
@@ -44,16 +49,17 @@ class PolicyConfig(Strict):
 
 
 class AmplitudeConfig(Strict):
-    """The loop that makes the measured v_a what it should be; `loop_design` gives its margins."""
+    """The loop that brings the measured v_a to its set point; `loop_design` gives its margins."""
 
-    # phase margin 60 degrees and gain margin 6.3 with this filter and commands 2 blocks late: controller/loop_design.py
+    # Share of the logarithmic error that one block corrects. Larger: the loop rings. Smaller: it settles late.
+    # Phase margin 60 degrees and gain margin 6.3 with this filter and commands 2 blocks late: controller/loop_design.py.
     gain: Positive = 0.0826
-    filter_s: Positive = 0.005
-    accel_bandwidth_Hz: Positive = 10000.0  # of the base accelerometer, undone at f
+    filter_s: Positive = 0.005  # time constant of the demodulated amplitude
+    accel_bandwidth_Hz: Positive = 10000.0  # of the base accelerometer; its roll-off at f is corrected
 
 
 class LimitsConfig(Strict):
-    """What no policy can exceed, and the set point of v_a / v_d."""
+    """Limits that no policy can exceed, and the set point of v_a / v_d."""
 
     v_ratio: Annotated[float, Field(ge=1.05, le=3.0)] = 1.2
     amplitude_max_m: Positive = 1e-7
@@ -61,9 +67,9 @@ class LimitsConfig(Strict):
     slew_m_per_s: Positive = 1e-6
     frequency_min_Hz: Positive = 500.0
     frequency_max_Hz: Positive = 5000.0
-    # the displacement transducers' carrier is 4.8 kHz: a vibration close by beats with it
+    # the carrier of the displacement transducers is 4.8 kHz: a vibration near it beats with it
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = [(4600.0, 5000.0)]
-    # a rig that froze must not be vibrated for longer
+    # silence after which the vibration ramps down: longer vibrates a rig that has frozen, shorter ramps down for a late block
     stale_after_s: Annotated[float, Field(gt=0, le=5.0)] = 0.02
 
 
@@ -128,13 +134,15 @@ class ControllerConfig(Strict):
         return self
 
 
-MOST_CANDIDATES = 64
-_ABOVE_RESONANCE = 2.2  # from about twice the contact resonance up the edge is at v_a / v_d = 1.05 whatever the damping
-_LEAST_GAP_HZ = 2.0  # a frequency in a band is moved to 1 Hz beside it, which must not be in the next one
+MOST_CANDIDATES = 64  # frequencies to choose from; more: finer steps, more memory
+# Lowest candidate over the contact resonance. Smaller: the v_a / v_d that stops stick-slip depends on the damping. Larger: fewer
+# frequencies are left. From about 2 up, v_a / v_d = 1.05 stops stick-slip for any damping.
+_ABOVE_RESONANCE = 2.2
+_LEAST_GAP_HZ = 2.0  # between bands: a frequency in a band moves to 1 Hz beside it, which must not lie in the next band
 
 
 def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:
-    """The forbidden bands from low to high; those that overlap, or all but do, are one."""
+    """The forbidden bands from low to high; bands that overlap, or are less than 2 Hz apart, become one."""
     bands: list[tuple[float, float]] = []
     for low, high in sorted(limits.forbidden_Hz):
         if bands and low < bands[-1][1] + _LEAST_GAP_HZ:
@@ -145,7 +153,7 @@ def forbidden_bands_Hz(limits: LimitsConfig) -> list[tuple[float, float]]:
 
 
 def _lowest_candidate(config: ControllerConfig) -> tuple[float, str]:
-    """From where on there are candidates [Hz], and in words."""
+    """The lower end of the candidates [Hz], and where it comes from, in words."""
     limits = config.limits
     above_Hz = _ABOVE_RESONANCE * config.contact_resonance_Hz
     if limits.frequency_min_Hz < above_Hz < limits.frequency_max_Hz:
@@ -159,7 +167,7 @@ def _candidate_step_Hz(config: ControllerConfig) -> float:
 
 
 def candidate_frequencies_Hz(config: ControllerConfig) -> list[float]:
-    """Frequencies to choose from, lowest first: above the contact resonance where the band allows, none forbidden."""
+    """The frequencies to choose from, lowest first [Hz]: above the contact resonance where the range allows, none forbidden."""
     bands, step_Hz = forbidden_bands_Hz(config.limits), _candidate_step_Hz(config)
     first = math.ceil(_lowest_candidate(config)[0] / step_Hz)
     last = math.floor(config.limits.frequency_max_Hz / step_Hz)

@@ -29,11 +29,11 @@ def step(
 
     Args:
         params, state: one record each of `controller.records.PARAMS` and `STATE`.
-        sensors: one sensor block; not looked at when `events` has no BLOCK.
+        sensors: one sensor block; not read when `events` has no BLOCK.
         events: bits of `controller.codes`: BLOCK, GAP, STALE, STOP, RESET.
-        gap_blocks: blocks that never came, just before this one.
-        t_ns: of the frame.
-        command, trace: one message record each, filled but for the trace's lateness.
+        gap_blocks: number of lost blocks just before this block.
+        t_ns: time of the frame.
+        command, trace: one message record each; all is filled except the trace's lateness.
         scratch: float64 [samples], overwritten.
 
     """
@@ -53,7 +53,7 @@ def step(
             accel_mps2 += float(block.mass_accel_mps2[i]) + float(block.base_accel_mps2[i])
         force_N /= samples
         position_m /= samples
-        # one sample that is no number would stay in the filters for ever: such a block is as good as lost
+        # A sample of NaN or infinity would stay in the filters for ever, so its block counts as lost.
         usable = math.isfinite(force_N + position_m + accel_mps2)
         s.missing_blocks += gap_blocks if usable else gap_blocks + 1
         if usable:

@@ -1,4 +1,4 @@
-"""What is allowed, whatever the policy wants. Nothing reaches the bus that did not come out of `allow`."""
+"""The limits, whatever the policy wants. Every command on the bus has passed `allow`."""
 
 import math
 
@@ -22,9 +22,9 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def _allowed_frequency(p: Record, frequency_Hz: float) -> float:
-    """The nearest frequency inside the band and outside every forbidden one, upwards first [Hz]."""
+    """The nearest frequency inside the range and outside every forbidden band, upwards first [Hz]."""
     result = min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz)
-    for i in range(p.bands):  # 2 Hz or more apart: 1 Hz beside one is in no other
+    for i in range(p.bands):  # the bands are 2 Hz or more apart, so 1 Hz beside a band lies in no other
         low, high = p.band_Hz[i, 0], p.band_Hz[i, 1]
         if low <= result <= high:
             if high < p.frequency_max_Hz:
@@ -35,10 +35,10 @@ def _allowed_frequency(p: Record, frequency_Hz: float) -> float:
 
 @kernel
 def allow(p: Record, s: Record, events: int, wanted_Hz: float, wanted_m: float) -> None:
-    """Set `allowed_Hz`, `allowed_m` and the `limit` that changed what was wanted.
+    """Set `allowed_Hz`, `allowed_m` and the `limit` that changed the wanted vibration.
 
-    The amplitude goes to zero, at the slew limit, on an operator's stop, without fresh input, and for anything that is no
-    number. A stop stays until a reset.
+    The amplitude goes to zero, at the slew limit, on an operator's stop, without fresh input, and for NaN or infinity. A stop
+    stays until a reset.
     """
     if events & STOP:
         s.stopped = 1
@@ -69,7 +69,7 @@ def allow(p: Record, s: Record, events: int, wanted_Hz: float, wanted_m: float) 
         s.allowed_Hz = inside_Hz
         largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * inside_Hz))
     else:
-        largest_m = 0.0  # no frequency was ever asked for
+        largest_m = 0.0  # no vibration was ever wanted, so there is no frequency
     if target_m > largest_m:
         target_m = largest_m
         if limit == NO_LIMIT:

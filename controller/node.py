@@ -18,7 +18,8 @@ from controller.records import LAYOUT_ID, build
 
 _STATE_EVERY = 10  # steps: 100 Hz
 _SNAPSHOT_EVERY = 1000  # steps: once a second
-_LATEST_BLOCKS = 256  # as many as the inbox holds: what is further behind was not delayed, its numbers began anew
+# Blocks that a late block may be behind, as many as the inbox holds. A block further behind comes from a rig that was restarted.
+_LATEST_BLOCKS = 256
 
 
 class ControllerNode:
@@ -48,12 +49,12 @@ class ControllerNode:
 
     @property
     def amplitude_m(self) -> float:
-        """Of the last command."""
+        """Amplitude of the last command [m]."""
         return float(self._state[0]["allowed_m"])
 
     @property
     def unreadable(self) -> bool:
-        """Whether the last block held a sample that is no number."""
+        """Whether the last block held a sample of NaN or infinity."""
         return int(self._trace[0]["limit"]) == wire.NOT_FINITE
 
     @property
@@ -69,20 +70,20 @@ class ControllerNode:
         )  # fmt: skip
 
     def reconfigure(self, config: ControllerConfig) -> None:
-        """Go on with another configuration; the memory stays."""
+        """Continue with another configuration and the present memory."""
         self._params, _ = build(config)
 
     def operator(self, action: int) -> None:
-        """A person's word; it takes effect with the next frame, where the log shows it."""
+        """Take an operator's action (`wire.Operator.Action`); it acts with the next frame, where the log shows it."""
         if action == wire.Operator.STOP:
             self._operator_events = STOP
         elif action == wire.Operator.RESET and not self._operator_events & STOP:
             self._operator_events = RESET
 
     def block(self, payload: bytes) -> Outgoing | None:
-        """Consume a sensor block: the command that answers it, or None for one seen before.
+        """Consume a sensor block; return the command that answers it, or None for a block that is late or repeated.
 
-        After this `rest` gives what else is to be sent, once the command is out.
+        Send the command first; then `rest` gives the other messages of the step.
         """
         payload = self._layout.canonical(payload, SENSORS.name)
         sequence, t_ns = sequence_and_time(payload, SENSORS.message)
@@ -90,7 +91,7 @@ class ControllerNode:
             line = f"{SENSORS.name}: block {sequence} after block {self._expected - 1}: must count up"
             raise Fault("BAD_MESSAGE", f"{line}; if the rig began anew, restart the controller too")
         if sequence < self._expected:
-            self.duplicates += 1  # late or repeated: what it would have told is already in a gap
+            self.duplicates += 1  # late or repeated: the controller has counted this block as a gap already
             return None
         gap_blocks = sequence - self._expected if self.steps else 0
         if self.steps and not gap_blocks and not self._length_checked:
@@ -102,7 +103,7 @@ class ControllerNode:
         return self._step(sensors, events, gap_blocks)
 
     def _check_length(self, apart_ns: int) -> None:
-        """Rates, filters and slopes count in blocks: those of another length would all be wrong."""
+        """Raise Fault CONFIG for blocks of another length: rates, filters and slopes count in blocks."""
         if abs(apart_ns - self._block_ns) > 0.01 * self._block_ns:
             line = f"{SENSORS.name}: blocks are {apart_ns * 1e-6:g} ms apart: must be block_s = {self._block_ns * 1e-9:g} s"
             raise Fault("CONFIG", f"{line}; set block_s of rig and controller alike")
@@ -128,7 +129,7 @@ class ControllerNode:
         return Outgoing(COMMAND, self._command.tobytes())
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
-        """What follows the command: the trace, now and then the plotted state and a snapshot of the memory."""
+        """The messages after the command: the trace, and at their rates the plotted state and a snapshot of the memory."""
         self._lateness_ns[0] = lateness_ns
         messages = [Outgoing(TRACE, self._trace.tobytes())]
         if self.steps % _STATE_EVERY == 0:
@@ -155,6 +156,6 @@ class ControllerNode:
         ):
             plotted[name] = trace[name]
         moving = trace.state > wire.STANDSTILL and trace.drive_velocity_mps > 0.0
-        measured = trace.limit not in (wire.STALE_INPUT, wire.NOT_FINITE)  # else the trace has what was measured last
+        measured = trace.limit not in (wire.STALE_INPUT, wire.NOT_FINITE)  # otherwise the trace repeats an old value
         plotted.velocity_ratio = trace.vibration_velocity_mps / trace.drive_velocity_mps if moving and measured else 0.0
         return Outgoing(STATE, self._plotted.tobytes())

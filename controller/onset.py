@@ -1,8 +1,9 @@
 """The estimate of stick-slip's onset from force, acceleration and drive position.
 
-While the contact sticks, the drive force climbs at k_d v_d; while it slides steadily it stays. So the force rate
-s = (dF_d/dt) / (k_d v_d) tells stick (1) from smooth sliding (0) some 900 ms before the slip, about 20 ms after the
-re-stick. Acceleration only confirms: a burst, the exciter's lines removed, makes a fall of the force a slip.
+While the contact sticks, the drive force climbs at k_d v_d; while the contact slides steadily, the force is constant. So the
+force rate s = (dF_d/dt) / (k_d v_d) tells stick (1) from smooth sliding (0) about 20 ms after the re-stick, some 900 ms before
+the slip. The acceleration only confirms: a fall of the force is a slip if the slide's acceleration, without the exciter's
+lines, bursts as well.
 """
 
 import math
@@ -11,10 +12,14 @@ from bridge.kernel import Record, kernel
 from controller.codes import SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
 from controller.config import FEWEST_WINDOW_BLOCKS, LONGEST_WINDOW_BLOCKS
 
-_SLIP_BLOCKS = 3
-_SCORE_SHARE = 0.2  # of a first-order filter of 5 blocks
-_HOLD_SHARE = 0.01  # v_d as held falls with 0.1 s, so that the vibration never dips when the drive slows
-_SLOPE_OF_SLIP_END = -1.0  # of k_d v_d: the force no longer falls
+_SLIP_BLOCKS = 3  # blocks over which the force of a slip falls
+# Share of the new value in the score's filter, a first-order filter of 5 blocks. Larger: noise moves the score. Smaller: stick is
+# seen later.
+_SCORE_SHARE = 0.2
+# Share a block by which the held v_d falls, a time constant of 0.1 s. Larger: the vibration dips when the drive slows. Smaller:
+# the vibration stays strong for longer than needed.
+_HOLD_SHARE = 0.01
+_SLOPE_OF_SLIP_END = -1.0  # slope of the force, over k_d v_d, above which the slip has ended
 
 
 @kernel
@@ -31,9 +36,9 @@ def _slope(ring: Record, at: int, count: int, block_s: float) -> float:
 def _filled(
     ring: Record, at: int, count: int, window_blocks: int, missing_blocks: int, value: float
 ) -> tuple[int, int]:
-    """Where the next block goes, and how many count, once the missing ones lie evenly between the last and `value`."""
+    """Fill the missing blocks of a ring evenly between its last value and `value`; return its next index and its count."""
     if count == 0 or 2 * missing_blocks >= window_blocks:
-        return at, 0  # most of the window would be made up
+        return at, 0  # begin anew, as at least half of the window would be interpolated
     last = ring[(at - 1) % LONGEST_WINDOW_BLOCKS]
     for i in range(missing_blocks):
         ring[(at + i) % LONGEST_WINDOW_BLOCKS] = last + (value - last) * (i + 1.0) / (missing_blocks + 1.0)
@@ -42,10 +47,9 @@ def _filled(
 
 @kernel
 def fill_gap(p: Record, s: Record, missing_blocks: int, force_N: float, position_m: float) -> None:
-    """Bridge the blocks that are missing before this one, so that the slopes go on.
+    """Interpolate the lost blocks before this block, as the rings hold blocks one period apart.
 
-    The rings hold blocks one period apart. To begin anew instead takes 20 whole blocks until v_d is measured: with one lost
-    in every 15 it never was, and a drive that went faster slipped at v_a / v_d = 0.76.
+    Emptied rings would need 20 blocks without a loss until v_d is measured again (docs/method/controller.md).
     """
     s.force_at, s.force_count = _filled(s.force_N, s.force_at, s.force_count, p.window_blocks, missing_blocks, force_N)
     s.position_at, s.position_count = _filled(
@@ -55,7 +59,7 @@ def fill_gap(p: Record, s: Record, missing_blocks: int, force_N: float, position
 
 @kernel
 def drive_velocity(p: Record, s: Record, position_m: float) -> None:
-    """Measure v_d from the drive position, mean of the block [m]."""
+    """Measure v_d from the drive position, the mean of the block [m]."""
     s.position_m[s.position_at] = position_m
     s.position_at = (s.position_at + 1) % LONGEST_WINDOW_BLOCKS
     s.position_count = min(s.position_count + 1, p.velocity_window_blocks)
@@ -68,9 +72,9 @@ def drive_velocity(p: Record, s: Record, position_m: float) -> None:
 
 @kernel
 def contact(p: Record, s: Record, force_N: float, burst_mps2: float) -> None:
-    """Judge the contact from the force, mean of the block [N], and the slide's burst, rms of the block [m/s2]."""
+    """Judge the contact from the force, the mean of the block [N], and the slide's burst, the rms of the block [m/s2]."""
     s.burst_mps2 = burst_mps2
-    s.burst_held_mps2 = max(burst_mps2, 0.8 * s.burst_held_mps2)  # a burst counts for some 10 blocks
+    s.burst_held_mps2 = max(burst_mps2, 0.8 * s.burst_held_mps2)  # a burst acts for some 10 blocks
     s.force_N[s.force_at] = force_N
     s.force_at = (s.force_at + 1) % LONGEST_WINDOW_BLOCKS
     s.force_count = min(s.force_count + 1, p.window_blocks)
@@ -103,7 +107,7 @@ def contact(p: Record, s: Record, force_N: float, burst_mps2: float) -> None:
 
 @kernel
 def known_breakaway_N(p: Record, s: Record) -> float:
-    """The force at which the contact breaks away, learnt or configured; 0 while unknown."""
+    """The breakaway force, learnt or configured [N]; 0 while unknown."""
     return s.breakaway_N if s.breakaway_N > 0.0 else p.breakaway_force_N
 
 
@@ -119,9 +123,9 @@ def _count_slips(p: Record, s: Record, force_N: float, expected_N_per_s: float) 
         if fast and s.burst_held_mps2 > p.slip_burst_mps2:
             s.slipping = 1
             s.slips += 1
-            if s.allowed_m == 0.0:  # a vibrated contact breaks away below its own force
+            if s.allowed_m == 0.0:  # a vibrated contact breaks away at a lower force
                 s.breakaway_N = s.peak_N if s.breakaway_N == 0.0 else 0.7 * s.breakaway_N + 0.3 * s.peak_N
     elif drop_N < -_SLOPE_OF_SLIP_END * math.fabs(expected_N_per_s) * _SLIP_BLOCKS * p.block_s:
         s.slipping = 0
         s.peak_N = force_N
-        s.force_count = 0  # the slope of the stick that begins must not remember the fall
+        s.force_count = 0  # the slope of the next stick must not contain the fall of the force

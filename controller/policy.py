@@ -1,9 +1,9 @@
-"""When to vibrate, how strongly, at which frequency. What it wants may be wrong; `limits` decides what is allowed.
+"""When to vibrate, how strongly, at which frequency. A wrong policy does no harm: `limits` decides which vibration is allowed.
 
-WATCH   no vibration; a stick that builds up leads to EXCITE, or to WAIT when it is too late for this slip
-WAIT    switching on past the point of no return causes the slip it should prevent: wait for the re-stick
+WATCH   no vibration; a stick leads to EXCITE, or to WAIT when it is too late for the coming slip
+WAIT    a vibration that starts this late causes the slip that it should prevent: wait for the re-stick
 EXCITE  hold v_a at v_ratio v_d; just above v_d at first where breakaway is near
-PROBE   every now and then fade out: a stick means it is still needed, none for a while means it is not
+PROBE   fade out from time to time: a stick shows that the vibration is still needed, smooth sliding that it is not
 """
 
 import math
@@ -32,13 +32,20 @@ from controller.codes import (
 from controller.onset import known_breakaway_N
 
 TWO_PI = 2.0 * math.pi
-_SMOOTH_STEPS_TO_RAISE = 200  # gentle until it has slid smoothly this long
-_RELAXED_STEPS = 500  # no slip came: the drive slowed down
-_FREE_STEPS_TO_TRIM = 10  # the measurement's filter and delay must have seen the unlimited command
-_LEAST_SHARE_TO_TRIM = 0.02  # of the set point: less means a dead accelerometer, not a weak piezo
-_LARGEST_LOG_GAIN = 3.4  # a factor of 30 either way: a lightly damped mount amplifies 10 to 25 times
-_WEAK_STEPS = 50  # in a row, to be called weak and to be called so no longer: noise around 1.05 must not switch it
-_ALARM_RATIO = 1.05  # 1.00 fails, 1.05 passes
+# Steps of smooth sliding until a gentle vibration is raised. Fewer: the raise may cause a slip. More: weak for longer.
+_SMOOTH_STEPS_TO_RAISE = 200
+# Steps without stick after which WAIT ends without a slip, as when the drive slows down.
+_RELAXED_STEPS = 500
+# Steps without a limit before the amplitude is trimmed. Fewer: filter and delay still show the limited command. More: late trim.
+_FREE_STEPS_TO_TRIM = 10
+# Share of the set point below which the measured v_a is not trusted. Larger: a weak piezo is not trimmed. Smaller: the noise of
+# a dead accelerometer is.
+_LEAST_SHARE_TO_TRIM = 0.02
+# Largest correction, a factor of 30 either way. Smaller: a lightly damped mount, which amplifies 10 to 25 times, is not held.
+_LARGEST_LOG_GAIN = 3.4
+# Steps in a row until a piezo is called weak, and until no longer. Fewer: noise around 1.05 switches. More: it is told late.
+_WEAK_STEPS = 50
+_ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak: 1.00 does not stop stick-slip, 1.05 does
 
 
 @kernel
@@ -137,9 +144,9 @@ def _judge_piezo(s: Record, weak: bool) -> None:
 
 @kernel
 def want(p: Record, s: Record) -> None:
-    """Turn the wanted velocity into frequency and amplitude, trimmed until the measured v_a is what was wanted.
+    """Turn the wanted velocity into frequency and amplitude, and trim the amplitude by the measured v_a.
 
-    The loop works on the logarithm, where the exciter's unknown gain is a constant: its margins hold for any mount.
+    The loop works on logarithms, where the exciter's unknown gain is a constant, so its margins hold for any mount.
     """
     velocity_mps = s.wanted_velocity_mps
     if velocity_mps <= 0.0:
@@ -148,7 +155,7 @@ def want(p: Record, s: Record) -> None:
         return
     trusted = s.vibration_velocity_mps > _LEAST_SHARE_TO_TRIM * velocity_mps
     settled = s.free_steps > _FREE_STEPS_TO_TRIM
-    too_strong = s.vibration_velocity_mps > velocity_mps  # trimmed at once: a resonating mount must not ring up
+    too_strong = s.vibration_velocity_mps > velocity_mps  # trimmed at once, so that a resonating mount does not ring up
     if trusted and (settled or too_strong) and s.mode == EXCITE:
         s.log_gain += p.loop_gain * (math.log(velocity_mps) - math.log(s.vibration_velocity_mps))
         s.log_gain = min(max(s.log_gain, -_LARGEST_LOG_GAIN), _LARGEST_LOG_GAIN)
@@ -159,5 +166,5 @@ def want(p: Record, s: Record) -> None:
             s.wanted_Hz = higher_Hz
             s.wanted_m = velocity_mps * math.exp(s.log_gain) / (TWO_PI * higher_Hz)
     largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz))
-    helpless = s.wanted_m > largest_m or (settled and not trusted)  # or nothing arrives, and nothing holds it back
+    helpless = s.wanted_m > largest_m or (settled and not trusted)  # too weak at its limit, or no vibration arrives
     _judge_piezo(s, helpless and s.vibration_velocity_mps < _ALARM_RATIO * s.drive_velocity_mps)

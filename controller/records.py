@@ -1,4 +1,4 @@
-"""The numbers a controller runs on, and all of its memory. A zeroed memory is a controller at its start."""
+"""The derived numbers of a controller, and all of its memory. A memory of zeros is a controller at its start."""
 
 import hashlib
 import math
@@ -82,18 +82,18 @@ STATE = np.dtype(
         ("wanted_velocity_mps", "f8"),
         ("wanted_Hz", "f8"),
         ("wanted_m", "f8"),
-        ("weak_steps", "i8"),  # in a row that the piezo was too weak; below 0: that it was not
+        ("weak_steps", "i8"),  # steps in a row in which the piezo was too weak; below 0: in which it was not
         # limits
         ("allowed_Hz", "f8"),
         ("allowed_m", "f8"),
         ("limit", "i8"),
-        ("free_steps", "i8"),  # since a limit last changed the command
+        ("free_steps", "i8"),  # steps since a limit last changed the command
         ("stopped", "i8"),
         ("stale", "i8"),
         # bookkeeping
         ("steps", "i8"),
         ("block", "i8"),
-        ("missing_blocks", "i8"),  # since the last one that could be used
+        ("missing_blocks", "i8"),  # lost blocks since the last usable block
     ],
     align=True,
 )

@@ -1,7 +1,7 @@
-"""Today's controller on the frames that a log says were consumed: would it have done the same?
+"""Today's controller on the frames that a log holds as consumed: does it give the same commands and traces?
 
-Inputs are fed, outputs are compared; no output is ever copied from the log. The only field left out is the trace's
-lateness: it was read from a clock and decides nothing.
+Inputs are fed, outputs are compared; no output is ever copied from the log. The only field that is not compared is the
+lateness in the trace, which comes from a clock and decides nothing.
 """
 
 from typing import Any, NamedTuple
@@ -22,14 +22,14 @@ _NO_ROW = -1
 
 
 class Change(NamedTuple):
-    """From `t_ns` on the controller runs with this configuration; its memory stays."""
+    """A change of configuration at `t_ns`; the memory stays."""
 
     t_ns: int
     config: ControllerConfig
 
 
 class Difference(NamedTuple):
-    """Where a replay first departs from the log."""
+    """The first place where a replay differs from the log."""
 
     table: str  # command or trace
     step: int
@@ -41,7 +41,7 @@ class Difference(NamedTuple):
 
 
 class Replay(NamedTuple):
-    """What today's controller answers to the frames of a log, one row a step that could be replayed."""
+    """The answers of today's controller to the frames of a log, one row for each step that could be replayed."""
 
     steps: npt.NDArray[np.int64]  # sequence of each replayed step
     command: Records
@@ -52,7 +52,7 @@ class Replay(NamedTuple):
 
     @property
     def identical(self) -> bool:
-        """Whether every bit that was compared is the same."""
+        """Whether every compared bit is the same."""
         return self.difference is None
 
 
@@ -70,7 +70,7 @@ def _steps(
     scratch: npt.NDArray[np.float64],
 ) -> None:
     for i in range(rows.shape[0]):
-        row = max(rows[i], 0)  # a step without a block does not look at it
+        row = max(rows[i], 0)  # a step without a block does not read its row
         step(
             params, state, sensors[row : row + 1], events[i], gap_blocks[i], t_ns[i],
             command[i : i + 1], trace[i : i + 1], scratch,
@@ -81,10 +81,11 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
     """Replay a log from `from_s` on, starting at the last snapshot before it (or at the run's start).
 
     Args:
+        run: the log.
         changes: configurations in order of time; the first holds from the start.
         from_s: only steps from this time on are compared and returned.
 
-    Raises Fault BAD_LOG where two controllers answered, whose steps cannot be told apart.
+    Raises Fault BAD_LOG where two controllers answered, as their steps cannot be told apart.
 
     """
     trace = run.trace
@@ -141,7 +142,7 @@ def _rows(sensors: Records, block: Any, events: npt.NDArray[np.int64]) -> npt.ND
 
 
 def _until(sequence: Any, rows: Any, events: Any, start: int) -> int:
-    """End of the stretch from `start` whose every step can be rebuilt."""
+    """End of the stretch from `start` in which every step can be rebuilt."""
     jumps = np.flatnonzero(np.diff(sequence[start:]) != 1)
     missing = np.flatnonzero((rows[start:] == _NO_ROW) & (events[start:] & BLOCK != 0))
     ends = [len(sequence) - start]
@@ -153,7 +154,7 @@ def _until(sequence: Any, rows: Any, events: Any, start: int) -> int:
 
 
 def _spans(changes: list[Change], t_ns: Any, start: int, end: int) -> list[tuple[int, int, Any]]:
-    """The stretch cut where the configuration changes."""
+    """The stretch, cut where the configuration changes: start, end and parameters of each part."""
     spans: list[tuple[int, int, Any]] = []
     for change, following in zip(changes, [*changes[1:], None], strict=True):
         first = max(start, int(np.searchsorted(t_ns, change.t_ns)) if change.t_ns > 0 else 0)
@@ -164,7 +165,7 @@ def _spans(changes: list[Change], t_ns: Any, start: int, end: int) -> list[tuple
 
 
 def _start(run: RunData, sequence: Any, from_ns: int, memory: Any) -> int:
-    """Index of the first step to replay, its memory restored."""
+    """Index of the first step to replay, after its memory is restored."""
     usable = [s for s in run.snapshots if s.layout == LAYOUT_ID and s.t_ns < from_ns]
     if usable:
         after = _restore(sequence, usable[-1], memory)
@@ -177,7 +178,7 @@ def _start(run: RunData, sequence: Any, from_ns: int, memory: Any) -> int:
 
 
 def _resume(run: RunData, sequence: Any, at: int, memory: Any) -> int:
-    """Index after the next snapshot from index `at` on; the end when there is none."""
+    """Index after the next snapshot from index `at` on, after its memory is restored; the end without a snapshot."""
     if at >= len(sequence):
         return at
     for snapshot in run.snapshots:
@@ -189,7 +190,7 @@ def _resume(run: RunData, sequence: Any, at: int, memory: Any) -> int:
 
 
 def _restore(sequence: Any, snapshot: Any, memory: Any) -> int | None:
-    """Index of the step after a snapshot, its memory restored; None when that step is not in the log."""
+    """Index of the step after a snapshot, after its memory is restored; None when that step is not in the log."""
     after = int(np.searchsorted(sequence, snapshot.step + 1))
     if after == len(sequence) or sequence[after] != snapshot.step + 1:
         return None
@@ -203,7 +204,7 @@ def _first_difference(run: RunData, rows: Any, steps: Any, command: Records, tra
     place = np.searchsorted(run.command["sequence"], steps)
     place = np.minimum(place, max(len(run.command) - 1, 0))
     logged_command = run.command[place]
-    there = logged_command["sequence"] == steps  # a command that the recorder lost cannot be compared
+    there = logged_command["sequence"] == steps  # commands that the recorder lost cannot be compared
     tables = (
         ("trace", TRACE, logged_trace, trace, np.ones(len(steps), bool)),
         ("command", COMMAND, logged_command, command, there),

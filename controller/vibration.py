@@ -1,4 +1,4 @@
-"""What the accelerometers say about the vibration: the delivered v_a, and the slide's burst without the exciter's lines."""
+"""The vibration as the accelerometers measure it: the delivered v_a, and the slide's burst without the exciter's lines."""
 
 import math
 
@@ -9,10 +9,10 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def _fit(samples: Record, step_rad: float, start_rad: float) -> tuple[float, float]:
-    """Fit a cos + b sin at one frequency to `samples` by least squares.
+    """Fit a cos + b sin at one frequency to `samples` by least squares; return a and b.
 
-    Exact for a pure sine however many periods a block holds, where a plain correlation leaks. The angle is turned from
-    sample to sample: two sines a block instead of forty, which is what a replay's speed hangs on.
+    The fit is exact for a pure sine over any share of a period, where a plain correlation leaks. The angle is turned from
+    sample to sample: two sines a block instead of forty, as the sines set the speed of a replay.
     """
     c, sn = math.cos(start_rad), math.sin(start_rad)
     turn_c, turn_sn = math.cos(step_rad), math.sin(step_rad)
@@ -35,7 +35,7 @@ def _fit(samples: Record, step_rad: float, start_rad: float) -> tuple[float, flo
 
 @kernel
 def _remove_line(samples: Record, step_rad: float) -> None:
-    """Take the best fitting line at one frequency out of `samples`, in place."""
+    """Subtract the best fitting line at one frequency from `samples`, in place."""
     a, b = _fit(samples, step_rad, 0.0)
     c, sn = 1.0, 0.0
     turn_c, turn_sn = math.cos(step_rad), math.sin(step_rad)
@@ -71,7 +71,7 @@ def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
 
 @kernel
 def skip(p: Record, s: Record, blocks: int) -> None:
-    """Turn the demodulator's phase through blocks that were not measured: the exciter went on."""
+    """Turn the demodulator's phase through lost blocks, during which the exciter went on."""
     s.phase_rad = (s.phase_rad + TWO_PI * s.allowed_Hz * p.block_s * blocks) % TWO_PI
 
 
