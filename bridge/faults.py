@@ -101,6 +101,13 @@ FAULTS = {
             "A score of it would mean nothing. Find the files as they were made, or make a new set.",
         ),
         FaultKind(
+            "MISSING_EXTRA",
+            12,
+            "Installed without an extra, stickslip controls, records, replays and judges runs. Diagnosis, tables and reports "
+            "need more packages, of which the line names the first that is not there. `pip install 'stickslip[all]'` adds them "
+            "to the environment that has stickslip; with pipx or uv, install stickslip anew with [all]. Nothing was started.",
+        ),
+        FaultKind(
             "INTERRUPTED",
             130,
             "Somebody pressed Ctrl-C. In real time the vibration was ramped down first. A log that was being written is closed, "

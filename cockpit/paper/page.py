@@ -4,6 +4,8 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from jinja2 import Environment, StrictUndefined  # here, so that it is missed before minutes of simulation
+
 from cockpit.paper.claims import PAPER_CLAIMS, PaperRow, paper_claims, parameter_rows, reference_rows, slip_rows
 from cockpit.paper.runs import (
     CYCLES_FROM_S,
@@ -78,8 +80,6 @@ def _simulate(progress: bool) -> dict[Key, PairRun]:
 
 
 def _page(result: ReproduceResult, runs: dict[Key, PairRun]) -> str:
-    from jinja2 import Environment, StrictUndefined
-
     from cockpit.paper.plots import figures
 
     groups: dict[str, list[PaperRow]] = {}

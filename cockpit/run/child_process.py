@@ -11,6 +11,8 @@ from typing import Any
 from bridge.faults import Fault
 
 _PARENT_CHECK_S = 0.25
+# what `stickslip[all]` brings and a plain installation lacks
+EXTRA_MODULES = frozenset({"jinja2", "joblib", "nptdms", "pyarrow", "threadpoolctl"})
 
 
 def stop_event(parent: int = 0) -> threading.Event:
@@ -73,3 +75,9 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         return report(fault, as_json)
     except KeyboardInterrupt:
         return report(Fault("INTERRUPTED", "stopped by Ctrl-C"), as_json)
+    except ModuleNotFoundError as error:
+        module = (error.name or "").partition(".")[0]
+        if module not in EXTRA_MODULES:
+            raise
+        line = f"this command needs {module}, which is not installed; pip install 'stickslip[all]'"
+        return report(Fault("MISSING_EXTRA", line), as_json)

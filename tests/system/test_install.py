@@ -1,12 +1,17 @@
 """The installed command where a stranger calls it: beside files that have the names of its packages."""
 
+import json
+import os
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from bridge.faults import FAULTS
+from cockpit.run.child_process import EXTRA_MODULES
 from tests import made_up
 from tests.system.ports import free_endpoint
 
@@ -23,9 +28,17 @@ def crowded(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def call(folder: Path, *arguments: str, status: int = 0) -> str:
-    """What the command says on stdout; it has to end with that exit status."""
-    done = subprocess.run([STICKSLIP, *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+def call(folder: Path, *arguments: str, status: int = 0, search: Path | None = None) -> str:
+    """What the command says on stdout; it has to end with that exit status.
+
+    Args:
+        search: a folder of modules that come before the installed ones, in child processes too.
+
+    """
+    env = os.environ | ({} if search is None else {"PYTHONPATH": str(search)})
+    done = subprocess.run(
+        [STICKSLIP, *arguments], cwd=folder, env=env, capture_output=True, text=True, timeout=120, check=False
+    )
     assert done.returncode == status, done.stderr
     return done.stdout
 
@@ -41,3 +54,90 @@ def test_workers_of_a_diagnosis_in_a_folder_with_files_of_the_same_names(crowded
         (made_up.evidence_folder(crowded / name) / "run-01.csv").unlink()
     said = call(crowded, "diagnose", "first", "second", "--jobs", "2", status=FAULTS["BAD_EVIDENCE"].exit_status)
     assert said.count("run-01.csv") == 2
+
+
+# all in one process, where importing costs its two seconds once; `--lockstep` starts plant, controller and recorder
+BASE = """
+import sys
+from cockpit.cli import app
+from cockpit.run import operator
+
+for line in sys.argv[1:]:
+    try:
+        app(line.split())
+    except SystemExit as ended:
+        if ended.code:
+            sys.exit(f"{line}: {ended.code}")
+"""
+
+
+@pytest.fixture
+def plain(tmp_path: Path) -> Path:
+    """A folder that hides all that only extras bring."""
+    folder = tmp_path / "hidden"
+    folder.mkdir()
+    for name in (*EXTRA_MODULES, "dask", "distributed", "hypothesis", "mujoco", "pandas", "sklearn"):
+        (folder / f"{name}.py").write_text(f"raise ModuleNotFoundError('No module named {name}', name='{name}')\n")
+    return folder
+
+
+def test_what_a_plain_installation_does_needs_no_extra(tmp_path: Path, plain: Path) -> None:
+    lines = [
+        "run --in-process --set duration_s=0.5 --log run.mcap",
+        f"run --lockstep --set duration_s=0.5 --log bus.mcap --endpoint {free_endpoint()}",
+        "replay run.mcap",
+        "log info run.mcap",
+        "log check run.mcap",
+        "log recover run.mcap --out whole.mcap",
+        "plot run.mcap",
+        "scenarios",
+        "explain",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", BASE, *lines], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(plain)},
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run.png").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("diagnose", "evidence"),
+        ("blind", "run", "set"),
+        ("log", "export", "run.mcap", "--to", "run.csv"),
+        ("log", "import", "run.csv", "--map", "map.toml", "--out", "evidence"),
+        ("reproduce",),
+    ],
+    ids=lambda arguments: " ".join(arguments[:2]),
+)
+def test_a_command_names_the_extra_that_is_missing(tmp_path: Path, plain: Path, arguments: tuple[str, ...]) -> None:
+    kind = FAULTS["MISSING_EXTRA"]
+    env = os.environ | {"PYTHONPATH": str(plain)}
+    done = subprocess.run(
+        [STICKSLIP, *arguments], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == kind.exit_status
+    assert re.fullmatch(
+        r"stickslip: MISSING_EXTRA: this command needs (\w+), which is not installed; pip install 'stickslip\[all\]'\n",
+        done.stderr,
+    )
+    assert done.stdout == ""
+
+
+def test_the_missing_extra_as_json(tmp_path: Path, plain: Path) -> None:
+    kind = FAULTS["MISSING_EXTRA"]
+    said = call(tmp_path, "reproduce", "--json", status=kind.exit_status, search=plain)
+    assert json.loads(said) == {
+        "fault": kind.code,
+        "line": "this command needs jinja2, which is not installed; pip install 'stickslip[all]'",
+        "exit_status": kind.exit_status,
+    }
+
+
+def test_all_that_the_extras_bring_is_told_of() -> None:
+    extras = tomllib.loads(Path("pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert extras["all"] == ["stickslip[diagnosis,tables]"]
+    names = {re.split(r"[\[>=]", line)[0] for line in (*extras["diagnosis"], *extras["tables"])}
+    assert names - {"stickslip"} == EXTRA_MODULES
