@@ -22,7 +22,7 @@ pairs, effects          the friction pairs; the effects that a real rig has and 
 records                 the derived numbers (`PARAMS`) and all memory (`STATE`)
 contact, piezo          one step of friction and slide; the motion of the base
 core                    one block of contact, drive, piezo and analogue filters: `advance`, `advance_disturbed` with effects
-four_rigs, four_rigs_step   the same for four rigs at once, in vector registers; one step of them
+four_rigs*              the same for four rigs at once, in vector registers; one step of them
 sensors                 the digital half of the channels
 step                    one whole block with its messages
 simulate                a run without bus and sensors

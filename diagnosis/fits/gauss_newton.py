@@ -45,9 +45,8 @@ class Stage(NamedTuple):
     steps: int  # at most
     renewals: int  # renewals of the nuisances' derivatives that may gain nothing before the fit ends
     knee: float  # of the compression, in noise floors
-    columns: bool = (
-        True  # whether to compute the derivatives where the fit ends; otherwise the last step's derivatives stay
-    )
+    # whether to compute the derivatives where the fit ends; otherwise those of the last step stay
+    columns: bool = True
 
 
 # Knee of the compression for a start far from the runs, in noise floors. Too small: far differences are cut flat and give no
@@ -55,9 +54,8 @@ class Stage(NamedTuple):
 FAR_KNEE = 60.0
 _FAR = Stage(4, 1, FAR_KNEE)
 _NEAR = Stage(6, 1, KNEE)
-_RETUNE = Stage(
-    9, 3, KNEE
-)  # of the baseline: more steps and renewals than other fits, as every fit is compared with it
+# of the baseline: more steps and renewals than other fits, as every fit is compared with it
+_RETUNE = Stage(9, 3, KNEE)
 _QUICK = Stage(2, 0, FAR_KNEE, columns=False)
 # Largest difference, in noise floors, from which a refit begins with the far stage. Too small: fits that are near lose time
 # there. Too large: fits start where the compression is nearly flat.

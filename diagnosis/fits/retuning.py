@@ -34,9 +34,8 @@ _SLIPS_OF_OTHERS = 8.0
 _SMOOTHEST, _ROUGHEST = 0.002, 0.005
 FIRST_REPLICATES, REPLICATES = 12, 32
 _NEW_REPLICATES = 24  # that the floor does not know
-_LEAST_EXPECTED = (
-    0.2  # of chi2 a compared feature: what the least floors promise is not held against a rig that is better
-)
+# of chi2 a compared feature: what the least floors promise is not held against a rig that is better
+_LEAST_EXPECTED = 0.2
 
 
 class Retuned(NamedTuple):
