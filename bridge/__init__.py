@@ -4,7 +4,7 @@ wire/     messages on the bus, for every language: stickslip.proto, PROTOCOL.md,
 log/      run logs (MCAP): written, recorded, read whole or cut, checked
 tables/   CSV, Parquet, MATLAB and TDMS, in and out
 
-config    strict TOML                            faults   codes, exit statuses and what to do
-files     what cannot be read; written whole     units    units in names, numbers in words
-kernel    compiled code and where it is kept
+config    strict TOML                              faults   codes, exit statuses and help
+files     checks before reading, atomic writing    units    units in names, numbers in words
+kernel    compiled code and its cache
 """

@@ -16,7 +16,7 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-# two numbers; TOML has only arrays, which strictness would not take for a tuple
+# two numbers; not strict, as TOML has only arrays and pydantic's strict mode refuses an array for a tuple
 Two = Annotated[tuple[float, float], Field(strict=False)]
 
 T = TypeVar("T", bound=Strict)
@@ -32,12 +32,15 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
     except UnicodeDecodeError as error:
         raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
-    except (ValueError, RecursionError) as error:  # Python's own too: 5000 digits, brackets 1000 deep
+    except (ValueError, RecursionError) as error:  # also Python's own limits: 5000 digits, brackets 1000 deep
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}") from None
 
 
 def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, Any]:
-    """Return `table` with `key.sub=value` settings applied; values are TOML (`1.1`, `true`, `"text"`, `[1, 2]`)."""
+    """A copy of `table` with `key.sub=value` settings applied; values are TOML (`1.1`, `true`, `"text"`, `[1, 2]`).
+
+    Raises Fault CONFIG when a setting has no `=`, or goes below a value that is not a table.
+    """
     result = _copied(table)
     for setting in settings:
         key, separator, text = setting.partition("=")
@@ -62,7 +65,7 @@ def _copied(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def validate(model: type[T], table: dict[str, Any], source: str) -> T:
-    """Turn a table into `model`. Raises Fault CONFIG: source: key = value: rule; remedy, one line a problem."""
+    """An instance of `model` from a table. Raises Fault CONFIG, a line for each problem: source: key = value: rule; remedy."""
     try:
         return model.model_validate(table)
     except ValidationError as error:
@@ -98,6 +101,6 @@ def _keys_beside(model: type[Strict], path: list[str]) -> list[str]:
         if hasattr(at, "model_fields"):
             field = at.model_fields.get(part)
             at = field.annotation if field else None
-        else:  # an index of a list, or a name in a dict: what these hold comes last
+        else:  # an index of a list, or a key of a dict: the type of their items is the last type argument
             at = (get_args(at) or (None,))[-1]
     return sorted(at.model_fields) if hasattr(at, "model_fields") else []

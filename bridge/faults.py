@@ -1,4 +1,4 @@
-"""Everything that can go wrong and that a person has to act on: a short code, an exit status, a paragraph of help."""
+"""Every fault that a person has to act on: a short code, an exit status, a paragraph of help."""
 
 from typing import NamedTuple
 
@@ -118,7 +118,10 @@ FAULTS = {
 
 
 class Fault(Exception):
-    """A fault with its code and one clear line for the person in front of the machine."""
+    """A fault: its row of `FAULTS`, and one line for the user.
+
+    The line has the form `where = value: rule; what to do`. Raises KeyError for a code that is not in `FAULTS`.
+    """
 
     def __init__(self, code: str, line: str) -> None:
         self.kind = FAULTS[code]
@@ -126,5 +129,5 @@ class Fault(Exception):
         Exception.__init__(self, f"{code}: {line}")
 
     def __reduce__(self) -> tuple[type["Fault"], tuple[str, str]]:
-        """For another process: an exception is made again from its one message otherwise."""
+        """Pickle code and line, for another process; by default an exception is made again from its message alone."""
         return Fault, (self.kind.code, self.line)

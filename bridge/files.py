@@ -1,4 +1,4 @@
-"""Files: a clear line for one that cannot be read; text and strict JSON written whole or not at all."""
+"""Files: a clear line for a file that cannot be read; text and strict JSON written whole or not at all."""
 
 import json
 import math
@@ -11,10 +11,13 @@ from bridge.faults import Fault
 
 
 def check_file(path: Path, code: str, remedy: str) -> None:
-    """Raise Fault `code` where there is no file, or where the operating system does not let it be looked at."""
+    """Raise Fault `code` when `path` is not a file, or when the operating system does not let it be read.
+
+    The fault's line ends in `remedy`.
+    """
     try:
         mode = path.stat().st_mode
-    except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError: no name that a file can have
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError: a name that no file can have
         why = "no such file"
     except OSError as error:
         why = f"cannot be read: {error.strerror}"
@@ -26,14 +29,14 @@ def check_file(path: Path, code: str, remedy: str) -> None:
 
 
 def shown(path: Path) -> str:
-    """The path as a text that can be printed: bytes of a name that are not UTF-8 are spelt out."""
+    """The path as printable text; bytes that are not UTF-8 are written in hexadecimal."""
     return os.fsencode(path).decode(errors="backslashreplace")
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file, its folder too, whole or not at all; a link stays one. Raises OSError.
+    """Write a text file whole or not at all, and make its folder. A symbolic link stays a link. Raises OSError.
 
-    What is no file, like /dev/null or a pipe, is written into: it must never be replaced.
+    A path that is not a regular file, such as /dev/null or a pipe, is written into and never replaced.
     """
     if path.is_relative_to("/dev") or (path.exists() and not path.is_file()):
         path.write_text(text, encoding="utf-8")
@@ -49,7 +52,7 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def strict_json(value: Any) -> Any:
-    """`value` with null for NaN and infinity, which JSON does not know."""
+    """`value` with None (null) for NaN and infinity, which JSON does not have; lists and dicts are copied."""
     if isinstance(value, dict):
         return {key: strict_json(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
@@ -58,5 +61,5 @@ def strict_json(value: Any) -> Any:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a file, its folder too. Raises OSError."""
+    """Write `value` as strict JSON, whole or not at all, and make the folder. Raises OSError."""
     write_whole(path, json.dumps(strict_json(value), allow_nan=False, indent=1) + "\n")

@@ -1,4 +1,4 @@
-"""How hot code is compiled: numba, cached on disk, without the flags that change bits."""
+"""Compilation of hot code: numba, cached on disk, without the flags that change bits."""
 
 import atexit
 import hashlib
@@ -17,20 +17,20 @@ import numpy.typing as npt
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# A record: one element of a numpy structured array, `array[0]`, read and written by field name. Numba and the plain
-# interpreter both accept it. A kernel call costs 0.5 us with records and 8.5 us with NamedTuples of the same 70
-# numbers (measured), and a record's bytes are the snapshot that the log keeps.
+# A record: one element of a numpy structured array, `array[0]`, read and written by field name. Both numba and the plain
+# interpreter accept a record. A kernel call costs 0.5 us with records and 8.5 us with NamedTuples of the same 70 numbers
+# (docs/decisions/1-records-not-namedtuples.md), and the bytes of a record are the snapshot that the log keeps.
 Record = Any
 
 
-PACKAGES = ("bridge", "controller", "plant", "diagnosis")  # those that hold kernels, or constants that kernels freeze
+PACKAGES = ("bridge", "controller", "plant", "diagnosis")  # with kernels, or with constants that kernels freeze
 
 
 def sources_digest(root: Path) -> str:
     """A hash over every source file of PACKAGES below `root`, sub-packages included.
 
-    Numba renews a cached kernel when its own file changes, not when a kernel that it calls does: without this, an edit of
-    plant/contact.py would leave plant/core.py running the old contact.
+    Numba renews a cached kernel when the kernel's own file changes, but not when a kernel that it calls changes. Without this
+    hash, plant/core.py would run the old contact after an edit of plant/contact.py.
     """
     digest = hashlib.sha256()
     for package in PACKAGES:
@@ -40,14 +40,14 @@ def sources_digest(root: Path) -> str:
 
 
 def _cache_folder() -> Path:
-    """A folder of its own for every version of the kernels' sources."""
-    # `Path.home` fails for a user without one
+    """The cache folder of this version of the kernels' sources."""
+    # not `Path.home`, which fails for a user without a home
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     return Path(home) / "stickslip" / sources_digest(Path(__file__).parent.parent)
 
 
 def _usable(folder: Path) -> Path:
-    """The folder, or where nothing can be written there one for this process and those that it starts, gone at its end."""
+    """The folder; when it is not writable, a temporary one for this process and its children, removed when this one ends."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -70,10 +70,10 @@ _settings.CACHE_DIR = str(_usable(Path(os.environ.get(_CACHE) or _cache_folder()
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function`; `NUMBA_DISABLE_JIT=1` runs it interpreted, with the same bits.
+    """Compile `function`. With `NUMBA_DISABLE_JIT=1` it runs interpreted, with the same bits.
 
-    `fastmath` stays off and kernels use `math.*` on scalars: fast maths and numpy's own vector maths both change the
-    last bit, and replay promises the same bits. Numpy's rules for division spare a check before each one.
+    `fastmath` stays off and kernels use `math.*` on scalars: fast maths and numpy's vector maths both change the last bit, and
+    replay guarantees equal bits. With numpy's rules for division (1 / 0 is infinite) numba checks no divisor.
     """
     compiled: Any = numba.njit(cache=True, fastmath=False, error_model="numpy")(function)
     return compiled

@@ -19,7 +19,7 @@ _UNITS = (
 
 
 def unit_of(name: str) -> str:
-    """Unit of `name`, as `N` for `drive_force_N`; `1` for a number without a unit, as a count or a code."""
+    """Unit of `name`, such as `N` for `drive_force_N`; `1` for a number without a unit, such as a count or a code."""
     return next((unit for suffix, unit in _UNITS if name.endswith(suffix)), "1")
 
 
@@ -30,13 +30,14 @@ _WITHOUT_PREFIX = {"", "%", "kg", "rad", "1/s"}
 
 
 def signal_name(column: str) -> str:
-    """`mass_accel_mps2` as `mass acceleration`."""
+    """A column in words: `mass_accel_mps2` is `mass acceleration`."""
     return name_and_unit(column)[0].replace("accel", "acceleration")
 
 
 def name_and_unit(name: str) -> tuple[str, str]:
-    """`gap_m` as ("gap", "m"); a bare `ratio` is given in percent, other numbers without a unit have the unit "".
+    """A parameter in words, and its unit: `gap_m` is ("gap", "m").
 
+    `ratio` alone is a relative change in percent; other numbers without a unit have the unit "".
     `phase_rad of run-02.csv` is ("phase in run-02.csv", "rad").
     """
     name, _, file = name.partition(" of ")
@@ -56,13 +57,13 @@ def name_and_unit(name: str) -> tuple[str, str]:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A number with its unit, four significant digits."""
+    """A number with its unit: four significant digits, and a prefix for large and small numbers."""
     factor, shown = prefixed(abs(value), unit)
     return f"{fixed_digits(value * factor, None)} {shown}".rstrip()
 
 
 def percent(share: float | None) -> str:
-    """A share or a probability; what is only nearly sure is never shown as 100 %."""
+    """A share or a probability as text; a share below 1 is never shown as 100 %, and one above 0 never as 0 %."""
     if share is None or not math.isfinite(share):
         return "unknown"
     if 0.0 < share < 0.001:
@@ -75,25 +76,25 @@ def percent(share: float | None) -> str:
 
 
 def times(value: float | None) -> str:
-    """A gap in noise floors."""
+    """A gap in noise floors as text, three significant digits."""
     return "unknown" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 def interval(pair: tuple[float, float] | None) -> str:
-    """Two shares as `95 % to 98 %`; empty where there is no interval."""
+    """Two shares as text, `95 % to 98 %`; empty where there is no interval."""
     if pair is None or not (math.isfinite(pair[0]) and math.isfinite(pair[1])):
         return ""
     return f"{percent(pair[0])} to {percent(pair[1])}"
 
 
 def band(edges_Hz: tuple[float, float]) -> str:
-    """`0 to 20 Hz`; an upper end that is not finite is open."""
+    """A band as text, `0 to 20 Hz`; `above 20 Hz` where the upper end is not finite."""
     low_Hz, high_Hz = edges_Hz
     return f"{low_Hz:g} to {high_Hz:g} Hz" if math.isfinite(high_Hz) else f"above {low_Hz:g} Hz"
 
 
 def prefixed(size: float, unit: str) -> tuple[float, str]:
-    """A factor, and the unit with the prefix that brings a number of this size between 1 and 1000."""
+    """A factor, and the unit with its prefix, which bring a number of this size between 1 and 1000."""
     if unit == "%":
         return 100.0, unit
     if unit in _WITHOUT_PREFIX or not math.isfinite(size) or size == 0.0 or 0.1 <= size < 1000.0:
@@ -103,12 +104,12 @@ def prefixed(size: float, unit: str) -> tuple[float, str]:
 
 
 def decimals_of(width: float) -> int:
-    """Decimals of a number whose interval is `width` wide: two digits of the width, more would be invented."""
+    """Decimals for a number whose interval is `width` wide: two digits of the width, as more have no meaning."""
     return min(max(1 - math.floor(math.log10(width)), 0), 6)
 
 
 def fixed_digits(value: float, digits: int | None) -> str:
-    """A number with so many decimals, or with four significant digits."""
+    """A number as text with `digits` decimals; with None, four significant digits."""
     if not math.isfinite(value):
         return "unknown"
     return f"{value:.4g}" if digits is None else f"{value:.{digits}f}"

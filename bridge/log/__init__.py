@@ -1,9 +1,9 @@
 """Run logs: every message of a run in one MCAP file.
 
-mcap_chunks, runlog      written in small chunks, so that a kill costs at most one
-recorder                 the process that writes what is on the bus
-log_reader, logfile      read without seeking, whole or cut; made whole again
-log_check, topic_watch   what is wrong with a log: all of it; the numbers and times of one topic
+mcap_chunks, runlog      writing in small chunks, so that a kill costs at most one chunk
+recorder                 the process that writes every message on the bus
+log_reader, logfile      reading without seeking, whole or cut; recovery
+log_check, topic_watch   faults of a log: all of them; those in the numbers and times of one topic
 signal_range             range, clipping and dead stretches of one signal, for logs and evidence
-finding                  one thing that is wrong, and where
+finding                  one fault of a log or of evidence, and its place
 """

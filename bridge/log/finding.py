@@ -1,18 +1,18 @@
-"""One thing that is wrong with a log or with evidence, told where it is."""
+"""A finding: one fault of a log or of evidence, and its place."""
 
 from typing import Any, NamedTuple
 
 
 class Finding(NamedTuple):
-    """What, where, how often, and what it means for the reader."""
+    """Kind, place, text and number of one fault."""
 
     kind: str  # short and stable: gap, clipped, constant, not-finite, ...
     where: str  # file and column, or topic
     text: str
-    times: int = 1  # rows, messages or bytes concerned, as `text` says
+    times: int = 1  # number of rows, messages or bytes concerned; `text` says which
 
     def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
+        """The finding as an object for `--json`."""
         return self._asdict()
 
     def in_words(self) -> str:

@@ -1,4 +1,4 @@
-"""What is wrong with a run log, found in one pass whose memory does not grow with the log."""
+"""Check of a run log in one pass; the memory does not grow with the log."""
 
 import json
 import re
@@ -16,10 +16,11 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import CHANNELS, SCHEMA_VERSION, parsed
 from bridge.wire.topics import BY_NAME
 
-LATE_NS = 1_000_000  # 1 ms, the usual block: answered later than its successor is due
-# a desktop is late now and then; one block in a hundred is a rig that does not keep up
+LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the next block is due
+# Share of late messages from which a rig does not keep up. Smaller: every desktop is late now and then; larger: a slow controller
+# passes.
 LATE_SHARE = 0.01
-_DEAD_S = 1.0  # a sensor with noise does not give one value for so long
+_DEAD_S = 1.0  # a longer stretch of equal values is a dead sensor, as a live one has noise
 _RANGES = {
     "drive_force_N": "force_range_N",
     "mass_accel_mps2": "accel_range_mps2",
@@ -30,7 +31,7 @@ _RANGES = {
 
 
 class LogCheck(NamedTuple):
-    """What a check saw."""
+    """The result of a check."""
 
     log: str
     findings: list[Finding]
@@ -39,12 +40,12 @@ class LogCheck(NamedTuple):
     late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
 
     def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
+        """The result as an object for `--json`."""
         return self._asdict() | {"findings": [finding.as_dict() for finding in self.findings]}
 
 
 class _Pass:
-    """The memory of one pass."""
+    """State of one pass over a log."""
 
     def __init__(self) -> None:
         self.topics = {name: TopicWatch(name) for name in STREAMING}
@@ -75,7 +76,7 @@ class _Pass:
 
 
 def check_log(path: Path, progress: Callable[[float], None] | None = None) -> LogCheck:
-    """Look for everything that is wrong with a log. Raises Fault BAD_LOG when it is no run log.
+    """Check a log. Raises Fault BAD_LOG when it is not a run log.
 
     `progress` is called with the share of the log that was read, 0 to 1.
     """
@@ -110,7 +111,7 @@ def _sample_s(seen: _Pass) -> float:
 
 
 def _table(reader: LogReader, name: str, key: str) -> Any:
-    """A table that the log keeps as JSON; empty where there is none or it is damaged."""
+    """A table that the log holds as JSON; empty where it is missing or damaged."""
     try:
         return json.loads(reader.metadata[name][key])
     except (KeyError, json.JSONDecodeError):
@@ -118,7 +119,7 @@ def _table(reader: LogReader, name: str, key: str) -> Any:
 
 
 def damage_findings(damage: Damage, path: Path) -> list[Finding]:
-    """What of a log was lost."""
+    """A finding for each kind of loss in a log."""
     found: list[Finding] = []
     remedy = f"`stickslip log recover {path}` saves the rest"
     if not damage.closed:
@@ -173,7 +174,7 @@ def _of_signal(where: str, seen: SignalLook, sample_s: float, limit: float | Non
         from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
         text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s of samples on"
         found.append(Finding("dead", where, text, seen.longest_run))
-    # a float32 just misses a limit that it cannot hold
+    # a limit that float32 cannot hold exactly is missed by rounding
     at_limit = limit is not None and max(seen.highest, -seen.lowest) >= limit * (1.0 - 1e-6)
     if seen.clipped_high or seen.clipped_low or at_limit:
         ends = [f"{seen.clipped_high} samples at {seen.highest:g}"] if seen.clipped_high else []

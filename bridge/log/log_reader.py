@@ -1,7 +1,7 @@
 """One pass over the records of a run log, from the front and without its index.
 
-A cut or damaged file so costs only what is cut or damaged: a damaged chunk is known by its checksum, and after a record
-that makes no sense the next whole chunk is looked for.
+So a cut or damaged file loses only the part that is cut or damaged: a checksum shows a damaged chunk, and after a record that
+cannot be read the pass goes on with the next whole chunk.
 """
 
 import contextlib
@@ -29,7 +29,8 @@ from bridge.wire.topics import TOPICS
 _HEAD = struct.Struct("<BQ")
 _LARGEST_RECORD_BYTES = 1 << 30
 _FOOTER_BYTES = 20
-# A chunk of ours says "zstd" 28 bytes into its content, after two times, a size and a checksum: 37 into its record.
+# Every chunk of this project holds "zstd" 28 bytes into its content (after two times, a size and a checksum), which is 37 bytes
+# into its record.
 _CHUNK_MARK = struct.pack("<I4s", 4, b"zstd")
 _MARK_AT = 28
 _SEARCH_BYTES = 1 << 20
@@ -42,12 +43,12 @@ CHANNEL, SEQUENCE, LOG_TIME, PUBLISH_TIME, START, END = range(6)  # columns of M
 
 
 class Damage(NamedTuple):
-    """What could not be read."""
+    """The parts of a log that could not be read."""
 
     cut_bytes: int  # from the first record that is not whole to the end of the file
-    bad_chunks: int  # whole, but their checksum is wrong
+    bad_chunks: int  # number of whole chunks with a wrong checksum
     closed: bool  # the file has its footer
-    bad_records: int = 0  # definitions, tables, messages or stretches of bytes that make no sense
+    bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
 
 
 class LogReader:
@@ -61,21 +62,21 @@ class LogReader:
         self.channels: dict[int, Channel] = {}
         self.metadata: dict[str, dict[str, str]] = {}
         self.size_bytes = 0
-        self.position_bytes = 0  # how far the pass has come
+        self.position_bytes = 0  # end of the part that was read
 
     def count_bad_messages(self, count: int) -> None:
-        """Messages that are whole but are none of their topic."""
+        """Add `count` messages that are whole but not messages of their topic to the damage."""
         if count:
             self._count(bad_records=count)
 
     def topic(self, channel_id: int) -> str:
-        """Topic of a channel; where its definition was damaged, the one that every log of this version gives it."""
+        """Topic of a channel; where its definition is damaged, the topic that every log of this version gives the channel."""
         if channel_id in self.channels:
             return self.channels[channel_id].topic.removeprefix("/")
         return _CHANNEL_TOPICS.get(channel_id, f"channel {channel_id}")
 
     def messages(self) -> Iterator[tuple[Bytes, MessageRows]]:
-        """The bytes of one chunk after the other, with where its messages are. Raises Fault BAD_LOG."""
+        """For each chunk: its bytes, and the places of its messages in them. Raises Fault BAD_LOG."""
         rows = np.empty((1 << 16, 6), np.int64)
         for data in self.chunks():
             if data.shape[0] // 31 > rows.shape[0]:  # no message is shorter than its head of 31 bytes
@@ -83,7 +84,7 @@ class LogReader:
             yield data, rows[: _walk(data, rows)]
 
     def chunks(self) -> Iterator[Bytes]:
-        """The records of one chunk after the other, uncompressed. Raises Fault BAD_LOG when this is no run log."""
+        """For each chunk: its records, uncompressed. Raises Fault BAD_LOG when the file is not a run log."""
         try:
             with self.path.open("rb") as file:
                 self.size_bytes = self.path.stat().st_size
@@ -140,14 +141,14 @@ class LogReader:
             raise Fault("BAD_LOG", line)
 
     def _after_damage(self, file: IO[bytes], from_bytes: int) -> int | None:
-        """Where the next whole chunk begins after bytes that make no sense; None when there is none."""
+        """Start of the next whole chunk after bytes that cannot be read; None when there is none."""
         start = _next_chunk(file, from_bytes + 1, self.size_bytes)
         if start is not None:
             self._count(bad_records=1)
             return start
         if self.size_bytes - from_bytes > len(MCAP0_MAGIC):
             file.seek(self.size_bytes - len(MCAP0_MAGIC))
-            if file.read() == MCAP0_MAGIC:  # the index is damaged, all before it was read
+            if file.read() == MCAP0_MAGIC:  # only the index is damaged; everything before it was read
                 self._count(bad_records=1)
                 self.damage = self.damage._replace(closed=True)
         return None
@@ -183,7 +184,7 @@ class LogReader:
 
 
 def _next(file: IO[bytes], size: int) -> tuple[int, bytes] | None:
-    """Opcode and content of the next whole record; None where the file is cut or no record makes sense."""
+    """Opcode and content of the next whole record; None where the file is cut or the bytes are not a record."""
     head = file.read(_HEAD.size)
     if len(head) < _HEAD.size:
         return None
@@ -194,7 +195,7 @@ def _next(file: IO[bytes], size: int) -> tuple[int, bytes] | None:
 
 
 def _next_chunk(file: IO[bytes], from_bytes: int, size: int) -> int | None:
-    """Where the first whole and sound chunk at or after `from_bytes` begins."""
+    """Start of the first whole chunk with a right checksum at or after `from_bytes`; None when there is none."""
     mark_offset = _HEAD.size + _MARK_AT
     at = from_bytes
     while at < size:
@@ -219,7 +220,7 @@ def _uncompressed(content: bytes) -> bytes | None:
         chunk = Chunk.read(ReadDataStream(BytesIO(content)))
         data = chunk.data
         if chunk.compression == "zstd":
-            # looked at first: a damaged size would have the library reserve whatever it says
+            # checked first: with a damaged size the library would reserve that much memory
             if zstandard.frame_content_size(data) != chunk.uncompressed_size:
                 return None
             if chunk.uncompressed_size > _LARGEST_RECORD_BYTES:
@@ -240,7 +241,7 @@ def _number(data: Bytes, at: int, width: int) -> np.int64:
 
 @kernel
 def _walk(data: Bytes, rows: MessageRows) -> int:
-    """Fill `rows` with the messages of a chunk; how many there are."""
+    """Fill `rows` with the places of the messages of a chunk, and return their number."""
     at = 0
     count = 0
     while at + 9 <= data.shape[0]:

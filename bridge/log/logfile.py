@@ -1,4 +1,4 @@
-"""A run log, whole or cut: its topics as arrays, at once or chunk by chunk; and recovery of what a kill left."""
+"""A run log, whole or cut: its topics as arrays, at once or chunk by chunk; and recovery of a cut log."""
 
 import contextlib
 import fcntl
@@ -43,16 +43,16 @@ class Piece(NamedTuple):
     """The messages of one topic in one chunk, in file order."""
 
     topic: str
-    log_time_ns: npt.NDArray[np.int64]  # [messages], when each arrived
-    records: Records  # [messages], of a streaming topic; empty of another one
-    payloads: list[bytes]  # of a topic that does not stream; empty of another one
+    log_time_ns: npt.NDArray[np.int64]  # [messages], time of arrival
+    records: Records  # [messages] for a streaming topic; empty for another topic
+    payloads: list[bytes]  # [messages] for a topic that does not stream; empty for a streaming topic
 
 
 def iter_pieces(reader: LogReader) -> Iterator[Piece]:
     """Every message of a log, chunk by chunk, in memory that does not grow with the log.
 
-    A message that is none of its topic is left out and counted in the reader's damage. Raises Fault BAD_LOG when
-    it is no run log of this project.
+    Bytes that are not a message of their topic are left out and counted in the reader's damage. Raises Fault BAD_LOG when the
+    file is not a run log of this project.
     """
     layouts: dict[str, Layout] = dict(_LAYOUTS)
     for data, rows in reader.messages():
@@ -74,7 +74,7 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
 
 
 def _samples(data: Bytes, rows: MessageRows) -> int:
-    """How many samples a channel the sensor blocks of a log have, as most of its first chunk say: one may be odd."""
+    """Samples of a channel in a sensor block: the most frequent number in the first chunk, as single blocks may be wrong."""
     found: Counter[int] = Counter()
     for row in rows:
         with contextlib.suppress(Fault):
@@ -98,7 +98,7 @@ def _gather(data: Bytes, starts: npt.NDArray[np.int64], template: Bytes, fixed: 
 
 
 def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> tuple[bytes, npt.NDArray[np.int64]]:
-    """The readable payloads of one topic with every field written and in order, and which rows they are."""
+    """The readable payloads of one topic, joined, with every field written and in order; and the indices of their rows."""
     if (rows[:, END] - rows[:, START] == layout.size).all():
         template = np.frombuffer(layout.blank().tobytes(), np.uint8)
         fixed = np.ones(layout.size, np.uint8)
@@ -117,7 +117,7 @@ def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> tupl
 
 
 def _readable(topic: str, payloads: list[bytes]) -> list[int]:
-    """Which of the payloads are messages of their topic; of a topic that this version does not know, all."""
+    """Indices of the payloads that are messages of their topic; all of them for a topic that this version does not know."""
     if topic not in BY_NAME:
         return list(range(len(payloads)))
     kept: list[int] = []
@@ -129,7 +129,7 @@ def _readable(topic: str, payloads: list[bytes]) -> list[int]:
 
 
 def block_period_ns(sensors: Records) -> float:
-    """Time between two sensor blocks, from their numbers and times; 1 ms where they do not tell."""
+    """Time between two sensor blocks [ns], from their numbers and times; 1 ms where these do not show it."""
     numbers = np.diff(sensors["sequence"].astype(np.int64))
     forward = numbers > 0
     if forward.any():
@@ -174,10 +174,10 @@ class RunData(NamedTuple):
 
 
 def read_run(path: Path) -> RunData:
-    """Read a log, whole or cut. Raises Fault BAD_LOG when it is no run log of this project."""
+    """Read a log, whole or cut, into memory. Raises Fault BAD_LOG when the file is not a run log of this project."""
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
     reader = LogReader(path)
-    # joined as bytes: numpy's own way to join records leaves the tags between their fields behind
+    # joined as bytes: numpy would join the fields of the records and drop the tags between them
     stored: dict[str, list[memoryview]] = {name: [] for name in STREAMING}
     dtypes: dict[str, np.dtype[Any]] = {name: layout.dtype for name, layout in _LAYOUTS.items()}
     dtypes["sensors"] = sensor_block(_DEFAULT_SAMPLES).dtype
@@ -205,14 +205,14 @@ def read_run(path: Path) -> RunData:
 
 
 class Recovered(NamedTuple):
-    """What `recover` saved."""
+    """The result of `recover`."""
 
     messages: int
     damage: Damage
 
 
 class _Copy:
-    """A new log that takes over definitions, tables and messages of another one as they turn up."""
+    """A new log that copies definitions, tables and messages of another log in the order in which they are read."""
 
     def __init__(self, writer: ChunkWriter, reader: LogReader) -> None:
         self.writer = writer
@@ -228,7 +228,10 @@ class _Copy:
                 self.kept.add(name)
 
     def take_channel(self, channel_id: int) -> int:
-        """Its id in the new log; a definition that was damaged is written as every log of this version has it."""
+        """Define the channel in the new log, and return its id there.
+
+        A damaged definition is replaced by the one that every log of this version has.
+        """
         if channel_id not in self.channel_ids:
             reader = self.reader
             channel = reader.channels.get(channel_id)
@@ -255,7 +258,7 @@ class _Copy:
 
 
 def refuse_a_live_log(path: Path, option: str) -> None:
-    """Raise Fault LOG_WRITE where a log is being recorded; `option` is the one that names another."""
+    """Raise Fault LOG_WRITE when `path` is a log that is being recorded; `option` is the option that names another file."""
     if not path.is_file():
         return
     with path.open("rb") as file:
@@ -269,9 +272,9 @@ def refuse_a_live_log(path: Path, option: str) -> None:
 
 
 def recover(path: Path, out: Path) -> Recovered:
-    """Write every message of a cut or damaged log that can be read to `out`, with an index; `out` may be `path`.
+    """Write every readable message of a cut or damaged log to `out`, with an index; `out` may be `path`.
 
-    Raises Fault BAD_LOG, and LOG_WRITE, also where `out` is being recorded.
+    Raises Fault BAD_LOG when nothing can be read, LOG_WRITE when `out` cannot be written or is being recorded.
     """
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
     refuse_a_live_log(out, "--out")

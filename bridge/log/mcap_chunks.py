@@ -1,7 +1,7 @@
-"""Writing MCAP: the library's own records, but with messages packed straight into their chunk.
+"""Writing MCAP with the records of the library `mcap`, but with messages packed directly into their chunk.
 
-The library's Writer costs 5.5 us a message here, a fifth of a lockstep run's time budget for each of a block's four
-messages; packed in place a message costs 1 us. What it writes is read back by the library's readers in the tests.
+The library's Writer takes 5.5 us for a message, and a block has four messages: each takes a fifth of the time of a block in a
+lockstep run. A message that is packed in place takes 1 us. The tests read the files back with the library's readers.
 """
 
 import struct
@@ -34,7 +34,7 @@ _INDEX_ENTRY = struct.Struct("<QQ")
 
 
 class _Open(NamedTuple):
-    """The chunk being filled."""
+    """The chunk that is being filled."""
 
     parts: list[bytes]
     entries: dict[int, list[bytes]]  # message index by channel
@@ -48,7 +48,7 @@ def _encoded(*records: McapRecord) -> bytes:
 
 
 class ChunkWriter:
-    """An MCAP file being written to `stream`, chunk by chunk as `flush` says. Not thread safe."""
+    """An MCAP file that is written to `stream`; each `flush` ends a chunk. Not thread safe. Methods raise OSError."""
 
     def __init__(self, stream: IO[bytes], library: str) -> None:
         self._stream = stream
@@ -65,14 +65,14 @@ class ChunkWriter:
         stream.write(MCAP0_MAGIC + _encoded(Header(profile="", library=library)))
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
-        """Define a schema; its id."""
+        """Define a schema, and return its id."""
         schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
         self._schemas.append(schema)
         self._stream.write(_encoded(schema))
         return schema.id
 
     def add_channel(self, topic: str, encoding: str, schema_id: int, metadata: dict[str, str]) -> int:
-        """Define a channel; its id."""
+        """Define a channel, and return its id."""
         channel = Channel(
             id=len(self._channels) + 1,
             topic=topic,
@@ -86,7 +86,7 @@ class ChunkWriter:
         return channel.id
 
     def add_metadata(self, name: str, fields: dict[str, str]) -> None:
-        """Write a table of texts at once, outside the chunks."""
+        """Write a table of texts immediately, outside the chunks."""
         data = _encoded(Metadata(name=name, metadata=fields))
         index = MetadataIndex(offset=self._stream.tell(), length=len(data), name=name)
         self._stream.write(data)
@@ -168,7 +168,7 @@ class ChunkWriter:
         self._offset = 0
 
     def finish(self) -> None:
-        """Write what is open, the index and the footer. The stream stays open."""
+        """Write the open chunk, the index and the footer. The stream stays open."""
         self.flush()
         self._stream.write(_encoded(DataEnd(data_section_crc=0)))
         statistics = Statistics(
@@ -209,6 +209,6 @@ class ChunkWriter:
 
 
 def ending_without_index() -> bytes:
-    """The 50 bytes that close a file after its last whole record; readers then scan instead of seeking."""
+    """The 50 bytes that close a file after its last whole record; readers then scan the file instead of seeking."""
     footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
     return _encoded(DataEnd(data_section_crc=0), footer) + MCAP0_MAGIC

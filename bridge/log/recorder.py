@@ -1,4 +1,4 @@
-"""The recorder process: everything on the bus into one log."""
+"""The recorder process: writes every message on the bus to one log."""
 
 import math
 import threading
@@ -14,11 +14,11 @@ from bridge.wire.messages import parsed
 from bridge.wire.topics import TOPICS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 
-_INBOX_LIMIT = 1 << 16  # 15 s of a run at 4100 messages/s
-_HEADERS_WAIT_S = 30.0  # a first start compiles kernels
-_QUIET_S = 0.3  # after the last END: nothing more is under way
-_PLANT_LOST_S = 1.0
-_STOP_S = 3.0  # after a stop the plant fades out within 1 s; a rig that goes on must not hold up the end
+_INBOX_LIMIT = 1 << 16  # messages, 15 s of a run at 4100 messages/s; smaller loses messages while the disk is busy
+_HEADERS_WAIT_S = 30.0  # time for the roles to answer; a first start compiles kernels
+_QUIET_S = 0.3  # silence after the last END from which no message is under way
+_PLANT_LOST_S = 1.0  # silence from which a plant that left the bus counts as lost
+_STOP_S = 3.0  # longest recording after a stop; the plant fades out within 1 s, and a rig may never end
 
 
 def run(
@@ -33,9 +33,13 @@ def run(
     """Record until the plant and the controller have ended, or `stop` is set.
 
     Args:
-        roles: whose configurations are waited for and kept.
-        about: what else the log should say of its run.
-        ready: called once a rig has answered, before the log is begun.
+        path: the log.
+        bus_config: of the bus.
+        roles: the processes whose configurations are awaited and written.
+        about: further entries on the run, written as a table `run`.
+        lockstep: log times are simulated times, and no message is dropped.
+        stop: ends the recording.
+        ready: called when the roles have answered, before the log is begun.
 
     Raises Fault NO_PEER, PEER_DIED, LOG_WRITE.
 
@@ -62,7 +66,7 @@ def run(
 
 
 def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
-    """Write until everybody has ended. Returns whether the plant vanished instead."""
+    """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
     ended: set[str] = set()
     heard_s = time.monotonic()
     seen = False
@@ -84,7 +88,7 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
             except Fault as fault:
                 if fault.kind.code != "BAD_MESSAGE":
                     raise
-                log.add_event("BAD_MESSAGE", fault.line)  # one client's rubbish must not end the record of the others
+                log.add_event("BAD_MESSAGE", fault.line)  # a wrong message of one client must not end the recording
             continue
         log.flush_when_due()
         quiet_s = time.monotonic() - heard_s

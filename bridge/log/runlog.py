@@ -1,4 +1,4 @@
-"""Writing a run: MCAP with real schemas, cut into chunks by time so that a kill loses little."""
+"""Writing a run log: MCAP with schemas, in chunks of 0.1 s, so that a kill loses little."""
 
 import contextlib
 import fcntl
@@ -15,14 +15,15 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import SCHEMA_VERSION, file_descriptor_set, sequence_and_time
 from bridge.wire.topics import RECORDER_EVENT, TOPICS, Topic
 
-FLUSH_PERIOD_S = 0.1  # a kill loses at most the open chunk: this, and never more than 0.25 s
-LARGEST_CHUNK_BYTES = 1 << 20  # a run in one process fills more than this in 0.1 s
-_LATEST_MESSAGES = 256  # what is further behind was not delayed: its sender began anew
+# Duration of a chunk. Longer: a kill loses more (it loses the open chunk, at most 0.25 s). Shorter: larger files.
+FLUSH_PERIOD_S = 0.1
+LARGEST_CHUNK_BYTES = 1 << 20  # ends a chunk earlier; a run in one process fills more than this in 0.1 s
+_LATEST_MESSAGES = 256  # largest lag of a delayed message, in numbers; a larger lag means that the sender restarted
 LIBRARY = f"stickslip schema {SCHEMA_VERSION}"
 
 
 def _locked(file: IO[bytes]) -> bool:
-    """Keep everybody else from writing or replacing the file; False where somebody does already."""
+    """Lock the file against writing and replacing by other processes; False when another process has the lock."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -33,7 +34,7 @@ def _locked(file: IO[bytes]) -> bool:
 
 
 class RunLog:
-    """One log file being written. Not thread safe: one thread owns it.
+    """One log file that is being written. Not thread safe: one thread owns it. Raises Fault LOG_WRITE.
 
     Args:
         path: the file; its folder is made.
@@ -51,7 +52,7 @@ class RunLog:
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            # not emptied: what is there may be the log of a run that goes on
+            # not truncated when it is opened: the file may be the log of a run under way
             self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666), "wb")
             if not _locked(self._file):
                 self._file.close()
@@ -79,7 +80,7 @@ class RunLog:
                 )
 
     def add_header(self, header: wire.Header) -> None:
-        """Keep the configuration and versions of one process: a log alone can re-create its run."""
+        """Write the configuration and versions of one process, so that a run can be repeated from its log alone."""
         fields = {
             "schema_version": str(header.schema_version),
             "configuration": header.configuration,
@@ -88,12 +89,12 @@ class RunLog:
         self._guarded(lambda: self._writer.add_metadata(header.role, fields))
 
     def add_metadata(self, name: str, fields: dict[str, Any]) -> None:
-        """Keep a table of values, each as JSON."""
+        """Write a table of values, each as JSON."""
         text = {key: json.dumps(value) for key, value in fields.items()}
         self._guarded(lambda: self._writer.add_metadata(name, text))
 
     def write(self, topic: Topic, payload: bytes) -> None:
-        """Keep one message, and note a gap in its sequence. Raises Fault BAD_MESSAGE, LOG_WRITE."""
+        """Write one message, and an event for a gap in its sequence. Raises Fault BAD_MESSAGE, LOG_WRITE."""
         sequence, t_ns = sequence_and_time(payload, topic.message)
         if t_ns < 0:
             line = f"{topic.name}: t_ns = {t_ns}: must be 0 or more; count it from the start of the run"
@@ -116,7 +117,7 @@ class RunLog:
             self._guarded(self._writer.flush)
 
     def add_event(self, code: str, text: str, t_ns: int | None = None) -> None:
-        """Keep an event of the recorder itself."""
+        """Write an event of the recorder; its time is `t_ns`, or that of the latest message."""
         at_ns = self._last_t_ns if t_ns is None else t_ns
         event = wire.Event(sequence=self._events, t_ns=at_ns, source="recorder", code=code, text=text)
         self._add(RECORDER_EVENT, event.SerializeToString(), self._events, at_ns)
@@ -140,7 +141,7 @@ class RunLog:
             raise Fault("LOG_WRITE", line) from None
 
     def _end_without_index(self) -> None:
-        """Close with 50 bytes where the last whole chunk ended: room that the chunk which did not fit has given back."""
+        """Close the file after its last whole chunk, with 50 bytes; removing the chunk that did not fit makes room for them."""
         with contextlib.suppress(OSError):
             self._file.close()
         with contextlib.suppress(OSError), self.path.open("r+b", buffering=0) as file:
@@ -149,7 +150,7 @@ class RunLog:
             file.write(ending_without_index())
 
     def close(self) -> None:
-        """Write the index and close. The file is whole after this, or was closed by a fault. Raises Fault LOG_WRITE."""
+        """Write the index and close the file, unless a fault has closed it. Raises Fault LOG_WRITE."""
         if not self._file.closed:
             self._guarded(self._writer.finish)
             self._file.close()

@@ -1,4 +1,4 @@
-"""What one look at a signal tells, sample by sample, with a memory of a few numbers: range, clipping, dead stretches."""
+"""Range, clipping and dead stretches of a signal, found sample by sample with a memory of a few numbers."""
 
 import math
 from typing import Any, NamedTuple
@@ -8,13 +8,13 @@ import numpy.typing as npt
 
 from bridge.kernel import kernel
 
-# A signal that is cut off meets its limit at full slope; a real peak slows down. Where a parabola would leave its top
-# with slope s after a run of L equal samples it would rise by s L / 4 above them. More than this share of the whole
-# range is a clipped signal. A position may well dwell at an end of its range: its runs count as 40 samples at most.
+# A clipped signal meets its limit at full slope; a real peak slows down. A parabola that leaves a run of L equal samples with the
+# slope s would rise by s L / 4 above them. A signal is clipped when this rise is more than the following share of its range.
+# Too small: round peaks count as clipped; too large: flat clipping stays unseen.
 _OVERSHOOT_SHARE = 1e-3
-_LONGEST_DWELL = 40.0
+_LONGEST_DWELL = 40.0  # samples that a run of a position counts at most, as a position may rest at an end of its range
 _SHORTEST_RUN = 3.0  # equal samples at the limit; noise alone hardly ever makes three
-_STEPS_OF_RESOLUTION = 2.5  # a peak of a quantised signal ends in steps of 1 or 2 of them
+_STEPS_OF_RESOLUTION = 2.5  # smallest step into a clipped run, in resolutions; a real peak ends in steps of 1 or 2
 
 # state: 0 samples, 1 last value, 2 run of equal values, 3 longest such run, 4 its end, 5 smallest step, 6 not finite,
 # 7 first sample not finite; then for the top and, mirrored, for the bottom: 8 extreme, 9 run, 10 step into the run,
@@ -26,7 +26,7 @@ _STATE_SIZE = _LONGEST + 1
 
 
 class SignalLook(NamedTuple):
-    """The findings about one signal."""
+    """Range and faults of one signal; values in its unit, others in samples."""
 
     samples: int
     lowest: float
@@ -55,9 +55,9 @@ def _count(state: npt.NDArray[np.float64], side: int, run: float, step: float, l
 @kernel
 def _end_run(state: npt.NDArray[np.float64], side: int, step_out: float) -> None:
     run, step_in = state[side + 1], state[side + 2]
-    # a run at the very beginning or end has one flank only: counted by its step alone
+    # a run at the very beginning or end of the signal has one flank only, and is counted by its step alone
     if math.isinf(step_in) and math.isfinite(step_out):
-        # and at the beginning by what is known at the end: this step is the smallest so far
+        # at the beginning the resolution is not known yet: the run is judged when the signal has ended
         state[side + 5] = run
         state[side + 6] = step_out
     else:
@@ -109,7 +109,7 @@ def _look(values: npt.NDArray[Any], state: npt.NDArray[np.float64]) -> None:
 
 
 class Signal:
-    """A signal being looked at, piece by piece; one that `dwells`, as a position does, may rest at its extremes."""
+    """A signal that is checked piece by piece; a signal that `dwells`, such as a position, may rest at its extremes."""
 
     def __init__(self, dwells: bool) -> None:
         self._dwells = dwells
@@ -119,21 +119,21 @@ class Signal:
         self._state[_LONGEST] = _LONGEST_DWELL if dwells else np.inf
 
     def add(self, values: npt.NDArray[Any]) -> None:
-        """Look at the next samples, [samples]."""
+        """Check the next samples, [samples]."""
         _look(values, self._state)
 
     def result(self) -> SignalLook:
-        """What was seen so far."""
+        """Range and faults of all samples so far."""
         state = self._state.copy()
         sides = (_SIDE, _SIDE + _PER_SIDE)
         for side in sides:
             _end_run(state, side, math.inf)
-            if not self._dwells:  # a position rests before it is moved
+            if not self._dwells:  # a position rests before it moves, so its first run is not clipping
                 _count(state, side, float(state[side + 5]), float(state[side + 6]), 4.0)
         high, low = float(state[_SIDE]), -float(state[_SIDE + _PER_SIDE])
         limit = max(_OVERSHOOT_SHARE * (high - low), 0.0)
         clipped = [int(state[side + 3]) if high > low and state[side + 4] > limit else 0 for side in sides]
-        # a unipolar sensor at rest folds its noise onto zero: the end of its scale, but nothing is lost there
+        # a unipolar sensor at rest clips its noise at 0: the end of its scale, but no signal is lost
         if low == 0.0:
             clipped[1] = 0
         if high == 0.0:
@@ -144,7 +144,7 @@ class Signal:
 
 
 def look(values: npt.NDArray[Any], dwells: bool) -> SignalLook:
-    """Look at a whole signal, [samples]; see `Signal`."""
+    """Range and faults of a whole signal, [samples]; see `Signal`."""
     signal = Signal(dwells)
     signal.add(values)
     return signal.result()

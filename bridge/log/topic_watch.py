@@ -1,4 +1,4 @@
-"""Numbers and times of one topic of a log: what is missing, what came twice, where a clock jumped."""
+"""Numbers and times of one topic of a log: missing messages, duplicates, jumps of a clock."""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,16 +7,13 @@ from bridge.log.finding import Finding
 from bridge.wire.messages import Records
 
 Integers = npt.NDArray[np.int64]
-# t_ns is counted in samples; a rate that is no whole number of nanoseconds rounds by one
+# Difference of t_ns and the message numbers up to which a clock is right; rounding to whole nanoseconds is far below.
 _CLOCK_TOLERANCE_NS = 1000
-_REMEMBERED_NUMBERS = 1 << 20  # missing ones, of which a late one is told from one that came twice
+_REMEMBERED_NUMBERS = 1 << 20  # missing numbers that are kept, to tell a late message from a duplicate; costs memory
 
 
 class TopicWatch:
-    """Follows one topic, message by message, in file order.
-
-    `period_ns` is the time between two numbers where the sender counts it, 0 where times only must not go back.
-    """
+    """Checks one topic, message by message, in file order."""
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
@@ -25,7 +22,7 @@ class TopicWatch:
         self.first_number = 0
         self.restarts = 0
         self._missing_numbers: set[int] = set()
-        self._gaps_for_good: list[range] = []  # before a restart, or too large to remember every number of
+        self._gaps_for_good: list[range] = []  # gaps before a restart, and gaps too large to remember each number
         self._highest = -1
         self._duplicates: list[int] = []
         self._late: list[int] = []
@@ -36,7 +33,14 @@ class TopicWatch:
         self._last_log_time_ns = 0
 
     def add(self, records: Records, log_time_ns: Integers, period_ns: float) -> None:
-        """Follow the next messages."""
+        """Check the next messages.
+
+        Args:
+            records: of the topic, [messages].
+            log_time_ns: time of arrival, [messages].
+            period_ns: time between two numbers where the sender counts it; 0 where times only must not go back.
+
+        """
         if not len(records):
             return
         number = records["sequence"].astype(np.int64)
@@ -51,7 +55,7 @@ class TopicWatch:
         arrival_ns = np.diff(log_time_ns, prepend=self._last_log_time_ns)
         for i in np.flatnonzero(step != 1):
             self._odd_number(int(number[i]), int(number[i]) - int(step[i]))
-        # running maximum without the restarts, which set it back
+        # the running maximum; `_odd_number` sets it back at a restart
         self._highest = max(self._highest, int(number[-1]))
         forward = step > 0
         jumped = np.abs(step_ns - period_ns * step) > _CLOCK_TOLERANCE_NS if period_ns else step_ns < 0
@@ -83,7 +87,7 @@ class TopicWatch:
             self._duplicates.append(number)
 
     def findings(self) -> list[Finding]:
-        """What is wrong with the topic."""
+        """A finding for each kind of fault of the topic."""
         where = "/" + self.topic
         found: list[Finding] = []
 
@@ -124,7 +128,7 @@ class TopicWatch:
 
 
 def _ranges(numbers: set[int]) -> list[range]:
-    """Numbers as stretches without a hole, in order."""
+    """The numbers as ranges without a gap, in order."""
     ordered = np.array(sorted(numbers), np.int64)
     return [
         range(int(own[0]), int(own[-1]) + 1)

@@ -1,6 +1,6 @@
 """Tables of other programs.
 
-readers            CSV, Parquet, MATLAB and TDMS, in pieces
-writers, matfile   CSV, Parquet and MATLAB, written as they come
-export             a run log as tables, a file a topic
+readers            reading CSV, Parquet, MATLAB and TDMS
+writers, matfile   writing CSV, Parquet and MATLAB, in batches of rows
+export             a run log as tables, a file for each topic
 """

@@ -18,15 +18,15 @@ SUFFIXES = (".parquet", ".csv", ".mat")
 
 
 class Exported(NamedTuple):
-    """What `export` wrote."""
+    """The result of `export`."""
 
     files: list[Path]
     rows: dict[str, int]  # by topic
-    damage: Damage  # of the log; what could not be read is not in the tables
+    damage: Damage  # of the log; damaged parts are not in the tables
 
 
 def check_request(to: Path, topics: list[str], from_s: float, until_s: float) -> None:
-    """Raise Fault CONFIG when a log cannot be exported like this."""
+    """Raise Fault CONFIG when the suffix of `to`, a topic or the times cannot be used."""
     if to.suffix not in SUFFIXES:
         raise Fault("CONFIG", f"--to {to}: must end in {', '.join(SUFFIXES)}; choose one of these formats")
     unknown = [topic for topic in topics if topic not in STREAMING]
@@ -44,11 +44,10 @@ def export(
     until_s: float = np.inf,
     progress: Callable[[float], None] | None = None,
 ) -> Exported:
-    """Write streaming topics of a log as tables; sensors have one row a sample, the others one row a message.
+    """Write streaming topics of a log as tables: a row for each sample of the sensors, a row for each message of other topics.
 
-    `to` ends in .parquet, .csv or .mat; a flat format gets one file a topic, FILE.TOPIC.parquet, when `topics` are
-    several. Only rows with from_s <= t_s < until_s are written. `progress` is called with the share of the log that
-    was read, 0 to 1.
+    `to` ends in .parquet, .csv or .mat. With several topics, .parquet and .csv get a file for each topic, FILE.TOPIC.parquet.
+    Only rows with from_s <= t_s < until_s are written. `progress` is called with the share of the log that was read, 0 to 1.
 
     Raises Fault BAD_LOG, BAD_MESSAGE, BAD_TABLE, CONFIG, LOG_WRITE; nothing unfinished is left behind.
     """
@@ -95,7 +94,7 @@ def _stream(
     rows = dict.fromkeys(writers, 0)
     period_ns = 0.0
     for piece in iter_pieces(reader):
-        if piece.topic not in writers or not len(piece.records):  # of a chunk nothing may be readable
+        if piece.topic not in writers or not len(piece.records):  # empty where no message of a chunk is readable
             continue
         if piece.topic == "sensors":
             period_ns = period_ns or block_period_ns(piece.records)
@@ -115,13 +114,13 @@ def _stream(
 
 
 def sensor_columns(sensors: Records, period_ns: float) -> Columns:
-    """Sensor blocks as one row a sample: `t_s` float64, the channels float32 as they were sent."""
+    """Sensor blocks as columns, [samples] each: `t_s` float64, the channels float32 as they were sent."""
     columns: Columns = {"t_s": sample_times_s(sensors, period_ns).ravel()}
     return columns | {name: sensors[name].ravel() for name in CHANNELS}
 
 
 def message_columns(records: Records) -> Columns:
-    """Messages as one row each: `t_s`, then every field as it was sent."""
+    """Messages as columns, [messages] each: `t_s`, then every field as it was sent."""
     names = records.dtype.names or ()
     columns: Columns = {"t_s": records["t_ns"] / 1e9}
     return columns | {name: np.ascontiguousarray(records[name]) for name in names}

@@ -1,7 +1,7 @@
 """MATLAB v5 files written column by column, so that a log larger than the memory can be exported.
 
-scipy writes a variable from one array in memory. Here the columns grow in files beside the result and are put together
-at the end. Layout: MathWorks, MAT-File Format, version 5 (uncompressed elements, little endian).
+scipy writes a variable from one array in memory. Here each column grows in a file beside the result, and the files are joined at
+the end. Layout: MathWorks, MAT-File Format, version 5 (uncompressed elements, little endian).
 """
 
 import shutil
@@ -43,7 +43,7 @@ def _matrix_head(matrix_class: int, rows: int, columns: int, name: str) -> bytes
 
 def _names(names: list[str]) -> bytes:
     packed = b"".join(name.encode().ljust(_NAME_BYTES, b"\0") for name in names)
-    # the width comes as a small element: kind and length in one word
+    # the width is a small element: kind and length share one word
     return struct.pack("<HHI", _INT32, 4, _NAME_BYTES) + _element(_INT8, packed)
 
 
@@ -52,7 +52,7 @@ def _text(value: str) -> bytes:
 
 
 def text_struct(name: str, fields: dict[str, dict[str, str]]) -> bytes:
-    """A variable that is a struct of structs of texts."""
+    """Bytes of a variable that is a struct of structs of texts."""
 
     def struct_of(name: str, names: list[str], values: list[bytes]) -> bytes:
         return _element(_MATRIX, _matrix_head(_STRUCT, 1, 1, name) + _names(names) + b"".join(values))
@@ -62,12 +62,12 @@ def text_struct(name: str, fields: dict[str, dict[str, str]]) -> bytes:
 
 
 def file_head() -> bytes:
-    """The 128 bytes that every file begins with."""
+    """The 128 bytes at the start of every file."""
     return b"MATLAB 5.0 MAT-file, stickslip".ljust(124) + struct.pack("<H2s", 0x0100, b"IM")
 
 
 class ColumnStruct:
-    """A variable `name` that is a struct of column vectors and grows on disk, in `folder`, a file a column."""
+    """A variable `name` that is a struct of column vectors; it grows on disk, in `folder`, with a file for each column."""
 
     def __init__(self, name: str, folder: Path) -> None:
         self.name = name
@@ -86,7 +86,7 @@ class ColumnStruct:
         self.rows += len(next(iter(columns.values())))
 
     def write_to(self, out: IO[bytes]) -> None:
-        """Write the variable and forget the columns. Raises Fault BAD_TABLE when it is too large for the format."""
+        """Write the variable and remove the columns. Raises Fault BAD_TABLE when the variable is too large for the format."""
         heads: list[bytes] = []
         for name in self._files:
             kind, matrix_class = _NUMBERS[self._dtypes[name].str]

@@ -1,4 +1,4 @@
-"""Measured data of other programs as columns: CSV, Parquet, MATLAB v5 and TDMS. Every error names file, column and row."""
+"""Measured data of other programs as columns, from CSV, Parquet, MATLAB v5 and TDMS. Every error names file, column and row."""
 
 import codecs
 import json
@@ -20,7 +20,7 @@ from scipy.io.matlab import MatReadError
 from bridge.faults import Fault
 from bridge.files import check_file
 
-# Arrow takes Ctrl-C and SIGTERM for itself while it reads a CSV file, and loses what comes when it is nearly done.
+# Arrow handles Ctrl-C and SIGTERM itself while it reads a CSV file, and loses a signal that comes near the end.
 pa.enable_signal_handlers(False)
 
 Floats = npt.NDArray[np.float64]
@@ -32,7 +32,7 @@ class Dialect(NamedTuple):
 
     delimiter: str = ","
     decimal: str = "."
-    skip_rows: int = 0  # lines before the one with the names
+    skip_rows: int = 0  # lines before the line with the names
     encoding: str = "utf-8"
 
 
@@ -41,11 +41,11 @@ class Table(NamedTuple):
 
     path: Path
     columns: dict[str, Any]
-    sample_rate_Hz: float | None = None  # where the file itself says so (TDMS)
-    decimal: str = "."  # of numbers that are text
+    sample_rate_Hz: float | None = None  # where the file states it (TDMS)
+    decimal: str = "."  # decimal sign of numbers that are stored as text
 
     def column(self, name: str) -> Floats:
-        """One column, float64 [rows]. Raises Fault BAD_TABLE when it is not there or is no column of numbers."""
+        """One column, float64 [rows]. Raises Fault BAD_TABLE when it is missing or does not hold numbers."""
         if name not in self.columns:
             known = ", ".join(sorted(self.columns)) or "none"
             raise Fault("BAD_TABLE", f"{self.path.name}: column {name}: not in the file; known here: {known}")
@@ -53,7 +53,7 @@ class Table(NamedTuple):
 
 
 def read_table(path: Path, dialect: Dialect | None = None) -> Table:
-    """Read a table. Raises Fault BAD_TABLE when it cannot be read as what its name says."""
+    """Read a table. Raises Fault BAD_TABLE when the file cannot be read as the format of its suffix."""
     check_file(path, "BAD_TABLE", "give the path of a file of measured data")
     if path.suffix not in SUFFIXES:
         remedy = "rename it" if path.suffix.lower() in SUFFIXES else "convert it"
@@ -82,7 +82,7 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
 
 
 def _as_it_says(path: Path, dialect: Dialect) -> Dialect:
-    """The dialect, but with UTF-16 where the first two bytes of the file say that it is."""
+    """The dialect, with UTF-16 where the first two bytes of the file mark it."""
     with path.open("rb") as file:
         mark = file.read(2)
     wide = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
@@ -90,7 +90,7 @@ def _as_it_says(path: Path, dialect: Dialect) -> Dialect:
 
 
 def _check_dialect(path: Path, dialect: Dialect) -> None:
-    """Refuse a file whose line of names is written in another way. Raises Fault BAD_TABLE."""
+    """Raise Fault BAD_TABLE when the line of names does not fit the dialect: another encoding or delimiter."""
     how = "`stickslip log import` reads it with a map that has, under [source],"
     lines: list[bytes] = []
     try:
@@ -130,24 +130,24 @@ def _csv(path: Path, dialect: Dialect) -> dict[str, Any]:
     try:
         table = read(threads=True)
     except pa.ArrowInvalid:
-        table = read(threads=False)  # which names the row
+        table = read(threads=False)  # without threads the error names the row
     return {name.strip(): table.column(name) for name in table.column_names}
 
 
 def _loaded(path: Path) -> dict[str, Any]:
-    """The variables of a MATLAB file. SciPy's compiled reader trusts what a file says of itself: a changed byte may end it."""
+    """The variables of a MATLAB file, read first in a process of its own: a damaged file may crash SciPy's compiled reader."""
     trial = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"
     status = subprocess.run([sys.executable, "-P", "-c", trial, str(path)], capture_output=True, check=False).returncode
     if status < 0:
         raise ValueError(f"it is damaged: its reader died of signal {-status}")
     try:
         return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
-    except (UnboundLocalError, ArithmeticError, MemoryError) as error:  # an unknown type, a size that is none
+    except (UnboundLocalError, ArithmeticError, MemoryError) as error:  # an unknown type, or an impossible size
         raise ValueError(f"it is damaged: {error}") from None
 
 
 def _mat(path: Path) -> dict[str, Any]:
-    """Variables that are vectors; `NAME.FIELD` of a struct; `NAME[0]`, `NAME[1]`... of a matrix."""
+    """Columns of a MATLAB file: `NAME` for a vector, `NAME.FIELD` for a struct, `NAME[0]`, `NAME[1]`... for a matrix."""
     variables = _loaded(path)
     columns: dict[str, Any] = {}
     for name, value in variables.items():
@@ -165,7 +165,7 @@ def _mat(path: Path) -> dict[str, Any]:
 
 
 def _tdms(path: Path) -> Table:
-    """Channels as `GROUP/CHANNEL`, and as `CHANNEL` where no other group has one of that name."""
+    """Channels of a TDMS file as `GROUP/CHANNEL`, and as `CHANNEL` where only one group has a channel of that name."""
     file: Any = TdmsFile.read(path)
     columns: dict[str, Any] = {}
     names: list[str] = []
@@ -182,11 +182,11 @@ def _tdms(path: Path) -> Table:
 
 
 def _numbers(values: Any, where: str, decimal: str) -> Floats:
-    """A column as float64; an empty cell is NaN. Raises Fault BAD_TABLE with the row of the first text in it."""
+    """A column as float64 [rows]; an empty cell is NaN. Raises Fault BAD_TABLE with the first row that is not a number."""
     if isinstance(values, pa.ChunkedArray):
         column: Any = values
         if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
-            # rows as a person counts them: the first one under the names is 1
+            # rows as a person counts them: the first row under the names is 1
             for row, text in enumerate(column.to_pylist(), 1):
                 if text is not None and not _is_number(text, decimal):
                     line = f"{where}: row {row} = {text!r}: must be a number; remove the row or name another column"

@@ -1,4 +1,4 @@
-"""Tables written a batch of rows at a time: Parquet, CSV and MATLAB v5. A file appears under its name when it is whole."""
+"""Tables written in batches of rows: Parquet, CSV and MATLAB v5. A file appears under its name only when it is whole."""
 
 import shutil
 from pathlib import Path
@@ -14,23 +14,23 @@ from bridge.tables.matfile import ColumnStruct, file_head, text_struct
 from bridge.units import unit_of
 
 Columns = dict[str, npt.NDArray[Any]]  # by name, all of one length
-# 10 MB a batch of sensors: large enough to compress and encode well, small against any memory
+# Rows of a batch, 10 MB of sensors. Too small: compression and encoding are poor; too large: memory.
 BATCH_ROWS = 1 << 18
 
 
 class TableWriter(Protocol):
-    """One table being written."""
+    """One table that is being written."""
 
     def append(self, columns: Columns) -> None:
         """Add rows. Every call has the same columns with the same types."""
         ...
 
     def finish(self) -> list[Path]:
-        """Make the file whole; its path, none where another table's writer makes it."""
+        """Complete the file, and return its path; an empty list where another writer completes the file."""
         ...
 
     def discard(self) -> None:
-        """Leave nothing behind."""
+        """Remove the unfinished file."""
         ...
 
 
@@ -47,7 +47,7 @@ def _schema(columns: Columns) -> Any:
 
 
 class ArrowTable:
-    """A Parquet or CSV file; Parquet columns carry their unit as metadata, CSV columns in their name."""
+    """A Parquet or CSV file. Parquet columns have their unit as metadata, CSV columns in their name."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -57,7 +57,7 @@ class ArrowTable:
         self._waiting_rows = 0
 
     def append(self, columns: Columns) -> None:
-        """Add rows; they go to disk a batch at a time."""
+        """Add rows; they are written to disk in batches."""
         self._waiting.append(columns)
         self._waiting_rows += len(next(iter(columns.values())))
         if self._waiting_rows >= BATCH_ROWS:
@@ -75,7 +75,7 @@ class ArrowTable:
                 options = pa_csv.WriteOptions(quoting_style="none")
                 self._writer = pa_csv.CSVWriter(str(_part(self.path)), self._schema, write_options=options)
             else:
-                # samples hardly ever repeat: dictionaries would be built in vain
+                # no dictionaries, as samples hardly ever repeat
                 self._writer = pq.ParquetWriter(
                     str(_part(self.path)), self._schema, compression="zstd", compression_level=1, use_dictionary=False
                 )
@@ -83,7 +83,7 @@ class ArrowTable:
         self._writer.write_batch(batch)
 
     def finish(self) -> list[Path]:
-        """Write what waits and close; the path of the file."""
+        """Write the waiting rows, close the file, and return its path; an empty list without rows."""
         self._flush()
         if self._writer is None:
             return []
@@ -97,7 +97,7 @@ class ArrowTable:
 
 
 class MatFile:
-    """One MATLAB file with a struct of columns for every table, and their units in the struct `units`."""
+    """One MATLAB file with a struct of columns for each table, and the units of the columns in the struct `units`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -107,14 +107,14 @@ class MatFile:
         self._units: dict[str, dict[str, str]] = {}
 
     def append(self, table: str, columns: Columns) -> None:
-        """Add rows to one of the tables."""
+        """Add rows to the table `table`."""
         if table not in self._structs:
             self._structs[table] = ColumnStruct(table, self._folder)
             self._units[table] = {name: unit_of(name) for name in columns}
         self._structs[table].append(columns)
 
     def finish(self) -> list[Path]:
-        """Put the columns together; the path of the file. Raises Fault BAD_TABLE when a table is too large."""
+        """Join the columns, and return the path of the file. Raises Fault BAD_TABLE when a table is too large."""
         if not self._structs:
             self.discard()
             return []
@@ -140,7 +140,7 @@ class MatFile:
 
 
 class MatTable:
-    """One table of a MATLAB file that is shared with other tables; the file itself is finished by its owner."""
+    """One table of a MATLAB file that holds other tables too; the owner of the file completes it."""
 
     def __init__(self, file: MatFile, table: str) -> None:
         self.file = file
@@ -151,7 +151,7 @@ class MatTable:
         self.file.append(self._table, columns)
 
     def finish(self) -> list[Path]:
-        """Nothing: the file holds other tables too."""
+        """Return an empty list: the owner of the file completes it."""
         return []
 
     def discard(self) -> None:

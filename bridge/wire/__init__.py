@@ -1,8 +1,8 @@
-"""The bus: what is said, under which topic, and how it travels. PROTOCOL.md describes it for other languages.
+"""The bus: messages, topics and transport. PROTOCOL.md describes it for clients in other languages.
 
-stickslip.proto, stickslip_pb2   the messages, and the module that `make proto` makes of them
-messages                         the same as NumPy records, to the byte
-topics                           who says what where
+stickslip.proto, stickslip_pb2   the messages, and the module that `make proto` generates from them
+messages                         the messages as NumPy records, equal to the byte
+topics                           sender, rate and message of every topic
 zenoh_link                       publishers, inboxes and presence over Zenoh
-realtime                         priority and processor of a process that keeps time
+realtime                         priority and core of a real-time process
 """

@@ -1,8 +1,8 @@
 """The messages of `stickslip.proto` as records that kernels read and write in place.
 
-A streaming message has only fields of fixed width, so its protobuf bytes have fixed places. `Layout` lays a numpy record
-over those places: filling in the record is the encoding, and a topic of a log is one array. Bytes from a client that
-leaves zeros out or changes the order are first brought into this form by the protobuf library.
+A streaming message has only fields of fixed width, so each field has a fixed place in the protobuf bytes. `Layout` lays a numpy
+record over these places: a filled record is an encoded message, and a topic of a log is one array. A client may leave out zeros
+or change the order of the fields; the protobuf library first brings such bytes into this form.
 """
 
 from typing import Any, TypeVar, cast
@@ -44,7 +44,7 @@ def _varint(value: int) -> bytes:
 
 
 class Layout:
-    """Where the fields of one streaming message lie.
+    """Places of the fields in the bytes of one streaming message.
 
     Args:
         message: class of the message.
@@ -84,12 +84,12 @@ class Layout:
         self._mask = int.from_bytes(fixed, "little")
 
     def blank(self, count: int = 1) -> Records:
-        """`count` messages of zeros, whose `tobytes()` are their protobuf encodings."""
-        # over a bytearray, since numpy's own copy of a record leaves the gaps between its fields, the tags, behind
+        """`count` messages of zeros, [count]; their `tobytes()` is their protobuf encoding."""
+        # over a bytearray, as numpy's copy of a record drops the bytes between the fields, which are the tags
         return np.frombuffer(bytearray(self._template * count), self.dtype)
 
     def is_canonical(self, payload: bytes) -> bool:
-        """Whether every field is written, in order."""
+        """Whether every field is written, in the order of the field numbers."""
         return len(payload) == self.size and int.from_bytes(payload, "little") & self._mask == self._tags
 
     def canonical(self, payload: bytes, topic: str) -> bytes:
@@ -136,7 +136,7 @@ def sensor_block(samples: int) -> Layout:
 
 
 def parsed(message: type[M], payload: bytes, topic: str) -> M:
-    """A message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
+    """A protobuf message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
     result = message()
     try:
         result.ParseFromString(payload)
@@ -147,7 +147,7 @@ def parsed(message: type[M], payload: bytes, topic: str) -> M:
 
 
 def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]:
-    """Sequence and t_ns of any message that has them, at no more than a look where the bytes are canonical."""
+    """Sequence and t_ns of a message that has both; read directly where the bytes are canonical. Raises Fault BAD_MESSAGE."""
     if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:
         return int.from_bytes(payload[1:9], "little"), int.from_bytes(payload[10:18], "little", signed=True)
     whole: Any = parsed(message, payload, message.DESCRIPTOR.name)
@@ -155,7 +155,7 @@ def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]
 
 
 def file_descriptor_set() -> bytes:
-    """The schema as MCAP wants it: a serialised FileDescriptorSet."""
+    """The schema for MCAP: a serialised FileDescriptorSet."""
     files = descriptor_pb2.FileDescriptorSet()
     wire.DESCRIPTOR.CopyToProto(files.file.add())
     return files.SerializeToString()

@@ -1,4 +1,4 @@
-"""The one table of topics: who sends what, how often, how old it may be, whether the log keeps it."""
+"""The table of topics: message, sender, rate, largest age, and whether the log keeps the topic."""
 
 from typing import NamedTuple
 
@@ -8,13 +8,13 @@ from bridge.wire import stickslip_pb2 as wire
 
 
 class Topic(NamedTuple):
-    """One row. The Zenoh key is PREFIX/NAME, the MCAP topic /NAME."""
+    """One row of the table. The Zenoh key is PREFIX/NAME, the MCAP topic /NAME."""
 
     name: str
     message: type[Message]
     sender: str
-    rate_Hz: float  # expected; 0: now and then
-    stale_after_s: float  # older than this is a fault, not a value; 0: never
+    rate_Hz: float  # expected; 0: irregular
+    stale_after_s: float  # age from which a message is a fault and no longer a value; 0: never
     logged: bool
 
 
@@ -45,7 +45,7 @@ BY_NAME = {topic.name: topic for topic in TOPICS}
 
 
 class Outgoing(NamedTuple):
-    """A message on its way: what a node hands to its link."""
+    """A message that a node hands to its link for sending."""
 
     topic: Topic
     payload: bytes

@@ -1,7 +1,7 @@
 """The bus: one Zenoh session of one process, on an explicit endpoint, without scouting.
 
-The rig (plant) listens; everybody else connects to it as a client and is relayed by it, so only one side ever dials.
-Receiving threads copy bytes into bounded queues and do nothing else: publishing from a callback can deadlock.
+The plant listens. All other processes connect to the plant as clients, and the plant relays their messages, so only one side of a
+connection dials. Receiving threads copy bytes into bounded queues and do nothing else: publishing from a callback can deadlock.
 """
 
 import contextlib
@@ -23,12 +23,12 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import parsed
 from bridge.wire.topics import Topic
 
-_CONNECT_S = 30.0  # a first start of the plant compiles before it listens: longer than 10 s on a busy machine
-_DIAL_S = 2.0  # of it at once: Zenoh hears no stop while it dials
+_CONNECT_S = 30.0  # time to wait for the plant; a first start compiles before it listens, which can take more than 10 s
+_DIAL_S = 2.0  # duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
 
 
 class BusConfig(Strict):
-    """Where the processes of one rig meet."""
+    """Address and key prefix of the bus of one rig."""
 
     endpoint: Annotated[str, Field(pattern=r"^tcp/.+:\d{1,5}$")] = "tcp/127.0.0.1:7447"
     prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
@@ -42,7 +42,7 @@ class BusConfig(Strict):
 
 
 class Received(NamedTuple):
-    """One message as it came in."""
+    """One received message."""
 
     topic: Topic
     payload: bytes
@@ -50,9 +50,9 @@ class Received(NamedTuple):
 
 
 class Inbox:
-    """A bounded queue between a receiving thread and a loop; what does not fit is counted and dropped.
+    """A bounded queue between a receiving thread and a loop; a message that does not fit is dropped and counted.
 
-    A `patient` one waits instead, which holds up the sender: for lockstep, where nothing may be lost and nothing is late.
+    A `patient` inbox waits instead, which blocks the sender. It is for lockstep, where no message may be lost and none is late.
     """
 
     def __init__(self, limit: int, patient: bool = False) -> None:
@@ -62,7 +62,7 @@ class Inbox:
         self._queue: queue.SimpleQueue[Received] = queue.SimpleQueue()
 
     def push(self, received: Received) -> None:
-        """Called by receiving threads."""
+        """Add a message; called by receiving threads."""
         while self._patient and self._queue.qsize() >= self._limit:
             time.sleep(0.001)
         if self._queue.qsize() >= self._limit:
@@ -71,7 +71,7 @@ class Inbox:
             self._queue.put(received)
 
     def keep(self, received: Received) -> None:
-        """As `push`, but never dropped: for what is rare and must not be missed."""
+        """Add a message that is never dropped; for rare messages that must not be missed."""
         self._queue.put(received)
 
     def get(self, timeout_s: float) -> Received | None:
@@ -90,7 +90,7 @@ class Inbox:
 
 
 def session_config(config: BusConfig, hub: bool, lockstep: bool) -> zenoh.Config:
-    """The settings of every session of the project; `hub` is the one that listens."""
+    """The settings of a session; `hub` is the session that listens."""
     settings: dict[str, Any] = {
         "mode": "peer" if hub else "client",
         "listen/endpoints": [config.endpoint] if hub else [],
@@ -100,11 +100,11 @@ def session_config(config: BusConfig, hub: bool, lockstep: bool) -> zenoh.Config
         "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
-        # A frozen process is noticed after 100 ms instead of 10 s, as puts to it wait. On a machine that pauses for as long the
-        # link is closed and made anew, which loses messages: in lockstep, where nothing is late, one run in eight stalled on it.
+        # Time [ms] after which a silent peer is dropped. Too long: puts wait for a frozen process. Too short: a computer that
+        # pauses for as long closes the link and makes it again, which loses messages (docs/method/bridge.md).
         "transport/link/tx/lease": 10_000 if lockstep else 100,
         "transport/link/tx/keep_alive": 4,
-        # deeper than the default 2: answers later than 1 ms fell from 24 and 51 to 1 and 2 of 10000
+        # Depth of the queues, 2 by default. Too small: late answers; counted: docs/method/bridge.md.
         "transport/link/tx/queue/size/real_time": 16,
         "transport/link/tx/queue/size/data": 16,
         "transport/shared_memory/enabled": False,
@@ -146,7 +146,10 @@ class Bus:
         stop: threading.Event | None = None,
         patience_s: float = _CONNECT_S,
     ) -> None:
-        """Listen as the plant, or dial it for `patience_s` or until `stop` is set. Raises Fault ENDPOINT_BUSY, NO_PEER."""
+        """Listen as the plant; any other role dials the plant for `patience_s` or until `stop` is set.
+
+        Raises Fault ENDPOINT_BUSY, NO_PEER.
+        """
         self._config = config
         self._role = role
         self._lockstep = lockstep
@@ -185,7 +188,7 @@ class Bus:
         self._keep_up(self._claims, sample)
 
     def _keep_up(self, names: set[str], sample: Any) -> None:
-        """Enter or strike out the last part of a token's key."""
+        """Add the last part of a token's key to `names`, or remove it when the token has gone."""
         name = str(sample.key_expr).rsplit("/", 1)[-1]
         with self._alive_changed:
             if sample.kind == zenoh.SampleKind.PUT:
@@ -195,7 +198,10 @@ class Bus:
             self._alive_changed.notify_all()
 
     def publisher(self, topic: Topic) -> Callable[[bytes], None]:
-        """A function that puts bytes on `topic`. Control goes first and, in real time, is dropped rather than waited for."""
+        """A function that sends bytes on `topic`.
+
+        Sensors and commands have priority. In real time a message that cannot be sent is dropped; in lockstep the call waits.
+        """
         control = topic.name in {"sensors", "command"}
         block = zenoh.CongestionControl.BLOCK
         declared = self._session.declare_publisher(
@@ -209,7 +215,7 @@ class Bus:
         return declared.put
 
     def listen(self, topic: Topic, receive: Callable[[Received], None]) -> None:
-        """Call `receive` for every message of `topic`, on a receiving thread: it must only store."""
+        """Call `receive` for every message of `topic`, on a receiving thread: `receive` must only store the message."""
 
         def on_sample(sample: Any) -> None:
             receive(Received(topic, sample.payload.to_bytes(), time.perf_counter_ns()))
@@ -218,7 +224,7 @@ class Bus:
         self._keep.append(self._session.declare_subscriber(self._key(topic.name), handler))
 
     def serve_header(self, header: wire.Header) -> None:
-        """Answer queries for the configuration of the header's role."""
+        """Answer queries for the configuration of the header's role with `header`."""
         key = self._key(f"header/{header.role}")
         payload = header.SerializeToString()
 
@@ -229,7 +235,7 @@ class Bus:
         self._keep.append(self._session.declare_queryable(key, reply))
 
     def headers(self, roles: Iterable[str], timeout_s: float, stop: threading.Event) -> dict[str, wire.Header]:
-        """Ask for the configurations of `roles`, as many as answer within `timeout_s` and before `stop` is set."""
+        """The configurations of those `roles` that answer within `timeout_s` and before `stop` is set, by role."""
         found: dict[str, wire.Header] = {}
         until_s = time.monotonic() + timeout_s
         missing = set(roles)
@@ -244,11 +250,11 @@ class Bus:
         return found
 
     def announce(self) -> None:
-        """Say that this role is ready: its subscriptions are in place and its kernels are compiled."""
+        """Announce that this role is ready: its subscriptions are in place and its kernels are compiled."""
         self._keep.append(self._session.liveliness().declare_token(self._key(f"alive/{self._role}")))
 
     def claim(self) -> tuple[str, Callable[[], set[str]]]:
-        """Say that this process wants its role: its claim, and a function that tells those of others."""
+        """Announce that this process wants its role. Returns its claim, and a function that returns the claims of others."""
         mine = uuid.uuid4().hex
         liveliness = self._session.liveliness()
         self._keep.append(liveliness.declare_token(self._key(f"claim/{self._role}/{mine}")))
@@ -267,14 +273,14 @@ class Bus:
             return role in self._alive
 
     def wait_for(self, roles: Iterable[str], timeout_s: float) -> set[str]:
-        """Wait until all `roles` are on the bus; the ones that are not after `timeout_s`."""
+        """Wait until all `roles` are on the bus, and return the roles that are missing after `timeout_s`."""
         wanted = set(roles)
         with self._alive_changed:
             self._alive_changed.wait_for(lambda: wanted <= self._alive, timeout_s)
             return wanted - self._alive
 
     def wait_until_alone(self, timeout_s: float) -> None:
-        """Wait until nobody but this role is left on the bus, at most `timeout_s`."""
+        """Wait until no other role is on the bus, at most `timeout_s`."""
         with self._alive_changed:
             self._alive_changed.wait_for(lambda: self._alive <= {self._role}, timeout_s)
 
