@@ -1,6 +1,6 @@
 """Diagnose rigs of the plant, twenty of every effect, from barely visible to large, twenty of none, and twenty of two.
 
-14 s of runs a rig. What is done is kept in OUT and not done again by the same version; the scores are of all that is there.
+A rig has 14 s of runs. Results are kept in OUT and not made again by the same version; the scores cover all kept results.
 """
 
 import argparse
@@ -28,12 +28,12 @@ from tests.blind.sizing import Bench
 
 NONE, TWO = "no-gap", "two-effects"
 VISIBLE = 2.0  # detection limits
-ORACLE_EVERY = 4  # cases: it takes half as long as the diagnosis
+ORACLE_EVERY = 4  # cases, as the oracle takes half as long as the diagnosis
 SOURCE = Plant("short")
 
 
 def done(out: Path, kind: str, number: int, seed: int, tool: str) -> tuple[Opened, float | None]:
-    """One case as it was before, or made, measured and diagnosed; with the shrinkage of the oracle where it is asked."""
+    """One case, kept or newly made, and diagnosed; with the shrinkage of the oracle for every `ORACLE_EVERY`th single effect."""
     path = out / f"{kind}-{number:02d}-of-seed-{seed}.json"
     kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     if kept.get("tool") != tool:

@@ -1,4 +1,4 @@
-"""Where the rigs of a blind set come from: a generator that knows nothing of the plant, or the plant itself."""
+"""The generators of rigs for a blind set: one that shares nothing with the plant, and the plant itself."""
 
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -7,18 +7,18 @@ import numpy as np
 
 
 class Effect(Protocol):
-    """An effect with everything drawn but how strong it is."""
+    """An effect with a drawn formula and drawn numbers, and a strength that is still to be set."""
 
     @property
     def name(self) -> str: ...
 
     def scaled(self, strength: float) -> "Effect":
-        """The same at another strength: 0 absent, 1 clearly large."""
+        """The same effect at another strength: 0 absent, 1 clearly large."""
         ...
 
 
 class Plan(NamedTuple):
-    """What to make, besides the seed."""
+    """All choices for an evidence besides its seed."""
 
     effects: tuple[Any, ...] = ()
     tolerances: float = 1.0  # how far the true parameters are drawn, in the stated tolerances
@@ -28,14 +28,14 @@ class Plan(NamedTuple):
 
 
 class Generator(Protocol):
-    """What `python -m tests.blind make` needs of a generator."""
+    """A source of rigs for `python -m tests.blind make`."""
 
     library: tuple[str, ...]  # effects that the diagnosis knows
-    outside: tuple[str, ...]  # effects that it does not know
-    usual: str | None  # friction law
-    backbones: tuple[str, ...]  # others
-    strongest: float  # strength
-    wide: float  # tolerances from which a rig without a gap may be drawn at most
+    outside: tuple[str, ...]  # effects that the diagnosis does not know
+    usual: str | None  # the usual friction law
+    backbones: tuple[str, ...]  # the other friction laws
+    strongest: float  # largest strength of an effect
+    wide: float  # scale of the tolerances of the widest rigs that still count as rigs without a gap
 
     def draw(self, random: np.random.Generator, name: str) -> Effect:
         """An effect at full strength."""

@@ -14,7 +14,7 @@ class Independent:
     """Rigs with another integrator, other formulas and, in a third of the cases, another friction law.
 
     Args:
-        runs: of every evidence.
+        runs: the protocol of every evidence.
 
     """
 
@@ -23,7 +23,7 @@ class Independent:
     usual = "lugre"
     backbones = ("multi-element", "lorentzian", "stretched")
     strongest = 1.5
-    wide = 1.1  # its draws are cut at three tolerances before they are scaled, and 3.3 is the most that is no gap
+    wide = 1.1  # draws are cut at three tolerances before they are scaled, and a gap begins at 3.3 tolerances
 
     def __init__(self, runs: tuple[RunPlan, ...] = PROTOCOL) -> None:
         self._runs = runs

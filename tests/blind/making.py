@@ -24,16 +24,16 @@ from tests.blind.sizing import Bench
 from tests.blind.strata import FEWEST, REAL, TARGETS, Drawn, draw
 
 Progress = Callable[[str, float], None]
-_ASKED, _ANSWERS, _SET = "asked.txt", "answers", "set"  # of a set in the making
-_TRIES = 3  # strengths that are looked at
-_NEAR_ENOUGH = 1.4  # times the target, or its inverse
-_WEAKEST = 0.01
-_INVISIBLE = 0.02  # detection limits: less is not told from nothing
-_ONE_TIME_S = 946_684_800  # of every file: 2000-01-01, so that no time tells what was made after what
+_ASKED, _ANSWERS, _SET = "asked.txt", "answers", "set"  # in the folder of an unfinished set
+_TRIES = 3  # strengths that are tried; more come closer to the target and take longer
+_NEAR_ENOUGH = 1.4  # factor around the target within which no further strength is tried
+_WEAKEST = 0.01  # strength
+_INVISIBLE = 0.02  # detection limits that the search counts at least, as its steps divide by this number
+_ONE_TIME_S = 946_684_800  # time of every file, 2000-01-01, so that no time shows the order of making
 
 
 class Sized(NamedTuple):
-    """An effect at the strength that was found, and what it is worth alone."""
+    """An effect at the strength that was found, and the detection limits that it is worth alone."""
 
     effect: Effect
     strength: float
@@ -41,9 +41,9 @@ class Sized(NamedTuple):
 
 
 def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, progress: Progress) -> None:
-    """Make a set and its key, both or neither; what was made before an interruption is not made again, nor named anew.
+    """Make a set and its key, both or neither; cases that were made before an interruption stay, with their names.
 
-    Beside the key the sizes are left, for `tests/blind/sizes`. Raises Fault CONFIG and OSError.
+    The sizes are written beside the key, for `tests/blind/sizes`. Raises Fault CONFIG and OSError.
     """
     if cases < FEWEST:
         raise Fault("CONFIG", f"--cases {cases}: must be {FEWEST} at least, one of each kind; 200 tell something")
@@ -60,7 +60,7 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
     )
     done = {secret.answer["counterfactual_seed"] for secret in sealed.values()}
     todo = [case for case in draw(source, cases, seed) if case.seed not in done]
-    # drawn they lie by kind, and which was made first can be seen in some file systems
+    # the draw is ordered by kind, and some file systems show the order of making
     secrets.SystemRandom().shuffle(todo)
     try:
         for case, answer in made(source, {secrets.token_hex(6): case for case in todo}, part / _SET, jobs, known):
@@ -84,7 +84,7 @@ def make_set(out: Path, key: Path, name: str, cases: int, seed: int, jobs: int, 
 
 
 def _taken_up(part: Path, asked: str) -> dict[str, Secret]:
-    """The cases that are there already, by name. Raises Fault CONFIG where they are of another set."""
+    """The finished cases of an unfinished set, by name. Raises Fault CONFIG where the folder holds another set."""
     note = part / _ASKED
     if not part.exists():
         (part / _ANSWERS).mkdir(parents=True)
@@ -107,7 +107,7 @@ def _taken_up(part: Path, asked: str) -> dict[str, Secret]:
 def made(
     source: Generator, drawn: Mapping[str, Drawn], folder: Path, jobs: int, known: Mapping[int, Sizes]
 ) -> Iterator[tuple[str, Answer]]:
-    """Make every case in a folder of its name; name and answer of each as they come."""
+    """Make every case in a folder of its name; yield name and answer of each case when it is done."""
     tasks = (
         joblib.delayed(_one)(source, case, folder / name, known.get(case.seed, {})) for name, case in drawn.items()
     )
@@ -142,7 +142,7 @@ def _one(source: Generator, case: Drawn, folder: Path, known: Sizes) -> tuple[st
 def sized(
     source: Generator, case: Drawn, plan: Plan, scratch: Path, known: Sizes
 ) -> tuple[list[Sized], list[list[Any]]]:
-    """Every effect of a case at the strength of its target, and where all of them together show."""
+    """Every effect of a case at the strength of its target, and the cells in which all effects together show."""
     smooth, trial, rough = plan._replace(smooth=True), scratch / "trial", scratch / "rough"
 
     def made(effects: tuple[Effect, ...]) -> Path:
@@ -163,7 +163,7 @@ def sized(
 
 
 def _real(case: Drawn, folder: Path) -> Answer:
-    """A fault in a measured log: neither its size in limits nor the rest of its gap is known."""
+    """Write a fault in a measured log; neither the fault's size in detection limits nor the log's own gap is known."""
     one = list(real_cases(np.random.default_rng(case.seed)))[case.number]
     one.write(folder)
     effects = [{"name": name, "formula": str(one.numbers), "detectability": None} for name in one.effects]
@@ -171,10 +171,10 @@ def _real(case: Drawn, folder: Path) -> Answer:
 
 
 def size(worth: Callable[[Effect], float], effect: Effect, target: float, strongest: float) -> Sized:
-    """The strength at which an effect is worth about `target` detection limits, or the strongest where it never is.
+    """The strength at which an effect is worth about `target` detection limits, or the strongest where it is never worth so much.
 
-    Detectability grows nearly in proportion to the strength, so each try scales the last; where that leaves the bracket,
-    its geometric mean is next. A strength is a number of four digits, or what is written of it would not make it again.
+    Detectability grows nearly in proportion to the strength, so each try scales the last one; where that leaves the bracket,
+    the geometric mean of the bracket is next. Strengths have four digits, so that a written strength makes the same effect.
     """
     strength, low, high = _four_digits(min(target / max(TARGETS), strongest)), _WEAKEST, strongest
     tried: list[tuple[float, Sized]] = []
@@ -212,7 +212,7 @@ def _answer(case: Drawn, effects: list[dict[str, Any]], cells: list[list[Any]]) 
 
 
 def _make_alike(folder: Path) -> None:
-    """The same times and modes for every file."""
+    """Give every file the same time and mode."""
     for path in (*folder.rglob("*"), folder):
         path.chmod(0o755 if path.is_dir() else 0o644)
         os.utime(path, (_ONE_TIME_S, _ONE_TIME_S))

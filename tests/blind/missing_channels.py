@@ -1,7 +1,7 @@
 """Diagnose rigs with one effect at its full strength whose logs lack channels.
 
-Wanted is an answer, with wider groups, and never a wrong one that is sure. A log without its channels may not show the effect at
-all; then no gap is the right answer.
+The diagnosis should give an answer, with wider groups, and never a wrong answer that is sure. A log without these channels may
+not show the effect at all; then no gap is the right answer.
 """
 
 import argparse
@@ -27,7 +27,7 @@ SURE = 0.8
 
 
 def diagnosed(number: int, seed: int) -> tuple[str, str, Diagnosis]:
-    """The channels that a case lacks, its effect, and what is found."""
+    """The channels that a case lacks, its effect, and its diagnosis."""
     random = np.random.default_rng([seed, number])
     source = Independent()
     names = sorted(source.library)

@@ -1,4 +1,4 @@
-"""Diagnose rigs under protocols drawn at random: speeds, reversals, vibrations and durations that are not the blind check's.
+"""Diagnose rigs under random protocols, with other speeds, reversals, vibrations and durations than the blind check.
 
 Without a gap, or with one effect at its full strength, which not every protocol can show: backlash needs a reversal.
 """
@@ -21,7 +21,7 @@ BACKBONES = ("lugre", "lugre", "multi-element", "lugre", "lugre", "lorentzian", 
 
 
 def drawn_protocol(random: np.random.Generator) -> tuple[RunPlan, ...]:
-    """Three or four runs, the last one kept aside; the first moves evenly, the others may reverse or vibrate."""
+    """Three or four runs, the last one held out; the first moves evenly, the others may reverse or vibrate."""
     runs: list[RunPlan] = []
     count = int(random.integers(3, 5))
     duration_s = float(random.choice([5.0, 8.0, 12.0]))
@@ -39,7 +39,7 @@ def drawn_protocol(random: np.random.Generator) -> tuple[RunPlan, ...]:
 
 
 def diagnosed(number: int, seed: int, with_effect: bool) -> tuple[str, Diagnosis]:
-    """The effect of a case, or none, and what is found."""
+    """The effect of a case, or "none", and its diagnosis."""
     random = np.random.default_rng([seed, number])
     source = Independent(drawn_protocol(random))
     names = sorted(source.library)

@@ -14,9 +14,9 @@ class PlantEffect(NamedTuple):
     """An effect as in a rig file, with the size that counts as strength 1."""
 
     name: str
-    size: str  # the parameter that is the size
-    large: float  # its value at strength 1
-    inverse: bool  # a smaller value is more: a corner frequency
+    size: str  # name of the parameter that the strength changes
+    large: float  # value of this parameter at strength 1
+    inverse: bool  # whether a smaller value is a larger effect, as with a corner frequency
     others: dict[str, float | str]
     strength: float = 1.0
 
@@ -42,7 +42,7 @@ class Plant:
     outside = ()
     usual = None
     backbones = ()
-    strongest = 1.0  # beyond, some rigs cannot be: static friction below the Coulomb friction
+    strongest = 1.0  # beyond, some rigs are impossible: their static friction is below the Coulomb friction
     wide = 1.5  # no number is drawn beyond three tolerances
 
     def __init__(self, protocol: str = "ladder") -> None:
@@ -62,7 +62,7 @@ class Plant:
 
 
 def drawn(random: np.random.Generator, name: str, sizes: Sizes) -> PlantEffect:
-    """One form of an effect: sign and everything else drawn."""
+    """One form of an effect, with drawn sign and drawn parameters."""
     others: dict[str, float | str] = {"form": sizes.form} if sizes.form else {}
     sign = float(random.choice(sizes.signs))
     others |= {key: low * (high / low) ** random.random() for key, (low, high) in sizes.log.items()}

@@ -1,10 +1,10 @@
-"""How large each effect is made: from barely visible in the protocol "ladder" on the paper's rig to large.
+"""The range of sizes of each effect: from barely visible in the protocol "ladder" on the paper's rig to large.
 
-Chosen so that simple features of the cycles (largest and smallest force, peak acceleration, spring fit) move by roughly
-2 to 15 of their standard errors at the lower end, with the same rig beside them; a diagnosis that does not know the rig
-sees less. Levels and stiffnesses start where their tolerances end. The least certain: frictional lag and Stribeck
-velocity (6 standard errors at 20 ms and at four times nominal, hence the wide ranges), speed ripple and backward friction
-(not seen by those features), force delay, force and accelerometer gain (a guess; a small gain hides in the tolerances).
+At the lower end, simple features of the cycles (largest and smallest force, peak acceleration, spring fit) move by roughly
+2 to 15 of their standard errors against the same rig without the effect; a diagnosis that does not know the rig sees less.
+Levels and stiffnesses start where their tolerances end. Least certain are frictional lag and Stribeck velocity (6 standard
+errors at 20 ms and at four times nominal, hence the wide ranges), speed ripple and backward friction (those features do not
+show them), force delay, and the gains of force sensor and accelerometer (a guess; a small gain hides in the tolerances).
 No resonance inside the band of the piezo is ever drawn.
 """
 

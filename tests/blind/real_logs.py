@@ -1,7 +1,7 @@
-"""Faults of a force sensor put into real logs: the rest of the evidence is as it was measured, with all that is odd about it.
+"""Faults of a force sensor added to real logs: all else in the evidence is as it was measured.
 
-The rig tables describe what the clean logs show, so a fault stands against them. Clean, these rigs have gaps of their own to any
-simple model (docs/quality/real-evidence.md): the fault is the largest new one, not the only one.
+The rig tables describe what the clean logs show, so a fault differs from them. The clean rigs already have gaps of their own to
+any simple model (docs/quality/real-evidence.md): the fault is the largest new gap, and not the only one.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,15 +16,15 @@ from scipy.signal import lfilter
 from tests.real.evidences import AXIS, MISSING, SLIDER, Cut, Levels, axis, slider
 
 Floats = npt.NDArray[np.float64]
-Sensor = Callable[[Floats, Floats], Floats]  # what it shows of a force [N] over time [s]
+Sensor = Callable[[Floats, Floats], Floats]  # from time [s] and force [N] to the shown force [N]
 
 _LEVEL_TOLERANCE = 0.03  # of the friction that the clean log itself shows
 _DEAD_TIME_S = 0.012  # the axis turns round within 0.1 s
-_AXIS_OFFSET_N = -3.16  # published for the clean axis; a bias comes on top
+_AXIS_OFFSET_N = -3.16  # published for the clean axis; a bias is added to this offset
 
 
 class RealCase(NamedTuple):
-    """One evidence that can be written; what was put into it, and how large."""
+    """One evidence that can be written, with the fault in it and the fault's size."""
 
     write: Callable[[Path], None]
     effects: tuple[str, ...]
@@ -32,13 +32,13 @@ class RealCase(NamedTuple):
 
 
 class Rig(NamedTuple):
-    """A real log that faults are put into, and what is large on it."""
+    """A real log that faults are added to, with the scales of a large fault."""
 
     write: Callable[[Path, Sensor], None]
-    force_N: float  # of its friction
-    begins_s: float  # of its clock
+    force_N: float  # friction force
+    begins_s: float  # start, on the clock of the log
     lasts_s: float
-    lag_s: float  # that changes its quickest motion clearly
+    lag_s: float  # a lag that clearly changes the fastest motion of the log
     offset_N: float
     faults: tuple[str, ...]
 
@@ -84,7 +84,7 @@ def _slider(folder: Path, sensor: Sensor, cuts: tuple[Cut, ...], levels: Levels)
 _FAST = (Cut("k168Nm_v1100", 1.1e-3, 0.0, 9.0), Cut("k168Nm_v1100", 1.1e-3, 9.0, 14.4, holdout=True))
 _SLOW = (Cut("k168Nm_v42", 4.2e-5, 0.0, 60.0), Cut("k168Nm_v42", 4.2e-5, 60.0, 100.0, holdout=True))
 _LEVEL_FAULTS = ("force-sensor-gain", "force-sensor-bias", "force-sensor-drift")
-# On the slider the force itself is all that is measured: a dead time moves the whole record and shows in nothing.
+# The slider measures the force alone: a dead time moves the whole record, so no feature shows it.
 RIGS = {
     "slider-fast": Rig(
         partial(_slider, cuts=_FAST, levels=Levels(0.362, 0.332)),
@@ -112,7 +112,7 @@ def real_cases(random: np.random.Generator) -> Iterator[RealCase]:
 
 
 def _sized(fault: str, size: float, sign: float, rig: Rig) -> tuple[Sensor, dict[str, Any]]:
-    """A fault at 0.5 to 1 of what is large on a rig; its numbers are those of the whole sensor, as the rig table sees it."""
+    """A fault of 0.5 to 1 times a large one on this rig; its numbers describe the whole sensor, against the rig table."""
     if fault == "force-sensor-gain":
         return gain(0.3 * sign * size), {"ratio": 0.3 * sign * size}
     if fault == "force-sensor-bias":

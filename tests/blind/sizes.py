@@ -1,7 +1,8 @@
-"""Sizes that were found before. With them a set is made again without sizing, and the same one by every version of the ruler.
+"""Kept sizes: with these a set is made again without sizing, and is the same set for every version of the sizing.
 
-`sizes/<generator>-<seed>.toml`: a table for the seed of a case, and of each of its effects the strength and the detection limits
-that it was worth. Who has them has the answers but for their names, so a set made with them is development data.
+`sizes/<generator>-<seed>.toml` has a table for the seed of each case; an entry gives the strength of an effect and the detection
+limits that the effect is worth. These files hold all of the answers but the names of the cases, so a set made with them is
+development data.
 """
 
 import tomllib
@@ -13,17 +14,17 @@ Sizes = Mapping[str, tuple[float, float]]  # of one case, by effect
 OPENED = {
     ("plant", 5980595),
     ("plant", 6073459),
-}  # generator and seed of sets that a score was published of, without sizes
+}  # generator and seed of sets with a published score and without kept sizes
 
 
 def known_sizes(generator: str, seed: int) -> dict[int, Sizes]:
-    """By the seed of a case; empty where a set was never sized."""
+    """The kept sizes, by the seed of a case; empty where a set was never sized."""
     path = Path(__file__).parent / "sizes" / f"{generator}-{seed}.toml"
     return read_sizes(path) if path.is_file() else {}
 
 
 def read_sizes(path: Path) -> dict[int, Sizes]:
-    """What `write_sizes` wrote."""
+    """The sizes in a file of `write_sizes`, by the seed of a case."""
     table: dict[str, dict[str, list[float]]] = tomllib.loads(path.read_text(encoding="utf-8"))
     return {
         int(seed): {name: (strength, limits) for name, (strength, limits) in effects.items()}
@@ -32,7 +33,7 @@ def read_sizes(path: Path) -> dict[int, Sizes]:
 
 
 def write_sizes(path: Path, answers: Iterable[Mapping[str, Any]]) -> None:
-    """The sizes of all effects that have one."""
+    """Write the sizes of all effects that have a size."""
     lines = [
         "# seed of a case, and of each of its effects the strength and the detection limits that it is worth there"
     ]

@@ -1,12 +1,11 @@
-"""How visible an effect is: what a rig without it cannot imitate, refitted inside its tolerances, in detection limits.
+"""How visible an effect is, in detection limits: the part that the baseline cannot imitate.
 
-The rig without effects is refitted to two evidences of one rig, with the effect and without; how much more chi2 is left with it
-is the square of the length that a matched filter would see. Both have a smooth surface: on a rough one an effect also moves every
-slip to another place, which alone looks like two limits. The floor is that of the rough one. A detection limit is the length at
-which the log evidence of a single effect with one parameter reaches 8.
+The baseline is fitted to two evidences of one rig, with the effect and without. The additional chi2 with the effect is the
+square of the length that a matched filter would see. Both evidences have a smooth surface: on a rough surface an effect also
+moves every slip to another place, which alone looks like two detection limits. The noise floor is that of the rough surface. A
+detection limit is the length at which the log evidence of a single effect with one parameter reaches 8.
 
-A linear estimate (the difference freed of the nuisances' directions) is not enough: it called a Coulomb friction 18 % lower worth
-10 limits, of which a refit leaves nothing.
+A linear estimate, the difference without the nuisances' directions, is not enough (docs/method/blind.md).
 """
 
 import math
@@ -31,19 +30,20 @@ from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.verdict.judge import JITTER
 
 Floats = npt.NDArray[np.floating[Any]]
-# The ruler stays where the diagnosis' own threshold moves, or scores of two versions could not be compared.
-_ALARM = 8.0  # log evidence
-_OCCAM = 5.0  # of one parameter, as it comes out of most refits
+# These numbers stay when the diagnosis' own threshold moves; otherwise scores of two versions could not be compared.
+_ALARM = 8.0  # log evidence of a detection limit
+_OCCAM = 5.0  # log evidence that one parameter costs in most refits
 LIMIT = math.sqrt(2.0 * JITTER * (_ALARM + _OCCAM))
-_MUCH = 0.6  # of chi2 a compared feature: less need not be refitted again
-_APPEARED = 4.0  # floors, where one evidence shows a feature that the other lacks
+# Chi2 per compared feature above which a refit goes on. Larger: a refit that stopped early counts as visible. Smaller: time.
+_MUCH = 0.6
+_APPEARED = 4.0  # difference, in floors, of a feature that only one of two evidences shows
 
 
 class Bench:
-    """A rig without its effects, to compare it with itself under an effect.
+    """A rig without effects, to compare it with the same rig under an effect.
 
     Args:
-        rough: evidence without an effect on the surface that the effect is to be seen on.
+        rough: evidence of the rig without effects on its rough surface.
         smooth: the same on a smooth surface.
 
     """
@@ -68,25 +68,25 @@ class Bench:
         self._without: Fit | None = None
 
     def detectability(self, folder: Path) -> float:
-        """How many detection limits the effect of this evidence is worth, in the runs that are fitted."""
+        """Detection limits that the effect of this evidence is worth in the fitted runs."""
         without = self._without or _refitted(self._fitter, np.zeros(len(self._nuisances)))
         problem = Problem(self._rig, [run for run in _runs(folder) if not run.holdout])
         fitter = Fitter(problem, self._floor(problem), self._nuisances)
         fit = _refitted(fitter, without.deviations)
-        # a valley that only one of the two refits finds is not the effect
+        # a better fit that only one of the two refits finds is no sign of the effect
         again = self._fitter.refit(NOTHING, fit.deviations, np.zeros(0))
         self._without = min(without, again, key=lambda one: one.chi2)
         as_before = self._without.chi2 / len(self._without.residual) * len(fit.residual)
         return math.sqrt(max(fit.chi2 - as_before, 0.0)) / LIMIT
 
     def _floor(self, problem: Problem) -> Floor:
-        """Anew for every evidence: what its replicates show depends on the forces that its segments begin with."""
+        """The noise floor; each evidence has its own, as replicates depend on the forces at the starts of its segments."""
         return floor_of(problem, self._described, replicates(problem, self._described, self._roughness, REPLICATES, 1))
 
     def cells(self, folder: Path) -> list[list[Any]]:
-        """Where this evidence differs: signal, regime, run, and compressed floors.
+        """The cells of this evidence: signal, regime, run, and difference in compressed floors.
 
-        The bands' mean squares are added up, as their shares of a gap are.
+        The mean squares of the bands of a cell are added up, as shares of a gap are.
         """
         runs = _runs(folder)
         squares: dict[tuple[str, str, str], float] = defaultdict(float)
@@ -99,7 +99,7 @@ class Bench:
 
 
 def _refitted(fitter: Fitter, deviations: Floats) -> Fit:
-    """The rig refitted, and further where much is left: one refit alone ended at 5783 of 1230."""
+    """The baseline, refitted further where much chi2 is left, as a single refit may stop early (docs/method/blind.md)."""
     fit = fitter.refit(NOTHING, deviations, np.zeros(0))
     return fit if fit.chi2 <= _MUCH * len(fit.residual) else fitter.further(fit)
 
@@ -109,9 +109,9 @@ def _runs(folder: Path) -> list[Prepared]:
 
 
 def _measured(without: Problem, runs: list[Prepared], described: Point) -> Floats:
-    """The features of `without` as the runs of the same files have them, [features]; NaN where they lack one.
+    """The features of `without` in runs of the same files [features]; NaN where a run lacks a feature.
 
-    As if each segment had begun in the same phase of its cycle: less what the described rig shows of the difference.
+    The difference that the described rig predicts is subtracted, as if each segment began in the same phase of its cycle.
     """
     files = {run.file for run in without.runs}
     other = Problem(without.rig, [run for run in runs if run.file in files])
@@ -129,7 +129,7 @@ def _measured(without: Problem, runs: list[Prepared], described: Point) -> Float
 def _differences(floor: Floor, without: Problem, there: Floats) -> Floats:
     """Features [features] less those of the problem, in floors, [compared]."""
     here = without.measured
-    # measured features hold the noise already that `expected` adds
+    # `expected` adds noise that measured features hold already, so its bias is subtracted first
     apart = (floor.expected(there - floor.bias) - floor.expected(here - floor.bias))[floor.compared]
     z = apart / floor.scatter[floor.compared]
     one_lacks_it = (np.isfinite(there) != np.isfinite(here))[floor.compared]

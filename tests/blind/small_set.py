@@ -1,4 +1,4 @@
-"""A small set with shorter runs, whose sizes are known: sizing takes minutes that `make test` has better use for.
+"""A small set with shorter runs and kept sizes, as sizing would take minutes of `make test`.
 
 `python -m tests.blind.small_set` sizes its effects anew and writes `small_set.toml`.
 """

@@ -21,7 +21,7 @@ class Bump(NamedTuple):
 
 
 class StandIn:
-    """A generator of two effects and one that nobody knows."""
+    """A generator of two effects of the library and one outside."""
 
     library = ("drive-backlash", "force-sensor-gain")
     outside = ("loose-screw",)
@@ -46,7 +46,7 @@ class StandIn:
 
 
 class StandInBench:
-    """Reads the strength off the force."""
+    """A bench that reads the strength from the force."""
 
     def __init__(self, _rough: Path, smooth: Path) -> None:
         self.force_N = _first_N(smooth)
@@ -63,7 +63,7 @@ def _first_N(folder: Path) -> float:
 
 
 def case(stratum, there, probabilities, named=None, groups=(), detectability=3.0, verdict=None, **more) -> Opened:
-    """A case; `named` is the leading candidate unless told."""
+    """A case; by default `named` is the leading candidate."""
     right = {"no-gap": "no-gap", "outside": "unexplained"}.get(stratum, "effect")
     answer = {
         "stratum": stratum,

@@ -1,4 +1,4 @@
-"""Which cases a set has: kinds of cases in their shares, effects in turn, all decided by one seed."""
+"""The cases of a set: kinds of cases in their shares, effects in turn, all drawn from one seed."""
 
 from typing import NamedTuple
 
@@ -25,18 +25,18 @@ BUT_FORCE_AND_DRIVE = (*ACCELERATIONS, "mass_position_m")
 
 
 class Unclear(NamedTuple):
-    """Effects that the channels left cannot tell apart, or only barely."""
+    """Effects that the remaining channels cannot tell apart, or only barely."""
 
     group: tuple[str, ...]
     leave_out: tuple[str, ...]
 
 
 UNCLEAR = (
-    # 1 ms of lag looks like 12 N s/m of damping to a spring whose force alone is seen
+    # where the force alone is measured, 1 ms of lag looks like 12 N s/m of damping
     Unclear(("force-sensor-delay", "force-sensor-lag", "drive-damping"), BUT_FORCE_AND_DRIVE),
     # force, stiffness and friction all scale alike
     Unclear(("force-sensor-gain", "coulomb-level", "static-level", "drive-stiffness"), BUT_FORCE_AND_DRIVE),
-    # what the piezo delivers is not seen; only that it is less
+    # the delivered vibration is not measured; the runs show only that it is weaker
     Unclear(("piezo-roll-off", "piezo-resonance", "piezo-sag"), ACCELERATIONS),
 )
 
@@ -56,12 +56,12 @@ class Drawn(NamedTuple):
 
 
 def counts(cases: int, has_outside: bool, real: int) -> dict[str, int]:
-    """How many cases of each kind: one at least, and what rounding leaves goes to the single effects.
+    """The number of cases of each kind: one at least; the remainder of rounding goes to the single effects.
 
     Args:
-        cases: of all kinds together.
+        cases: number of cases of all kinds together.
         has_outside: whether the generator has effects outside the library.
-        real: how many faults in measured logs there are to take.
+        real: number of faults in measured logs.
 
     """
     found = {name: max(1, round(share * cases)) for name, share in SHARES.items()}
@@ -72,7 +72,7 @@ def counts(cases: int, has_outside: bool, real: int) -> dict[str, int]:
 
 
 def _real_faults() -> int:
-    """How many faults in measured logs there are; none without the logs."""
+    """The number of faults in measured logs; 0 without the logs."""
     try:
         return len(list(real_cases(np.random.default_rng(0))))
     except FileNotFoundError:
@@ -80,7 +80,7 @@ def _real_faults() -> int:
 
 
 def draw(generator: Generator, cases: int, seed: int) -> list[Drawn]:
-    """Draw all cases; their order tells their kind."""
+    """Draw all cases, ordered by kind."""
     library, outside = generator.library, generator.outside
     source = np.random.default_rng([seed, 0])
     turns = {names: source.permutation(names).tolist() for names in (library, outside) if names}

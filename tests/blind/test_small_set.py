@@ -39,7 +39,7 @@ def test_every_case_was_diagnosed(tool):
 
 
 def test_visible_effects_are_named(tool):
-    """Of seven single effects of two detection limits or more, one may have another first."""
+    """Of seven single effects of two detection limits or more, all but one must come first."""
     assert tool["visible"]["top_1"]["n"] == 7
     assert tool["visible"]["top_1"]["value"] >= 6 / 7
     assert tool["visible"]["top_3"]["value"] == 1.0

@@ -1,4 +1,4 @@
-"""Rigs with nothing wrong but a vibration that means over 1 ms do not show: in a sensor's cable, or at other frequencies."""
+"""Rigs whose only effect is a vibration that means over 1 ms hide: in a sensor's cable, or at other frequencies."""
 
 import numpy as np
 import pytest

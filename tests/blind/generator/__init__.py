@@ -1,9 +1,9 @@
-"""Makes evidence folders of rigs that hide a gap; shares no line with the plant or the diagnosis it tests.
+"""Makes evidence folders of rigs that hide a gap; shares no line with the plant, nor with the diagnosis that it tests.
 
 kernel.py    the rig's equations of motion and their integrator     rig.py      the numbers of one rig
-surface.py   friction along the track                               runs.py     what is driven and vibrated when
-chain.py     the sensor chain: noise, hum, bandwidth, resolution    effect.py   what an effect is
-library.py   the 26 named effects                                   outside.py  effects that have no name
+surface.py   friction along the track                               runs.py     the commands of drive and piezo in each run
+chain.py     the sensor chain: noise, hum, bandwidth, resolution    effect.py   an effect and its formulas
+library.py   the 26 named effects                                   outside.py  effects that have no name in the library
 evidence.py  one folder on disk                                     case.py     a case, from seed to folder
 
 Signs as in the paper: a force is positive when it pulls in +x. Sources of the formulas stand beside them.

@@ -1,7 +1,7 @@
-"""A case: which effects a rig hides, and the evidence it gives.
+"""A case: the effects that a rig hides, and the evidence of its runs.
 
-Each random stream has a seed of its own, made of the case's seed, a word and the run: a counterfactual (the same
-call with no effects) has the same rig, surface, sensors, starts and noise, and differs by the effects alone.
+Each random stream has its own seed, made of the case's seed, a word and the run. So a counterfactual (the same call
+without effects) has the same rig, surface, sensors, starts and noise, and differs by the effects alone.
 """
 
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ from tests.blind.generator.surface import STEP_m, draw_surface, track_m
 
 @dataclass(frozen=True)
 class Case:
-    """What is particular about one rig.
+    """The choices for one rig.
 
-    backbone     a name of rig.BACKBONES, or drawn from the seed
-    tolerances   scale of how far the rig's numbers lie from the described ones; 0: exactly as described
+    backbone     a name of rig.BACKBONES; None: drawn from the seed
+    tolerances   scale of the distance of the rig's numbers from the described ones; 0: exactly as described
     roughness    scale of the surface's scatter; 0: the same friction everywhere
     sensors      scale of noise, hum, drift and bow; 0: an ideal chain, bandwidth and resolution included
     leave_out    standard columns that this rig does not record
@@ -48,7 +48,7 @@ def _stream(seed: int, word: str, run: int = 0) -> np.random.Generator:
 
 
 def _stretch_m(params: np.ndarray, force_N: float) -> tuple[float, float]:
-    """Stretch of the drive spring at a force above 0, and where its clamp's slider stands, by bisection."""
+    """Stretch of the drive spring at a force above 0, and position of its clamp's slider, by bisection [m]."""
     p = params[0]
     low, high = 0.0, 0.1
     for _ in range(80):
@@ -62,10 +62,10 @@ def _stretch_m(params: np.ndarray, force_N: float) -> tuple[float, float]:
 
 
 def _steps_of(params: np.ndarray, level: np.ndarray, tracks: Tracks) -> int:
-    """Steps per sample that the fastest slip allows: sigma0 |v| / g of the stiffest element at most 1.5 per step.
+    """Steps per sample that the fastest slip needs: sigma0 |v| / g of the stiffest element is at most 1.5 per step.
 
     Runge-Kutta is stable up to 2.78. A slip reaches (F_s - F_c) / sqrt(k m) plus twice the drive's speed; F_s and
-    F_c taken as far apart as ageing and direction may bring them. 13 unless effects make the slip twice as fast.
+    F_c are taken as far apart as ageing and direction can bring them. 13 steps, unless effects make the slip twice as fast.
     """
     p = params[0]
     low, high = (float(f(level) * f(tracks.load)) for f in (np.min, np.max))
@@ -86,7 +86,7 @@ def _steps_of(params: np.ndarray, level: np.ndarray, tracks: Tracks) -> int:
 
 
 def _frame_m(params: np.ndarray, force_N: float) -> float:
-    """How far the frame gives way to a force."""
+    """Displacement of the frame under a force [m]."""
     p = params[0]
     if p["frame_inverse_mass_1_per_kg"] == 0.0:
         return 0.0
@@ -99,7 +99,7 @@ def _run(params: np.ndarray, level: np.ndarray, start: Start, force: float, trac
     slider = _stretch_m(params, force)[1]
     y = np.zeros(STATES)
     y[0] = y[11] = start.position_m
-    carried = force + place_force_N(p, start.position_m)  # by the contact, so that the slide is at rest
+    carried = force + place_force_N(p, start.position_m)  # force that the contact carries, so that the slide is at rest
     y[2:6] = carried / p["contact_stiffness_N_per_m"]
     y[6] = -_frame_m(params, force)
     if p["base_inverse_mass_1_per_kg"] > 0.0:
@@ -123,7 +123,7 @@ def _run(params: np.ndarray, level: np.ndarray, start: Start, force: float, trac
 
 
 def simulate(case: Case, seed: int, plans: tuple[Plan, ...] = PROTOCOL, finer: int = 1) -> list[Signals]:
-    """What the rig's recorder holds after each run: standard column -> (samples,) at 20 kHz, float64.
+    """The recorded signals of each run: standard column -> (samples,) at 20 kHz, float64.
 
     `finer` divides the integrator's step.
     """

@@ -8,7 +8,7 @@ from tests.blind.generator.effect import Signals
 from tests.blind.generator.kernel import SAMPLE_RATE_HZ
 
 RANGE_m = 0.050  # of a displacement sensor
-# data sheets give an accelerometer's bandwidth where it reads 5 % low; one pole does so at 0.33 of its corner
+# data sheets give the frequency at which an accelerometer reads 5 % low; a single pole does so at 0.33 of its corner
 ACCEL_POLE_Hz = 10_000.0 / np.sqrt(1.0 / 0.95**2 - 1.0)
 
 
@@ -98,10 +98,10 @@ def _response(channel: Channel, frequency_Hz: np.ndarray) -> np.ndarray:
 
 
 def _filtered(channel: Channel, signal: np.ndarray) -> np.ndarray:
-    """Through the analog response, by Fourier transform; before the run the signal stood at its first value.
+    """The signal after the analogue response, by Fourier transform; before the run the signal has its first value.
 
-    The first value is taken off and the end led back to the start over 2 s, so that the transform's wrap-around
-    meets a signal at rest.
+    The first value is subtracted, and the end is led back to the start over 2 s, so that the wrap-around of the
+    transform meets a signal at rest.
     """
     if not (channel.low_pass_Hz or channel.pole_Hz or channel.high_pass_Hz):
         return signal
@@ -126,7 +126,7 @@ def _noise(random: np.random.Generator, channel: Channel, samples: int) -> np.nd
 
 
 def measure(random: np.random.Generator, chain: Chain, signals: Signals, scale: float) -> Signals:
-    """What the recorder writes for the true signals of one run; `scale` 0 is an ideal chain, 1 the drawn one."""
+    """The recorded signals for the true signals of one run; `scale` 0 is an ideal chain, 1 the drawn chain."""
     if scale == 0.0:
         return signals
     measured = dict(signals)

@@ -1,4 +1,4 @@
-"""What an effect is: a mechanism's name, one formula for it, that formula's numbers, and one strength."""
+"""An effect: the name of a mechanism, one formula for it, the numbers of this formula, and one strength."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ Signals = dict[str, np.ndarray]  # standard column -> (samples,)
 
 @dataclass(frozen=True)
 class Formula:
-    """One way a mechanism can act. `draw` gives its numbers; each hook gets (what it changes, strength, numbers).
+    """One way in which a mechanism acts. `draw` gives its numbers; each hook gets (object to change, strength, numbers).
 
     rig      params (1,) PARAMS, in place
     surface  positions [m], friction level along the track, in place
@@ -35,7 +35,7 @@ class Formula:
 
 @dataclass(frozen=True)
 class Effect:
-    """A drawn effect. Strength 1 is clearly large for its mechanism; 0 is a rig without it."""
+    """A drawn effect. Strength 1 is clearly large for its mechanism; 0 is a rig without the effect."""
 
     formula: Formula
     numbers: Numbers = field(hash=False)
@@ -78,7 +78,7 @@ def either(random: np.random.Generator) -> float:
 
 
 def noise_seed(random: np.random.Generator) -> float:
-    """For numbers that a formula draws per run; kept as a float so that all numbers are."""
+    """A seed for numbers that a formula draws per run; a float, as all numbers of an effect are floats."""
     return float(random.integers(2**31))
 
 

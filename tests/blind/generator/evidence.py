@@ -1,4 +1,4 @@
-"""One evidence folder: manifest.toml and a parquet file per run, the same shape whatever the rig hides."""
+"""One evidence folder: manifest.toml and a parquet file per run, of the same shape for every rig."""
 
 from pathlib import Path
 
@@ -23,12 +23,12 @@ COLUMNS = (
 
 
 def file_name(number: int) -> str:
-    """Of run `number`, counted from 0."""
+    """Name of the file of run `number`, counted from 0."""
     return f"run-{number + 1:02d}.parquet"
 
 
 def manifest(plans: tuple[Plan, ...]) -> str:
-    """The rig as its owner knows it: the same text for every case of a protocol."""
+    """The manifest, with the rig as its owner knows it: the same text for every case of a protocol."""
     lines = ['format = "evidence/1"', "", "[rig]", 'drive = "spring"']
     lines += [f"{name} = {value!r}" for name, value in DESCRIBED.items()]
     lines += ["", "[rig.tolerance]"]
@@ -42,7 +42,7 @@ def manifest(plans: tuple[Plan, ...]) -> str:
 
 
 def write_run(path: Path, signals: Signals, leave_out: tuple[str, ...]) -> None:
-    """Time in float64: in float32 10 s would be known to 1 us only. Everything else in float32."""
+    """Write one run: time in float64, as float32 resolves 10 s to 1 us only; all other columns in float32."""
     columns = [name for name in COLUMNS if name not in leave_out]
     arrays = [pa.array(signals[name].astype(np.float64 if name == "t_s" else np.float32)) for name in columns]
     pq.write_table(pa.table(arrays, names=columns), path, compression="zstd", compression_level=1)

@@ -5,8 +5,8 @@ force [N]; inner mass x, v; seal deflection [m]. Bristle rate as LuGre (Canudas 
 z' = v_r - sigma0 |v_r| z / g(v_r). At 22 mm/s of slip sigma0 |v| / g is 1.2e5 1/s, 0.45 per step of 3.85 us;
 Runge-Kutta is stable up to 2.78, so there is room for a stiff element and a slip five times as fast.
 
-What has memory without being a rate (rest time, lag of g, clamp slider, heat) is carried from step to step.
-Off means a factor of exactly 1 or an addend of exactly 0.
+Memory that is no rate (rest time, lag of g, clamp slider, heat) is carried from step to step.
+An effect that is off is a factor of exactly 1 or an addend of exactly 0.
 """
 
 import math
@@ -18,12 +18,12 @@ SAMPLE_RATE_HZ = 20_000
 SUBSTEPS = 13
 STATES = 14
 REST_SPEED_MPS = 2e-5  # below it the contact rests and ages; drive velocities start at 0.15 mm/s
-SMOOTHING_S = 1e-3  # of slip speed and drive force where a slow mechanism listens to them
+SMOOTHING_S = 1e-3  # time constant of slip speed and drive force as inputs of slow mechanisms
 
 
 @nb.njit(cache=True)
 def spring_force_N(p, stretch_m, slider_m):
-    """Static force of the drive spring at a stretch; slider_m is where the clamp's slider stands."""
+    """Static force of the drive spring at a stretch; slider_m is the position of the clamp's slider."""
     s = stretch_m
     if p.backlash_m > 0.0:
         half, edge = 0.5 * p.backlash_m, 0.1 * p.backlash_m  # a soft edge: the teeth give a little
@@ -44,7 +44,7 @@ def spring_force_N(p, stretch_m, slider_m):
 
 @nb.njit(cache=True)
 def place_force_N(p, x_m):
-    """What pulls the slide at a place whichever way it moves: the track's tilt, a magnet's detent."""
+    """The force on the slide at a place, in both directions of motion: the track's tilt, a magnet's detent."""
     place = x_m - p.tilt_centre_m
     force = -(p.tilt_N_per_m * place + p.tilt_N_per_m2 * place * place)
     if p.detent_force_N > 0.0:
@@ -64,7 +64,7 @@ def _aged(p, rest_s):
 
 @nb.njit(cache=True)
 def _stribeck_share(p, r):
-    """How much of F_s - F_c is left at r times the Stribeck velocity."""
+    """The share of F_s - F_c that is left at r times the Stribeck velocity."""
     if p.lorentzian > 0.0:
         return 1.0 / (1.0 + r * r)
     if p.stribeck_exponent == 2.0:
@@ -74,7 +74,7 @@ def _stribeck_share(p, r):
 
 @nb.njit(cache=True)
 def _steady_friction_N(p, v_r, lagged_mps, level, aged, stribeck_mps):
-    """g: what the contact carries at a steady speed. `level` is load times surface; lagged_mps < 0: nothing lags."""
+    """g, the friction force at a steady speed. `level` is load times surface; lagged_mps < 0: nothing lags."""
     coulomb = p.coulomb_force_N
     static = p.static_force_N * (1.0 + aged)
     side = 1.0 if v_r >= 0.0 else -1.0

@@ -1,4 +1,4 @@
-"""The 26 effects that have a name: formulas per mechanism, from the literature, and how their numbers are drawn."""
+"""The 26 effects that have a name: the formulas of each mechanism, from the literature, and how their numbers are drawn."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def formulas_of(name: str) -> list[Formula]:
 
 
 def draw_effect(random: np.random.Generator, name: str) -> Effect:
-    """An effect of this name, in the library or outside it, at strength 1: which formula, and its numbers."""
+    """An effect of this name, in the library or outside it, at strength 1, with a drawn formula and drawn numbers."""
     formulas = formulas_of(name)
     formula = formulas[int(random.integers(len(formulas)))]
     return Effect(formula, formula.draw(random))

@@ -17,9 +17,9 @@ def _ageing(p: np.ndarray, s: float, n: Numbers) -> None:
 
 
 def _lag(p: np.ndarray, s: float, n: Numbers) -> None:
-    """The time or distance goes as the strength, and below a tenth the share that lags fades as well.
+    """Time or distance are in proportion to the strength; below a strength of 0.1 the share that lags fades as well.
 
-    Otherwise the faintest lag would still act under vibration, whose period is 0.2 ms and whose path is 0.08 um.
+    Otherwise the faintest lag would still act under vibration, with its period of 0.2 ms and its path of 0.08 um.
     """
     p["lag_share"] = 1.1 * s / (s + 0.1) if s < 1.0 else 1.0
     p["lag_delay_s"] = s * n["delay_s"]
@@ -69,7 +69,7 @@ def _load_wave(tracks: Tracks, s: float, n: Numbers) -> None:
 
 def _load_noise(tracks: Tracks, s: float, n: Numbers) -> None:
     band = n["frequency_Hz"] * np.array([1.0 - n["half_band"], 1.0 + n["half_band"]])
-    slow = SAMPLE_RATE_HZ // 100  # designed at 200 Hz: so narrow a band is ill-conditioned at 20 kHz
+    slow = SAMPLE_RATE_HZ // 100  # filtered at 200 Hz, as a filter of so narrow a band is ill-conditioned at 20 kHz
     coarse = noise_of(n, tracks.number).standard_normal(len(tracks.t_s) // slow + 4000)
     coarse = sosfiltfilt(butter(2, band, "bandpass", fs=200.0, output="sos"), coarse)[2000:]
     noise = np.interp(tracks.t_s * 200.0, np.arange(len(coarse)), coarse / coarse.std())

@@ -23,7 +23,7 @@ def _stiffness(p: np.ndarray, s: float, n: Numbers) -> None:
 
 
 def _move_drive(tracks: Tracks, extra_m: np.ndarray) -> None:
-    """The drive truly moves so, and its displacement sensor sees it."""
+    """Move the drive itself, so that its displacement sensor shows the motion."""
     extra_m = extra_m - extra_m[0]
     tracks.drive_m += extra_m
     tracks.drive_mps += np.gradient(extra_m, tracks.t_s)
@@ -34,13 +34,13 @@ def _wave(angle: np.ndarray, n: Numbers) -> np.ndarray:
 
 
 def _ripple_pitch(tracks: Tracks, s: float, n: Numbers) -> None:
-    """The lead of the screw errs once and twice per turn; a run that starts elsewhere starts at another angle."""
+    """The lead of the screw has an error once and twice per turn; the angle at the start follows from the position."""
     per_m = 2.0 * np.pi / n["pitch_m"]
     _move_drive(tracks, s * n["depth"] / per_m * _wave(per_m * (tracks.origin_m + tracks.drive_m), n))
 
 
 def _ripple_time(tracks: Tracks, s: float, n: Numbers) -> None:
-    """The motor's speed swings about what it is told, by a share of it."""
+    """The motor's speed swings around its command, by a share of the command."""
     speed = s * n["depth"] * tracks.drive_mps * _wave(2.0 * np.pi * n["frequency_Hz"] * tracks.t_s, n)
     _move_drive(tracks, np.cumsum(speed) * (tracks.t_s[1] - tracks.t_s[0]))
 
@@ -65,7 +65,7 @@ def _structure(side: str):
 
 
 def _deliver(tracks: Tracks, response: np.ndarray) -> None:
-    """Amplitude and phase of what arrives, (samples,) complex; the frequency is held while the amplitude is not 0."""
+    """Delivered over commanded vibration, (samples,) complex; the frequency is held while the amplitude is not 0."""
     tracks.amplitude_m[:-1] *= np.abs(response)
     tracks.amplitude_m[-1] *= np.abs(response[-1])
     tracks.phase_rad += np.angle(response)

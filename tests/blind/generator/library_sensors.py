@@ -1,4 +1,4 @@
-"""Sensor effects of the library: they change what is measured and nothing of the rig."""
+"""Sensor effects of the library: they change the measured signals, and not the rig."""
 
 import numpy as np
 from scipy.signal import bessel, bilinear, lfilter
@@ -28,7 +28,7 @@ def _drift_power(signals: Signals, s: float, n: Numbers) -> None:
 
 
 def _low_pass(signals: Signals, s: float, n: Numbers) -> None:
-    """A filter of unit gain whose corner goes as 1 / strength; it has settled before the run begins."""
+    """A filter of unit gain whose corner is in proportion to 1 / strength; it has settled before the run begins."""
     corner_Hz = n["corner_Hz"] / s
     if corner_Hz > 0.4 * SAMPLE_RATE_HZ:  # beyond what 20 kHz can hold: a first-order mix that vanishes with s
         share = 0.4 * SAMPLE_RATE_HZ / corner_Hz

@@ -1,4 +1,4 @@
-"""Effects that happen to real rigs and are none of the library's mechanisms."""
+"""Effects of real rigs that are none of the library's mechanisms."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -11,9 +11,9 @@ Random = np.random.Generator
 
 
 def _clock(signals: Signals, s: float, n: Numbers) -> None:
-    """Two recorders, the slower one timed by software: the accelerations run off from the rest, more every second.
+    """Two recorders, one of them timed by software: the accelerations drift away in time from the other signals.
 
-    Cubic splines, because straight lines would take 13 % off a vibration at 4.5 kHz.
+    Cubic splines interpolate, as straight lines would take 13 % off a vibration at 4.5 kHz.
     """
     own_s = np.minimum(signals["t_s"] * (1.0 + s * n["skew"]), signals["t_s"][-1])
     for column in ("mass_accel_mps2", "base_accel_mps2"):
@@ -21,7 +21,7 @@ def _clock(signals: Signals, s: float, n: Numbers) -> None:
 
 
 def _compression(signals: Signals, s: float, n: Numbers) -> None:
-    """The force amplifier runs out of supply: above the knee a newton gives less and less."""
+    """The force amplifier saturates: above the knee each further newton shows less."""
     force = signals["drive_force_N"]
     over = np.maximum(np.abs(force) - n["knee_N"], 0.0)
     share = np.minimum(s * n["share"], 1.0)
@@ -29,7 +29,7 @@ def _compression(signals: Signals, s: float, n: Numbers) -> None:
 
 
 def _coupling_slip(tracks: Tracks, s: float, n: Numbers) -> None:
-    """A clamp between drive sensor and spring lets go now and then; the spring's end jumps back within 5 ms."""
+    """A clamp between drive sensor and spring slips at random times; the spring's end jumps back within 5 ms."""
     random = noise_of(n, tracks.number)
     count = random.poisson(n["per_second"] * tracks.t_s[-1]) + 1
     direction = np.sign(tracks.drive_mps)
@@ -40,7 +40,7 @@ def _coupling_slip(tracks: Tracks, s: float, n: Numbers) -> None:
 
 
 def _debris(tracks: Tracks, s: float, n: Numbers) -> None:
-    """A particle is caught, ploughs for some ten milliseconds and leaves."""
+    """A particle gets into the contact, ploughs for some ten milliseconds and leaves."""
     random = noise_of(n, tracks.number)
     count = random.poisson(n["per_second"] * tracks.t_s[-1]) + 1
     for at_s in random.uniform(0.0, tracks.t_s[-1], count):
@@ -49,14 +49,14 @@ def _debris(tracks: Tracks, s: float, n: Numbers) -> None:
 
 
 def _cross_talk(signals: Signals, s: float, n: Numbers) -> None:
-    """The piezo's kilohertz voltage couples into the force cable: as a capacitor does, in step with its slope."""
+    """The piezo's voltage couples into the force cable as through a capacitor, in proportion to its slope."""
     share = signals["base_accel_mps2"] / (2.0 * np.pi * 3000.0) ** 2 / 0.02e-6  # about 1 at 3 kHz, as f^2
     signals["drive_force_N"] += s * n["pick_up_N"] * share
 
 
 def _drop_outs(signals: Signals, s: float, n: Numbers) -> None:
-    """A loose plug: the force falls back towards nothing for some milliseconds."""
-    start_nm = int(1e9 * signals["mass_position_m"][0])  # tells one run from another
+    """A loose plug: the force signal falls towards zero for some milliseconds."""
+    start_nm = int(1e9 * signals["mass_position_m"][0])  # differs from run to run, so it serves as the run's number
     random = noise_of(n, start_nm)
     keep = np.ones(len(signals["t_s"]))
     count = random.poisson(n["per_second"] * signals["t_s"][-1]) + 1
@@ -81,7 +81,7 @@ OUTSIDE_FORMULAS = (
         lambda r: {"acceleration_friction_s2_per_m": r.uniform(0.02, 0.05)},
         rig=scales("acceleration_friction_s2_per_m"),
     ),
-    # the wiper of the guide: soft, breaks away after tens of micrometres, stands still beside the vibrated base
+    # the wiper of the guide: a soft contact that breaks away after tens of micrometres and does not vibrate with the base
     Formula(
         "guide-seal",
         "parallel-contact",
@@ -124,7 +124,7 @@ OUTSIDE_FORMULAS = (
         lambda r: {"second_harmonic": either(r) * r.uniform(0.2, 0.4), "subharmonic": r.uniform(0.3, 0.6)},
         rig=scales("second_harmonic", "subharmonic"),
     ),
-    # a linear motor's cogging: pulls the slide to places on the track whichever way it goes
+    # cogging of a linear motor: pulls the slide to fixed places on the track in both directions
     Formula(
         "magnet-detent",
         "sine",

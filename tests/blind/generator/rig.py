@@ -1,4 +1,4 @@
-"""The numbers of one rig: as described to its owner, and as they truly are."""
+"""The numbers of one rig: the described ones, and the true ones."""
 
 from dataclasses import dataclass
 
@@ -101,7 +101,7 @@ PARAMS = np.dtype(
 
 @dataclass(frozen=True)
 class Start:
-    """How a run finds the rig: where the slide stands, how far the spring is loaded, how old the contact is."""
+    """State of the rig at the start of a run: position of the slide, load of the spring, age of the contact."""
 
     position_m: float
     force_share: float  # of F_c
@@ -123,8 +123,8 @@ def _draw_numbers(random: np.random.Generator, scale: float) -> dict[str, float]
 def _draw_elements(random: np.random.Generator, p: np.ndarray) -> None:
     """Elements of a generalized Maxwell slip with LuGre's rate equation (Lampaert, Al-Bender & Swevers 2003).
 
-    Yield displacements spread by at most 1.6 up and down: the hysteresis of presliding is rounder, the steady
-    force, the total stiffness and the total damping are those of the one-element model.
+    The yield displacements spread by at most a factor of 1.6 either way, so the hysteresis of presliding is rounder. The
+    steady force, the total stiffness and the total damping are those of the model with one element.
     """
     count = int(random.integers(3, ELEMENTS + 1))
     force = random.uniform(0.7, 1.3, count)
@@ -135,9 +135,9 @@ def _draw_elements(random: np.random.Generator, p: np.ndarray) -> None:
 
 
 def draw_rig(random: np.random.Generator, backbone: str | None, scale: float) -> np.ndarray:
-    """One rig as a (1,) array of PARAMS, numbers within `scale` times their tolerance.
+    """One rig as a (1,) array of PARAMS; its numbers are spread by `scale` times their tolerances.
 
-    Without a backbone named, LuGre with a Gaussian Stribeck curve in two draws of three.
+    Without a `backbone`, two draws of three are LuGre with a Gaussian Stribeck curve.
     """
     p = np.zeros(1, PARAMS)
     for name, value in _draw_numbers(random, scale).items():

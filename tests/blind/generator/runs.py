@@ -1,4 +1,4 @@
-"""The protocol: what the drive and the piezo are told in each run, and what they then do."""
+"""The protocol: the commands of drive and piezo in each run, and their motion."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ VIBRATION_RAMP_S = 0.025  # a step of a piezo rings its mount; 20 to 100 ms is u
 
 @dataclass(frozen=True)
 class Plan:
-    """One run: (from when, drive velocity) and (from when, vibration frequency; 0 is off)."""
+    """One run: pairs of (start [s], drive velocity [m/s]) and of (start [s], vibration frequency [Hz]; 0 is off)."""
 
     drive: tuple[tuple[float, float], ...]
     vibration: tuple[tuple[float, float], ...] = ()
@@ -39,18 +39,18 @@ PROTOCOL = (
 
 @dataclass
 class Tracks:
-    """What happens to the rig from outside during one run. Knots are samples + 1 long, held values samples long."""
+    """The inputs of the rig during one run. Knots have samples + 1 values, held values have `samples`."""
 
     number: int  # of the run, from 0
     t_s: np.ndarray  # knots
-    origin_m: float  # where the drive starts, on the track
-    drive_m: np.ndarray  # knots; from there
+    origin_m: float  # start of the drive on the track
+    drive_m: np.ndarray  # knots; travel of the drive from `origin_m`
     drive_mps: np.ndarray  # knots
-    unseen_m: np.ndarray  # knots; what the spring's end moves beyond the measured drive position
+    unseen_m: np.ndarray  # knots; motion of the spring's end that the measured drive position does not show
     load: np.ndarray  # knots; factor on friction
     frequency_Hz: np.ndarray  # held
     amplitude_m: np.ndarray  # knots; delivered
-    phase_rad: np.ndarray  # held; of the delivered against the commanded vibration
+    phase_rad: np.ndarray  # held; phase of the delivered vibration against the commanded one
     commanded_m: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -58,7 +58,7 @@ class Tracks:
 
 
 def _vibration(plan: Plan, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequency and amplitude at t: to zero just before a frequency ends, from zero after one begins."""
+    """Frequency and amplitude at t; the amplitude ramps from zero after a frequency begins, and to zero before it ends."""
     frequency, amplitude = np.zeros_like(t_s), np.zeros_like(t_s)
     ends = [begin for begin, _ in plan.vibration[1:]] + [plan.duration_s + 1.0]
     for (begin, value), end in zip(plan.vibration, ends, strict=False):
@@ -70,7 +70,7 @@ def _vibration(plan: Plan, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tracks_of(plan: Plan, number: int, origin_m: float = 0.0) -> Tracks:
-    """The run as planned: a drive that moves as told, a piezo that delivers what it is told, no load change."""
+    """The inputs as planned: drive and piezo follow their commands exactly, and the load is constant."""
     samples = round(plan.duration_s * SAMPLE_RATE_HZ)
     t_s = np.arange(samples + 1) / SAMPLE_RATE_HZ
     knots, speeds, before = [], [], 0.0
