@@ -1,6 +1,7 @@
 """Compilation of hot code: numba, cached on disk, without the flags that change bits."""
 
 import atexit
+import errno
 import hashlib
 import os
 import shutil
@@ -49,6 +50,8 @@ def _cache_folder() -> Path:
 def _usable(folder: Path) -> Path:
     """The folder; when it is not writable, a temporary one for this process and its children, removed when this one ends."""
     try:
+        if str(folder).startswith("~"):  # not expanded: a folder of that name would be made where the command is called
+            raise OSError(errno.ENOENT, "its home is not known")
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:

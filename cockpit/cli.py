@@ -1,5 +1,6 @@
 """The `stickslip` command, put together. Each command imports what it needs when it runs, so that `--help` is quick."""
 
+import logging
 import os
 
 import typer
@@ -42,4 +43,6 @@ def main() -> None:
     # for joblib, which starts its workers with `python -m`: the folder of the person who calls would be searched first, and
     # may hold a plant.py or numpy.py of that person's own
     os.environ["PYTHONSAFEPATH"] = "1"
+    # a picture looks the same where a read-only home keeps no cache of its fonts, of which matplotlib warns in two lines
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     app()

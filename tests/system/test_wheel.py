@@ -1,0 +1,77 @@
+"""The wheel: it holds all that the packages need, and is small without extras."""
+
+import os
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("bridge", "cockpit", "controller", "diagnosis", "plant")
+BASE_MB = 650.0
+
+
+def run(*command: str | Path, cwd: Path, **more: str) -> str:
+    """What a command that has to end well says on stdout, without the environment of the checkout."""
+    usual = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    done = subprocess.run(command, cwd=cwd, env=usual | more, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    run(sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", folder, cwd=ROOT)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_the_wheel_holds_every_file_of_the_packages_and_nothing_else(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as file:
+        held = {name for name in file.namelist() if ".dist-info/" not in name}
+    listed = run("git", "ls-files", *PACKAGES, "deploy", cwd=ROOT).splitlines()
+    assert held == {f"cockpit/{name}" if name.startswith("deploy/") else name for name in listed}
+
+
+def test_what_the_wheel_holds_runs_in_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
+    unpacked, empty = tmp_path / "unpacked", tmp_path / "empty"
+    empty.mkdir()
+    zipfile.ZipFile(wheel).extractall(unpacked)
+    # interpreted: the kernels at another path would be compiled anew, for half a minute, and kept for nobody
+    said = run(
+        sys.executable, "-P", "-m", "cockpit", "run", "--in-process", "--set", "duration_s=0.05",
+        cwd=empty, PYTHONPATH=str(unpacked), NUMBA_DISABLE_JIT="1",
+    )  # fmt: skip
+    assert "blocks   50, none lost" in said
+    where = run(sys.executable, "-P", "-c", "import cockpit; print(cockpit.__file__)", cwd=empty, PYTHONPATH=str(unpacked))
+    assert Path(where.strip()).is_relative_to(unpacked)
+
+
+def installed(at: Path, requirement: str) -> Path:
+    """The bin folder of a fresh environment with what was required, from the package index."""
+    venv.create(at, with_pip=True)
+    run(at / "bin" / "python", "-m", "pip", "install", "--quiet", requirement, cwd=at)
+    return at / "bin"
+
+
+@pytest.mark.nightly
+def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> None:
+    at = installed(tmp_path / "base", str(wheel))
+    files = [path for path in (tmp_path / "base" / "lib").rglob("*") if path.is_file()]
+    assert sum(path.stat().st_blocks * 512 for path in files) < BASE_MB * 2**20
+    said = run(at / "stickslip", "run", "--lockstep", "--set", "duration_s=1", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path))
+    assert "blocks   1000, none lost" in said
+
+
+@pytest.mark.nightly
+def test_a_fresh_installation_with_all_diagnoses(wheel: Path, tmp_path: Path) -> None:
+    from tests import made_up
+
+    made_up.evidence_folder(tmp_path / "evidence")
+    at = installed(tmp_path / "all", f"{wheel}[all]")
+    said = run(at / "stickslip", "diagnose", "evidence", "--jobs", "2", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path))
+    assert said.startswith("unexplained")
