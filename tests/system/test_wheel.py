@@ -33,7 +33,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_wheel_holds_every_file_of_the_packages_and_nothing_else(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as file:
         held = {name for name in file.namelist() if ".dist-info/" not in name}
-    listed = run("git", "ls-files", *PACKAGES, "deploy", cwd=ROOT).splitlines()
+    listed = run(
+        "git", "ls-files", "--cached", "--others", "--exclude-standard", *PACKAGES, "deploy", cwd=ROOT
+    ).splitlines()
     assert held == {f"cockpit/{name}" if name.startswith("deploy/") else name for name in listed}
 
 
@@ -47,7 +49,9 @@ def test_what_the_wheel_holds_runs_in_an_empty_folder(wheel: Path, tmp_path: Pat
         cwd=empty, PYTHONPATH=str(unpacked), NUMBA_DISABLE_JIT="1",
     )  # fmt: skip
     assert "blocks   50, none lost" in said
-    where = run(sys.executable, "-P", "-c", "import cockpit; print(cockpit.__file__)", cwd=empty, PYTHONPATH=str(unpacked))
+    where = run(
+        sys.executable, "-P", "-c", "import cockpit; print(cockpit.__file__)", cwd=empty, PYTHONPATH=str(unpacked)
+    )
     assert Path(where.strip()).is_relative_to(unpacked)
 
 
@@ -63,7 +67,9 @@ def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> 
     at = installed(tmp_path / "base", str(wheel))
     files = [path for path in (tmp_path / "base" / "lib").rglob("*") if path.is_file()]
     assert sum(path.stat().st_blocks * 512 for path in files) < BASE_MB * 2**20
-    said = run(at / "stickslip", "run", "--lockstep", "--set", "duration_s=1", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path))
+    said = run(
+        at / "stickslip", "run", "--lockstep", "--set", "duration_s=1", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path)
+    )
     assert "blocks   1000, none lost" in said
 
 
