@@ -52,11 +52,15 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def strict_json(value: Any) -> Any:
-    """`value` with None (null) for NaN and infinity, which JSON does not have; lists and dicts are copied."""
+    """`value` as JSON knows it: a named tuple is an object, a path a text, NaN and infinity are null."""
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        value = value._asdict()  # pyright: ignore[reportAttributeAccessIssue]
     if isinstance(value, dict):
         return {key: strict_json(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
         return [strict_json(inner) for inner in value]
+    if isinstance(value, Path):
+        return shown(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

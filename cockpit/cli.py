@@ -2,12 +2,16 @@
 
 import logging
 import os
+import platform
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
 from cockpit.commands.blind import blind_app
 from cockpit.commands.diagnose import diagnose
 from cockpit.commands.explain import explain
+from cockpit.commands.json_option import JsonGroup
 from cockpit.commands.log import log_app
 from cockpit.commands.pictures import plot, reproduce, stability
 from cockpit.commands.processes import controller, operator_stop, plant, record
@@ -16,26 +20,87 @@ from cockpit.commands.run import run
 from cockpit.commands.scenarios import scenarios
 
 app = typer.Typer(
+    cls=JsonGroup,
     help="Real-time control against stick-slip: run a rig or its stand-in, replay, recover and judge its logs.",
+    context_settings={"help_option_names": ["-h", "--help"]},
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("run")(run)
+
+
+def _examples(*lines: str) -> str:
+    """For the end of a help text."""
+    return "\n".join(["Examples:", *(f"  {line}" for line in lines)])
+
+
+app.command(
+    "run",
+    epilog=_examples(
+        "stickslip run",
+        "stickslip run --in-process --set controller.limits.v_ratio=1.3",
+        "stickslip run --scenario stop-and-go --log runs/axis.mcap",
+        "stickslip run --set duration_s=0          until Ctrl-C",
+        "stickslip run --lockstep --json > verdict.json",
+    ),
+)(run)
 app.command("plant")(plant)
 app.command("controller")(controller)
 app.command("record")(record)
 app.command("recorder", hidden=True)(record)  # a child is named by its role
 app.command("stop")(operator_stop)
-app.command("replay")(replay_command)
-app.command("plot")(plot)
+app.command(
+    "replay",
+    epilog=_examples(
+        "stickslip replay runs/paper-c45-c45.mcap",
+        "stickslip replay runs/paper-c45-c45.mcap --set limits.v_ratio=1.3@10s",
+        "stickslip replay runs/paper-c45-c45.mcap --closed-loop --set limits.v_ratio=1.3",
+        "stickslip replay runs/paper-c45-c45.mcap --to-bus --all --speed 2",
+    ),
+)(replay_command)
+app.command(
+    "plot",
+    epilog=_examples(
+        "stickslip plot runs/paper-c45-c45.mcap", "stickslip plot runs/paper-c45-c45.mcap --out figure.pdf"
+    ),
+)(plot)
 app.command("map")(stability)
-app.command("diagnose")(diagnose)
-app.add_typer(log_app, name="log")
+app.command(
+    "diagnose",
+    epilog=_examples(
+        "stickslip diagnose runs/example --report report.html",
+        "stickslip diagnose runs/example --json",
+        "stickslip diagnose runs/example --json diagnosis.json --apply rig.toml",
+        "stickslip diagnose evidence/ --jobs 2 --report reports",
+    ),
+)(diagnose)
+app.add_typer(
+    log_app,
+    name="log",
+    epilog=_examples(
+        "stickslip log info runs/paper-c45-c45.mcap",
+        "stickslip log export runs/paper-c45-c45.mcap --to run.csv --topic sensors --until 2s",
+        "stickslip log import measured.csv --map map.toml --out evidence/rig",
+    ),
+)
 app.add_typer(blind_app, name="blind")
 app.command("reproduce")(reproduce)
 app.command("scenarios")(scenarios)
 app.command("explain")(explain)
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        print(f"stickslip {version('stickslip')}, Python {platform.python_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def about(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Say the version and leave.")
+    ] = False,
+) -> None:
+    """Take what stands before the name of a command."""
 
 
 def main() -> None:

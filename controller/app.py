@@ -30,8 +30,8 @@ def run(
     header: wire.Header,
     lockstep: bool,
     stop: threading.Event,
-) -> None:
-    """Answer every block on the bus until the plant ends its run or `stop` is set.
+) -> int:
+    """Answer every block on the bus until the plant ends its run or `stop` is set; how many steps.
 
     Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG, ENDPOINT_BUSY.
     """
@@ -46,6 +46,7 @@ def run(
         granted = realtime.claim(0 if lockstep else 1)  # before the announcement, as the rig may begin right after
         bus.announce()
         process.loop(stop, granted)
+    return node.steps
 
 
 def _refuse_a_second(bus: Bus, endpoint: str) -> None:

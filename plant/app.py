@@ -30,8 +30,8 @@ def run(
     wait_for: list[str],
     lockstep: bool,
     stop: threading.Event,
-) -> None:
-    """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set.
+) -> int:
+    """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set; how many blocks.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER, LOCKSTEP_STALLED, BAD_MESSAGE.
     """
@@ -53,6 +53,7 @@ def run(
             process.realtime(blocks, stop)
         process.event("END", f"blocks={node.block}")
         bus.wait_until_alone(_GOODBYE_S)  # this process relays the messages of the others, so it leaves last
+    return node.block
 
 
 def wait_for_peers(bus: Bus, endpoint: str, roles: list[str], stop: threading.Event) -> None:

@@ -1,6 +1,5 @@
 """`stickslip blind ...`: diagnose a set of rigs with sealed answers without them, open and score it."""
 
-import sys
 import time
 from contextlib import closing
 from pathlib import Path
@@ -9,26 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bridge.faults import Fault
-from cockpit.run.child_process import end_like_ctrl_c, guarded
+from cockpit.commands.json_option import Json, JsonGroup, carry_out, tell
+from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import check_writable, writing
 
 if TYPE_CHECKING:
     from diagnosis.blind.opening import OpenedSet
 
 blind_app = typer.Typer(
-    help="How good is the diagnosis? Sealed cases, diagnosed without the answers, scored.", no_args_is_help=True
+    cls=JsonGroup,
+    help="How good is the diagnosis? Sealed cases, diagnosed without the answers, scored.",
+    no_args_is_help=True,
 )
 SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `python -m tests.blind make` made.")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")]
 Key = Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")]
-AsJson = Annotated[
-    Path | None,
-    typer.Option(
-        "--json",
-        metavar="FILE",
-        help="Write the scores here as JSON, with what is there and what was said of every case.",
-    ),
-]
 Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one HTML file.")]
 
 
@@ -36,7 +30,7 @@ _LEFT_TO_THE_COMMAND = {"allow_extra_args": True, "ignore_unknown_options": True
 
 
 @blind_app.command("make", hidden=True, add_help_option=False, context_settings=_LEFT_TO_THE_COMMAND)
-def blind_make() -> None:
+def blind_make(as_json: Json = None) -> None:
     """Say which command makes a set: the generators of cases are part of the tests, which are not installed."""
 
     def work() -> None:
@@ -45,11 +39,11 @@ def blind_make() -> None:
         )
         raise Fault("CONFIG", line)
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 @blind_app.command("run")
-def blind_run(folder: SetArgument, jobs: Jobs = None) -> None:
+def blind_run(folder: SetArgument, jobs: Jobs = None, as_json: Json = None) -> None:
     """Diagnose every case that has no result yet, without the key. It can be stopped and taken up again."""
 
     def work() -> None:
@@ -65,16 +59,17 @@ def blind_run(folder: SetArgument, jobs: Jobs = None) -> None:
             for done, outcome in enumerate(outcomes, 1):
                 left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
                 progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
-        print(f"all cases have results    {folder}\nnext    stickslip blind score {folder} --key KEY")
+        words = [f"all cases have results    {folder}", f"next    stickslip blind score {folder} --key KEY"]
+        tell(as_json, {"set": folder, "diagnosed": todo}, words)
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 @blind_app.command("score")
 def blind_score(
     folder: SetArgument,
     key: Key,
-    as_json: AsJson = None,
+    as_json: Json = None,
     report: Report = None,
     baselines: Annotated[
         bool, typer.Option("--baselines", help="Oracle and tree ensemble too: half a minute a case and core.")
@@ -91,7 +86,8 @@ def blind_score(
         from diagnosis.blind.opening import open_set, with_baselines
 
         end_like_ctrl_c()
-        _check_file("--json", as_json)
+        if as_json is not None and as_json.resolve() == key.resolve():
+            raise Fault("CONFIG", f"--json {as_json}: is the key, which would be lost; choose another")
         _check_file("--report", report)
         with writing(), watched() as progress:
             found = open_set(folder, key, partial)
@@ -99,7 +95,7 @@ def blind_score(
                 found = with_baselines(found, folder, jobs or cpu_count(), progress)
         _told(found, folder.name, as_json, report)
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 @blind_app.command("pool")
@@ -107,7 +103,7 @@ def blind_pool(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="What `blind score --json` wrote of each set.")
     ],
-    as_json: AsJson = None,
+    as_json: Json = None,
     report: Report = None,
 ) -> None:
     """Score several opened sets of one version together, or one again, from the files of their scores."""
@@ -115,32 +111,29 @@ def blind_pool(
     def work() -> None:
         from diagnosis.blind.pooling import pooled
 
+        _check_file("--report", report)
         for option, path in (("--json", as_json), ("--report", report)):
-            _check_file(option, path)
             if path is not None and path.resolve() in {file.resolve() for file in files}:
                 raise Fault(
                     "CONFIG", f"{option} {path}: is one of the files to read, which would be lost; choose another"
                 )
         _told(pooled(files), ", ".join(path.stem for path in files), as_json, report)
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | None) -> None:
     from diagnosis.blind.opening import scored
-    from diagnosis.blind.pooling import write_scores
+    from diagnosis.blind.pooling import kept_scores
     from diagnosis.blind.report import write_report
     from diagnosis.blind.table import table
 
     methods = scored(found)
     with writing():  # before anything is printed, which ends where nobody reads on
-        if as_json is not None:
-            write_scores(as_json, found, methods)
         if report is not None:
             write_report(methods, found.sealed, name, report)
-    print(table(methods, found.sealed))
-    if report is not None:
-        print(f"\nreport     {report}")
+    words = [table(methods, found.sealed), *(["", f"report     {report}"] if report is not None else [])]
+    tell(as_json, kept_scores(found, methods), words)
 
 
 def _check_file(option: str, path: Path | None) -> None:

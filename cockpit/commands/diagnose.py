@@ -1,6 +1,5 @@
 """`stickslip diagnose`: what makes a rig differ from its description; for one evidence folder or for many."""
 
-import json
 import os
 import signal
 import sys
@@ -9,12 +8,14 @@ from contextlib import closing
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from bridge.faults import FAULTS, Fault
-from cockpit.run.child_process import guarded, report
+from bridge.files import write_json
+from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
+from cockpit.run.child_process import report
 from cockpit.run.writable import check_writable, writing
 
 if TYPE_CHECKING:
@@ -22,25 +23,33 @@ if TYPE_CHECKING:
     from diagnosis.evidence.folder import Evidence
     from diagnosis.result import Diagnosis
 
-_STDOUT = Path("-")
 _LONGEST_NAME_BYTES = 200  # of 255 that a disk takes; a number and `.html.part` follow
 
 
 class _Wishes(NamedTuple):
     """What the command line asks for."""
 
-    json: Path | None
+    as_json: Path | None
     report: Path | None
     apply: Path | None
     jobs: int
     cluster: str
+
+    @property
+    def json_file(self) -> Path | None:
+        """Where the JSON goes, if not to stdout."""
+        return None if self.as_json == STDOUT else self.as_json
+
+    @property
+    def only_json(self) -> Path | None:
+        """For `tell`: words, but for JSON on stdout; a file may be refused, and the words are said all the same."""
+        return STDOUT if self.as_json == STDOUT else None
 
 
 def diagnose(
     evidence: Annotated[
         list[Path], typer.Argument(help="Evidence folders with a manifest.toml, or a folder that holds such folders.")
     ],
-    as_json: Annotated[Path | None, typer.Option("--json", help="Write the result here as JSON; - for stdout.")] = None,
     report: Annotated[
         Path | None, typer.Option(help="Write a report, one HTML file; for many folders a folder of them.")
     ] = None,
@@ -51,6 +60,7 @@ def diagnose(
     cluster: Annotated[
         str, typer.Option(help="Dask scheduler, e.g. tcp://127.0.0.1:8786; its workers read the folders themselves.")
     ] = "",
+    as_json: Json = None,
 ) -> None:
     """Say what makes a rig differ from its description: the effect, how sure, how much of the gap it closes."""
 
@@ -67,7 +77,7 @@ def diagnose(
         _check_destinations(wishes, one, sources)
         return _diagnose_one(sources[0], wishes) if one else _diagnose_many(sources, wishes)
 
-    sys.exit(guarded(work, as_json == _STDOUT))
+    carry_out(work, as_json)
 
 
 def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolder"]) -> None:
@@ -79,10 +89,10 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolde
     from diagnosis.evidence.manifest import MANIFEST, RUN_SUFFIXES
 
     seen: dict[Path, str] = {}
-    for option, path in (("--json", wishes.json), ("--report", wishes.report), ("--apply", wishes.apply)):
-        if path is None or (path == _STDOUT and option == "--json"):
+    for option, path in (("--json", wishes.json_file), ("--report", wishes.report), ("--apply", wishes.apply)):
+        if path is None:
             continue
-        if path == _STDOUT:
+        if path == STDOUT:
             raise Fault("CONFIG", f"{option} -: must be a file; only --json can go to stdout")
         check_writable(option, path)
         whole = path.resolve()
@@ -112,10 +122,9 @@ def _diagnose_one(source: "EvidenceFolder", wishes: _Wishes) -> int:
         refuse_force_drive(evidence)
     with watched() as progress:
         diagnosis = _result(source, evidence, wishes, progress)
-    if wishes.json != _STDOUT:
-        print("\n".join(in_words(diagnosis)))
+    tell(wishes.only_json, to_json(diagnosis), in_words(diagnosis), indent=1)
     wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
-        ("", wishes.json, lambda path: _write_json(path, to_json(diagnosis))),
+        ("", wishes.json_file, lambda path: write_json(path, to_json(diagnosis))),
         ("report     ", wishes.report, lambda path: write_report(diagnosis, source.name, path)),
     ]
     if wishes.apply is not None and diagnosis.verdict == "unexplained":
@@ -149,7 +158,7 @@ def _told(refused: list[Fault]) -> int:
 
 def _tell(wishes: _Wishes, line: str) -> None:
     """On stdout, but where the JSON goes there."""
-    print(line, file=sys.stderr if wishes.json == _STDOUT else sys.stdout)
+    print(line, file=sys.stderr if wishes.as_json == STDOUT else sys.stdout)
 
 
 def _result(
@@ -186,12 +195,13 @@ def _diagnose_many(sources: list["EvidenceFolder"], wishes: _Wishes) -> int:
             found[name] = _without_pictures(outcome)
             progress(f"{len(found)} of {len(sources)}: {in_a_line(outcome)}", len(found) / len(sources))
     results = [found[source.name] for source in sources]
-    if wishes.json is not None:
-        _written(wishes.json, lambda path: _write_json(path, many_as_json(results)), refused)
-    if wishes.json != _STDOUT:
-        print("\n".join(in_a_line(outcome) for outcome in results))
-        if wishes.report is not None and any(outcome.diagnosis is not None for outcome in results):
-            print(f"reports    {wishes.report}")
+    table = many_as_json(results)
+    if wishes.json_file is not None:
+        _written(wishes.json_file, lambda path: write_json(path, table), refused)
+    words = [in_a_line(outcome) for outcome in results]
+    if wishes.report is not None and any(outcome.diagnosis is not None for outcome in results):
+        words.append(f"reports    {wishes.report}")
+    tell(wishes.only_json, table, words, indent=1)
     statuses = [FAULTS[outcome.fault[0]].exit_status for outcome in results if outcome.fault is not None]
     # bad evidence first: that is what the person who called can mend
     return min((status for status in (*statuses, _told(refused)) if status), default=0)
@@ -215,12 +225,3 @@ def _report_names(names: list[str]) -> dict[str, str]:
         taken.add(one.casefold())
         found[name] = f"{one}.html"
     return found
-
-
-def _write_json(path: Path, value: dict[str, Any]) -> None:
-    from bridge.files import strict_json, write_json
-
-    if path == _STDOUT:
-        print(json.dumps(strict_json(value), allow_nan=False, indent=1))
-    else:
-        write_json(path, value)

@@ -1,6 +1,5 @@
 """`stickslip log ...`: look into a log, check it, make a cut one whole, turn it into tables and tables into evidence."""
 
-import json
 import math
 import sys
 from collections.abc import Callable, Generator
@@ -10,37 +9,35 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cockpit.run.child_process import guarded
+from cockpit.commands.json_option import STDOUT, Json, JsonGroup, carry_out, tell
 
 if TYPE_CHECKING:
     from bridge.log.logfile import Damage
 
-log_app = typer.Typer(help="Look into a log, check it, make a cut one whole; tables out and in.", no_args_is_help=True)
+log_app = typer.Typer(
+    cls=JsonGroup, help="Look into a log, check it, make a cut one whole; tables out and in.", no_args_is_help=True
+)
 LogArgument = Annotated[Path, typer.Argument(help="A run log, .mcap.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 
 @log_app.command("info")
-def log_info(path: LogArgument, as_json: Json = False) -> None:
+def log_info(path: LogArgument, as_json: Json = None) -> None:
     """Judge the run in a log: slips, swing, v_a / v_d, latency, what was lost."""
 
     def work() -> None:
         from cockpit.judge.verdict import headline, in_words, judge
 
         verdict = judge(path)
-        if as_json:
-            print(json.dumps(verdict.as_dict()))
-        else:
-            print("\n".join([headline(verdict), *in_words(verdict)]))
+        tell(as_json, verdict.as_dict(), [headline(verdict), *in_words(verdict)])
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)
 
 
 @log_app.command("recover")
 def log_recover(
     path: LogArgument,
     out: Annotated[Path | None, typer.Option(help="Write here instead of in place.")] = None,
-    as_json: Json = False,
+    as_json: Json = None,
 ) -> None:
     """Save every message that can be read from a cut or damaged log, with a new index."""
 
@@ -48,12 +45,10 @@ def log_recover(
         from bridge.log.logfile import recover
 
         saved = recover(path, out or path)
-        if as_json:
-            print(json.dumps({"messages": saved.messages, "out": str(out or path)} | saved.damage._asdict()))
-            return
-        print(f"{out or path}: {saved.messages} messages, whole again; {_lost(saved.damage) or 'nothing was lost'}")
+        words = f"{out or path}: {saved.messages} messages, whole again; {_lost(saved.damage) or 'nothing was lost'}"
+        tell(as_json, {"messages": saved.messages, "out": out or path} | saved.damage._asdict(), [words])
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)
 
 
 def _lost(damage: "Damage") -> str:
@@ -65,9 +60,9 @@ def _lost(damage: "Damage") -> str:
 
 
 @contextmanager
-def _progress(text: str, as_json: bool) -> Generator[Callable[[float], None]]:
+def _progress(text: str, as_json: Path | None) -> Generator[Callable[[float], None]]:
     """A bar on stderr for a person who watches; yields the function to call with the share done."""
-    if as_json or not sys.stderr.isatty():
+    if as_json == STDOUT or not sys.stderr.isatty():
         yield lambda _share: None
         return
     from rich.console import Console
@@ -87,7 +82,7 @@ def log_export(
     ] = "",
     start: Annotated[str, typer.Option("--from", help="From this time of the run on, e.g. 12.5s.")] = "",
     end: Annotated[str, typer.Option("--until", help="Up to this time of the run, e.g. 20s.")] = "",
-    as_json: Json = False,
+    as_json: Json = None,
 ) -> None:
     """Write a log as tables: sensors one row a sample, the other topics one row a message."""
 
@@ -101,17 +96,12 @@ def log_export(
         names = [name.strip() for name in topic.split(",")] if topic else STREAMING
         with _progress(f"exporting {path.name}", as_json) as progress:
             written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress)
-        files = [str(file) for file in written.files]
-        if as_json:
-            print(json.dumps({"files": files, "rows": written.rows, "damage": written.damage._asdict()}))
-            return
-        for name, rows in written.rows.items():
-            print(f"{name:<8} {rows} rows")
-        print("\n".join(files) or "nothing to write: no message of these topics in this time")
-        if lost := _lost(written.damage):
-            print(f"warning  the log is damaged; {lost}")
+        words = [f"{name:<8} {rows} rows" for name, rows in written.rows.items()]
+        words += [str(file) for file in written.files] or ["nothing to write: no message of these topics in this time"]
+        lost = _lost(written.damage)
+        tell(as_json, written, [*words, f"warning  the log is damaged; {lost}"] if lost else words)
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)
 
 
 @log_app.command("import")
@@ -124,7 +114,7 @@ def log_import(
             "--out", help="Evidence folder (a run is added), or FILE.mcap for log check, export and diagnose."
         ),
     ],
-    as_json: Json = False,
+    as_json: Json = None,
 ) -> None:
     """Turn measured data of another program into evidence for `stickslip diagnose`, or into a run log."""
 
@@ -132,19 +122,15 @@ def log_import(
         from diagnosis.evidence.import_table import import_file
 
         done = import_file(path, channel_map, out)
-        if as_json:
-            print(json.dumps(done.as_dict()))
-            return
         place = done.out if done.out.suffix == ".mcap" else done.out / done.file
-        print(f"{place}: {done.rows} samples of {', '.join(done.columns)}")
-        for finding in done.findings:
-            print(finding.in_words())
+        words = f"{place}: {done.rows} samples of {', '.join(done.columns)}"
+        tell(as_json, done, [words, *(finding.in_words() for finding in done.findings)])
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)
 
 
 @log_app.command("check")
-def log_check(path: LogArgument, as_json: Json = False) -> None:
+def log_check(path: LogArgument, as_json: Json = None) -> None:
     """Say what is wrong with a log; exit status 0 when nothing is, 1 with findings, 7 when it is no run log."""
 
     def work() -> int:
@@ -152,14 +138,10 @@ def log_check(path: LogArgument, as_json: Json = False) -> None:
 
         with _progress(f"checking {path.name}", as_json) as progress:
             check = check_log(path, progress)
-        if as_json:
-            print(json.dumps(check.as_dict()))
-        else:
-            for finding in check.findings:
-                print(finding.in_words())
-            counts = ", ".join(f"{name} {count}" for name, count in check.messages.items())
-            late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())
-            print(f"{path}: {len(check.findings)} findings; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}")
+        counts = ", ".join(f"{name} {count}" for name, count in check.messages.items())
+        late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())
+        words = f"{path}: {len(check.findings)} findings; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
+        tell(as_json, check, [*(finding.in_words() for finding in check.findings), words])
         return 1 if check.findings else 0
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)

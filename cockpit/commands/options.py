@@ -20,7 +20,6 @@ Lockstep = Annotated[
     typer.Option("--lockstep", help="Not paced: each block waits for its command. Repeatable to the bit."),
 ]
 ChildOf = Annotated[int, typer.Option("--child", hidden=True)]  # the process that started this one, 0: a person
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 LogFile = Annotated[Path | None, typer.Option("--log", help="Where the log goes; runs/NAME.mcap if not given.")]
 DEFAULT_SCENARIO = "paper-c45-c45"
 

@@ -1,8 +1,6 @@
 """`stickslip plot`, `map` and `reproduce`: a run, a rig and the paper as pictures."""
 
 import contextlib
-import json
-import sys
 from collections.abc import Generator
 from pathlib import Path
 from typing import Annotated
@@ -10,8 +8,8 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.options import DEFAULT_SCENARIO, Json
-from cockpit.run.child_process import guarded
+from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.options import DEFAULT_SCENARIO
 from cockpit.run.writable import check_writable, writing
 
 
@@ -32,6 +30,7 @@ def plot(
         Path | None,
         typer.Option(help="The picture, a PNG file; without it, beside LOG under its name.", show_default=False),
     ] = None,
+    as_json: Json = None,
 ) -> None:
     """Draw the run in a log: drive force, v_a against v_d, and what the controller did."""
 
@@ -42,10 +41,10 @@ def plot(
         if picture.resolve() == log.resolve():
             raise Fault("CONFIG", f"--out {picture}: is the log, which the picture would replace; choose another file")
         with _written(picture):
-            plot_run(log, picture)
-        print(f"picture  {picture}")
+            verdict = plot_run(log, picture)
+        tell(as_json, {"picture": picture} | verdict.as_dict(), [f"picture  {picture}"])
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 def stability(
@@ -57,7 +56,7 @@ def stability(
         ),
     ] = [],  # noqa: B006
     out: Annotated[Path, typer.Option(help="The picture, a PNG file.")] = Path("runs/map.png"),
-    as_json: Json = False,
+    as_json: Json = None,
 ) -> None:
     """Draw where a rig sticks and slips, over drive velocity, stiffness and vibration."""
 
@@ -68,14 +67,14 @@ def stability(
         made = load_rig(rig, settings)
         with _written(out):
             result = stability_map(made, out)
-        print(json.dumps(result._asdict()) if as_json else f"{result.answer}\npicture  {out}")
+        tell(as_json, result, [result.answer, f"picture  {out}"])
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)
 
 
 def reproduce(
     out: Annotated[Path, typer.Option(help="The report, one HTML file.")] = Path("runs/reproduce.html"),
-    as_json: Json = False,
+    as_json: Json = None,
 ) -> None:
     """Redo the paper: its figures, tables and claims, each with its number and whether it holds."""
 
@@ -84,7 +83,7 @@ def reproduce(
 
         with _written(out):
             result = redo(out, progress=True)
-        print(json.dumps(result.as_json()) if as_json else f"{result.verdict}\nreport   {out}")
+        tell(as_json, result.as_json(), [result.verdict, f"report   {out}"])
         return 0 if result.passed else 1
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)

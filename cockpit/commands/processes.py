@@ -1,11 +1,11 @@
 """`stickslip plant`, `controller`, `record` and `stop`: one process of a run, and a person's word to it."""
 
-import sys
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
 from bridge.faults import Fault
+from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import (
     DEFAULT_SCENARIO,
     ChildOf,
@@ -18,7 +18,20 @@ from cockpit.commands.options import (
     Settings,
     as_settings,
 )
-from cockpit.run.child_process import guarded, stop_event
+from cockpit.run.child_process import stop_event
+
+
+class Served(NamedTuple):
+    """What a process did on the bus until its end."""
+
+    role: str
+    endpoint: str
+    lockstep: bool
+    blocks: int  # of the plant; steps of the controller, one a block
+
+    def in_words(self) -> str:
+        """One line for a person."""
+        return f"{self.role:<8} {self.blocks} blocks on {self.endpoint}"
 
 
 def plant(
@@ -30,6 +43,7 @@ def plant(
     lockstep: Lockstep = False,
     wait_for: Annotated[str, typer.Option(help="Roles that must be on the bus before the first block.")] = "controller",
     child: ChildOf = 0,
+    as_json: Json = None,
 ) -> None:
     """Serve the stand-in rig of a scenario on the bus."""
 
@@ -44,9 +58,11 @@ def plant(
                 "CONFIG", f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder or both, by comma"
             )
         described = header(made, "plant", lockstep)
-        serve(made.rig, made.seed, made.duration_s, made.bus, described, roles, lockstep, stop_event(child))
+        blocks = serve(made.rig, made.seed, made.duration_s, made.bus, described, roles, lockstep, stop_event(child))
+        served = Served("plant", made.bus.endpoint, lockstep, blocks)
+        tell(as_json, served, [served.in_words()])
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 def controller(
@@ -57,6 +73,7 @@ def controller(
     prefix: Prefix = None,
     lockstep: Lockstep = False,
     child: ChildOf = 0,
+    as_json: Json = None,
 ) -> None:
     """Control the rig that is on the bus, with the controller of a scenario."""
 
@@ -65,9 +82,11 @@ def controller(
         from controller.app import run as control
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
-        control(made.controller, made.bus, header(made, "controller", lockstep), lockstep, stop_event(child))
+        steps = control(made.controller, made.bus, header(made, "controller", lockstep), lockstep, stop_event(child))
+        served = Served("controller", made.bus.endpoint, lockstep, steps)
+        tell(as_json, served, [served.in_words()])
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 def record(
@@ -79,6 +98,7 @@ def record(
     lockstep: Lockstep = False,
     log: LogFile = None,
     child: ChildOf = 0,
+    as_json: Json = None,
 ) -> None:
     """Record everything on the bus until the plant ends its run. A log that is there already is renamed, not overwritten."""
 
@@ -97,8 +117,9 @@ def record(
 
         about, stop = about_run(made, lockstep), stop_event(child)
         record_all(path, made.bus, ["plant", "controller"], about, lockstep, stop, ready)
+        tell(as_json, {"log": path}, [f"log      {path}"])
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)
 
 
 def operator_stop(
@@ -106,15 +127,17 @@ def operator_stop(
     scenario: ScenarioName = DEFAULT_SCENARIO,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
+    as_json: Json = None,
 ) -> None:
     """Tell a running controller to ramp the vibration down and keep it down, until --reset; exit status 4: nobody obeyed."""
 
     def work() -> None:
         from bridge.wire import stickslip_pb2 as wire
-        from cockpit.run.operator import tell
+        from cockpit.run.operator import tell as say
         from cockpit.run.scenario import load_scenario
 
         made = load_scenario(scenario, as_settings([], None, endpoint, prefix))
-        tell(made.bus, wire.Operator.RESET if reset else wire.Operator.STOP)
+        taken = say(made.bus, wire.Operator.RESET if reset else wire.Operator.STOP)
+        tell(as_json, {"endpoint": made.bus.endpoint, "taken": taken}, [f"taken    {taken}"])
 
-    sys.exit(guarded(work))
+    carry_out(work, as_json)

@@ -1,14 +1,14 @@
 """`stickslip replay`: a log through today's controller, simulated again, or back on the bus."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Json, Prefix, as_settings
-from cockpit.run.child_process import guarded, stop_event
+from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
+from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Prefix, as_settings
+from cockpit.run.child_process import stop_event
 
 
 def _only_with(mode: str, given: dict[str, bool]) -> None:
@@ -44,7 +44,7 @@ def replay_command(
     ] = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
-    as_json: Json = False,
+    as_json: Json = None,
 ) -> None:
     """Feed a log to today's controller: the same bits (exit 0), or the first difference (exit 1)."""
 
@@ -59,7 +59,11 @@ def replay_command(
         if not closed_loop:
             _only_with("--closed-loop, whose new run goes there", {"--log": log is not None})
         if to_bus:
-            for option, given in (("--closed-loop", closed_loop), ("--json", as_json), ("--set", bool(settings))):
+            for option, given in (
+                ("--closed-loop", closed_loop),
+                ("--json", as_json is not None),
+                ("--set", bool(settings)),
+            ):
                 if given:
                     line = f"{option}: not with --to-bus, which plays the log as it is; leave one of them out"
                     raise Fault("CONFIG", line)
@@ -83,7 +87,15 @@ def replay_command(
             if out.resolve() == logs[0].resolve():
                 line = f"--log {out}: is the recorded run, which the new one would replace; choose another file"
                 raise Fault("CONFIG", line)
-            return replaying.closed_loop(logs[0], settings, out, as_json)
-        return replaying.replay_logs(logs, from_s, settings, as_json)
+            compared = replaying.closed_loop(logs[0], settings, out)
+            tell(as_json, compared, compared.in_words())
+            return 0
+        replayed: list[replaying.Replayed] = []
+        for path in logs:
+            replayed.append(replaying.replay_log(path, from_s, settings))
+            if as_json != STDOUT:
+                print("\n".join(replayed[-1].in_words()), flush=True)  # the next log may be a bad one
+        tell(as_json, replayed, [])
+        return 0 if all(one.identical for one in replayed) else 1
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)

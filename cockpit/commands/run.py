@@ -1,14 +1,13 @@
 """`stickslip run`: plant, controller and recorder to the end of a scenario."""
 
-import sys
 from typing import Annotated
 
 import typer
 
+from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import (
     DEFAULT_SCENARIO,
     Endpoint,
-    Json,
     Lockstep,
     LogFile,
     Prefix,
@@ -17,7 +16,6 @@ from cockpit.commands.options import (
     Settings,
     as_settings,
 )
-from cockpit.run.child_process import guarded
 
 
 def run(
@@ -35,7 +33,7 @@ def run(
         bool, typer.Option("--in-process", help="Lockstep in one process, without a bus: fastest.")
     ] = False,
     log: LogFile = None,
-    as_json: Json = False,
+    as_json: Json = None,
 ) -> None:
     """Run plant, controller and recorder to the end of a scenario and say what came of it."""
 
@@ -45,6 +43,8 @@ def run(
 
         other = [rig_setting(rig)] if rig is not None else []
         changed = [*other, *as_settings(settings, seed, endpoint, prefix)]
-        return run_scenario(scenario, changed, lockstep, in_process, log, as_json)
+        came = run_scenario(scenario, changed, lockstep, in_process, log)
+        tell(as_json, came.as_dict(), came.in_words())
+        return 0 if came.verdict.good else 1
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)

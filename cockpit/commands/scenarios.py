@@ -1,13 +1,9 @@
 """`stickslip scenarios`: what comes with the project."""
 
-import json
-import sys
-
-from cockpit.commands.options import Json
-from cockpit.run.child_process import guarded
+from cockpit.commands.json_option import Json, carry_out, tell
 
 
-def scenarios(as_json: Json = False) -> None:
+def scenarios(as_json: Json = None) -> None:
     """List the scenarios and rigs that come with the project."""
 
     def work() -> None:
@@ -19,11 +15,7 @@ def scenarios(as_json: Json = False) -> None:
             for path in sorted(deploy_folder().glob("scenarios/*.toml"))
         }
         rigs = [path.stem for path in sorted(deploy_folder().glob("rigs/*.toml"))]
-        if as_json:
-            print(json.dumps({"scenarios": found, "rigs": rigs}))
-            return
-        for name, description in found.items():
-            print(f"{name:<24} {description}")
-        print("rigs: " + ", ".join(rigs))
+        words = [f"{name:<24} {description}" for name, description in found.items()]
+        tell(as_json, {"scenarios": found, "rigs": rigs}, [*words, f"rigs: {', '.join(rigs)}"])
 
-    sys.exit(guarded(work, as_json))
+    carry_out(work, as_json)

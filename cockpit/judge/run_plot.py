@@ -8,7 +8,7 @@ import numpy as np
 
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.judge.verdict import headline, judge_run
+from cockpit.judge.verdict import RunVerdict, headline, judge_run
 
 _SHADES: dict[int, str] = {wire.EXCITE: "#dcebd8", wire.WAIT: "#f2d694", wire.PROBE: "#d5e3f0", wire.STOPPED: "#f0d5d5"}
 _NAMES: dict[int, str] = {
@@ -20,8 +20,8 @@ _NAMES: dict[int, str] = {
 _INK, _RED, _BLUE = "#1f2d3a", "#b5402a", "#2a6fb5"
 
 
-def plot_run(path: Path, out: Path) -> None:
-    """Draw the run in a log to the PNG file `out`. Raises Fault BAD_LOG, OSError when `out` cannot be written."""
+def plot_run(path: Path, out: Path) -> RunVerdict:
+    """Draw the run in a log to the PNG file `out`; its figures. Raises Fault BAD_LOG, OSError when `out` cannot be written."""
     from matplotlib.figure import Figure
 
     run = read_run(path)
@@ -52,6 +52,7 @@ def plot_run(path: Path, out: Path) -> None:
     lower.set_xlabel("time [s]")
     lower.legend(handles=lower.lines, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
     figure.savefig(out, dpi=110, format="png")
+    return verdict
 
 
 def _shade(axes: Any, t_s: Any, mode: Any) -> None:

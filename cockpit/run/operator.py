@@ -14,11 +14,17 @@ _ANSWER_S = 2.0  # a rig is there at once or not at all, and a controller reads 
 _AGAIN_S = 0.5  # with twice as many busy processes as cores one word in 300 did not arrive
 
 
-def tell(bus_config: BusConfig, action: wire.Operator.Action) -> None:
-    """Say it until the controller's event tells that it was taken. Raises Fault NO_PEER when none does."""
+def tell(bus_config: BusConfig, action: wire.Operator.Action) -> str:
+    """Say it until the controller's event tells that it was taken; the words of that event.
+
+    Raises Fault NO_PEER when none does.
+    """
     where, by_hand = bus_config.endpoint, "stop the exciter's amplifier by hand"
     who = f"{os.environ.get('USER') or 'somebody'} (process {os.getpid()})"  # whose word was taken must be told apart
-    word = wire.Operator(action=action, who=who).SerializeToString()
+    word, said = (
+        wire.Operator(action=action, who=who).SerializeToString(),
+        f"{wire.Operator.Action.Name(action)} by {who}",
+    )
     try:
         bus = Bus(bus_config, "operator", lockstep=True, patience_s=_ANSWER_S)
     except Fault:
@@ -33,8 +39,8 @@ def tell(bus_config: BusConfig, action: wire.Operator.Action) -> None:
             raise Fault("NO_PEER", f"{line}; if something vibrates, {by_hand}")
         for _ in range(round(_ANSWER_S / _AGAIN_S)):
             send(word)
-            if _taken(inbox, f"{wire.Operator.Action.Name(action)} by {who}", _AGAIN_S):
-                return
+            if _taken(inbox, said, _AGAIN_S):
+                return said
     line = f"{where}: the controller does not answer: must within {_ANSWER_S:g} s"
     raise Fault("NO_PEER", f"{line}; take it that it goes on as before, and {by_hand}")
 

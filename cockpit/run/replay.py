@@ -3,7 +3,7 @@
 import json
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from cockpit.run.run import about_run
 from cockpit.run.scenario import Scenario, header
 from controller.codes import RESET, STOP
 from controller.config import ControllerConfig
-from controller.replay import Change, Replay, replay
+from controller.replay import Change, Difference, replay
 
 _LATEST_S = 1e9  # 32 years; a log counts nanoseconds in 64 bits, 1.8e10 s
 
@@ -75,59 +75,54 @@ def _words_of(run: RunData) -> list[Word]:
     return [Word(int(row["t_ns"]), action) for row in run.trace for bit, action in words if int(row["events"]) & bit]
 
 
-def replay_logs(paths: list[Path], from_s: float, settings: list[str], as_json: bool) -> int:
-    """Replay logs and say whether today's controller does the same; 0 when all are identical, 1 otherwise."""
-    results: list[dict[str, Any]] = []
-    for path in paths:
-        run = read_run(path)
-        if not len(run.trace):
-            raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded, so nothing can be replayed")
-        result = replay(run, changes_of(run, settings), from_s)
-        if result.compared == 0:
-            line = (
-                f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
-            )
-            raise Fault("BAD_LOG", f"{line}; use an earlier --from")
-        results.append(_row(run, result, settings))
-        if not as_json:
-            print("\n".join(_lines(run, result, settings)))
-    if as_json:
-        print(json.dumps(results))
-    return 0 if all(row["identical"] for row in results) else 1
+class Replayed(NamedTuple):
+    """What today's controller makes of one log."""
 
+    log: str
+    identical: bool
+    compared_steps: int
+    skipped_steps: int  # they could not be rebuilt
+    difference: Difference | None
+    likely_reason: str
+    changed: bool  # by a setting
 
-def _row(run: RunData, result: Replay, settings: list[str]) -> dict[str, Any]:
-    difference = result.difference._asdict() if result.difference else None
-    return {
-        "log": str(run.path),
-        "identical": result.identical,
-        "compared_steps": result.compared,
-        "skipped_steps": result.skipped,
-        "difference": difference,
-        "likely_reason": "" if result.identical else likely_reason(run, settings),
-    }
-
-
-def _lines(run: RunData, result: Replay, settings: list[str]) -> list[str]:
-    skipped = (
-        f"; {result.skipped} steps could not be rebuilt, their block or the memory before them is not in the log"
-        if result.skipped
-        else ""
-    )
-    if result.difference is None:
-        return [f"{run.path}: identical, {result.compared} steps, every command and trace in it bit for bit{skipped}"]
-    d = result.difference
-    lines = [
-        f"{run.path}: differs from block {d.block} at {d.t_s:.3f} s on: {d.table}.{d.field} was {d.logged:.9g}, "
-        f"is {d.replayed:.9g}{skipped}",
-        f"  likely reason: {likely_reason(run, settings)}",
-    ]
-    if settings:
-        lines.append(
-            "  the log's plant heard the old commands: with these it would have answered differently from there on; "
-            "--closed-loop simulates that"
+    def in_words(self) -> list[str]:
+        """The answer in lines for a person."""
+        skipped = (
+            f"; {self.skipped_steps} steps could not be rebuilt, their block or the memory before them is not in the log"
+            if self.skipped_steps
+            else ""
         )
-    return lines
+        if self.difference is None:
+            same = f"identical, {self.compared_steps} steps, every command and trace in it bit for bit"
+            return [f"{self.log}: {same}{skipped}"]
+        d = self.difference
+        lines = [
+            f"{self.log}: differs from block {d.block} at {d.t_s:.3f} s on: {d.table}.{d.field} was {d.logged:.9g}, "
+            f"is {d.replayed:.9g}{skipped}",
+            f"  likely reason: {self.likely_reason}",
+        ]
+        if self.changed:
+            lines.append(
+                "  the log's plant heard the old commands: with these it would have answered differently from there on; "
+                "--closed-loop simulates that"
+            )
+        return lines
+
+
+def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
+    """Replay one log from a time on; whether today's controller does the same. Raises Fault BAD_LOG and CONFIG."""
+    run = read_run(path)
+    if not len(run.trace):
+        raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded, so nothing can be replayed")
+    result = replay(run, changes_of(run, settings), from_s)
+    if result.compared == 0:
+        line = f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
+        raise Fault("BAD_LOG", f"{line}; use an earlier --from")
+    reason = "" if result.identical else likely_reason(run, settings)
+    return Replayed(
+        str(run.path), result.identical, result.compared, result.skipped, result.difference, reason, bool(settings)
+    )
 
 
 def likely_reason(run: RunData, settings: list[str]) -> str:
@@ -168,7 +163,23 @@ def outcome(run: RunData) -> RunFigures:
     return RunFigures(slips, swing_N, verdict.velocity_ratio_min, work_J, dose)
 
 
-def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> int:
+class Compared(NamedTuple):
+    """A run as it was recorded, and simulated again with the changed controller."""
+
+    was: RunFigures
+    now: RunFigures
+    log: str  # of the new run
+
+    def in_words(self) -> list[str]:
+        """A table for a person."""
+        rows = [
+            f"{field:<28}{getattr(self.was, field):>14.4g}{getattr(self.now, field):>14.4g}"
+            for field in RunFigures._fields
+        ]
+        return [f"{'':<28}{'as recorded':>14}{'changed':>14}", *rows, f"log  {self.log}"]
+
+
+def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
     """Simulate a log's run again, from its own plant and seed, with the changed controller, and compare both."""
     run = read_run(path)
     changes = changes_of(run, settings)
@@ -188,12 +199,4 @@ def closed_loop(path: Path, settings: list[str], log: Path, as_json: bool) -> in
         "settings": [*_timed_then(run), *settings],
     }
     run_onboard(scenario, log, about, changes=changes[1:], words=_words_of(run))
-    was, now = outcome(run), outcome(read_run(log))
-    if as_json:
-        print(json.dumps({"was": was._asdict(), "now": now._asdict(), "log": str(log)}))
-        return 0
-    print(f"{'':<28}{'as recorded':>14}{'changed':>14}")
-    for field in RunFigures._fields:
-        print(f"{field:<28}{getattr(was, field):>14.4g}{getattr(now, field):>14.4g}")
-    print(f"log  {log}")
-    return 0
+    return Compared(outcome(run), outcome(read_run(log)), str(log))

@@ -1,15 +1,18 @@
 """`stickslip run`: one scenario, one log, one verdict."""
 
 import contextlib
-import json
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
 from bridge.log.logfile import refuse_a_live_log
-from cockpit.run.child_process import report
 from cockpit.run.scenario import Scenario, load_scenario
+
+if TYPE_CHECKING:
+    from cockpit.judge.margins import Margins
+    from cockpit.judge.verdict import RunVerdict
 
 
 def log_path(given: Path | None, name: str) -> Path:
@@ -52,10 +55,31 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     return now.st_mtime_ns, now.st_size
 
 
-def run_scenario(
-    name: str, settings: list[str], lockstep: bool, in_process: bool, log: Path | None, as_json: bool
-) -> int:
-    """Run a scenario and print its verdict; the exit status: 0 good, 1 when the run itself shows stick-slip or loss."""
+class RunOutcome(NamedTuple):
+    """What came of a run, and on which rig."""
+
+    verdict: "RunVerdict"
+    rig: str
+    effects: list[str]  # of the rig
+    loop: "Margins | None"  # of a rig with effects, which is another than the one the loop was designed for
+
+    def as_dict(self) -> dict[str, Any]:
+        """For `--json`."""
+        table = self.verdict.as_dict() | {"rig": self.rig}
+        return table | {"effects": self.effects, "loop": self.loop} if self.loop is not None else table
+
+    def in_words(self) -> list[str]:
+        """The verdict in one line, then in lines for a person."""
+        from cockpit.judge.margins import margins_in_words
+        from cockpit.judge.verdict import headline, in_words
+
+        rig = f"rig      {self.rig}" + (f", with {', '.join(self.effects)}" if self.effects else "")
+        margins = margins_in_words(self.loop) if self.loop is not None else []
+        return [headline(self.verdict), rig, *margins, *in_words(self.verdict)]
+
+
+def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: bool, log: Path | None) -> RunOutcome:
+    """Run a scenario and judge it. Raises Fault INTERRUPTED after Ctrl-C, with the verdict on stderr before."""
     scenario = load_scenario(name, settings)
     path = log_path(log, scenario.name)
     before = _stamp(path)
@@ -81,23 +105,18 @@ def run_scenario(
     except KeyboardInterrupt:
         interrupted = True
     from bridge.log.logfile import read_run
-    from cockpit.judge.verdict import headline, in_words, judge, judge_run
+    from cockpit.judge.verdict import in_words, judge, judge_run
 
     if interrupted:
         if _stamp(path) == before:
-            return report(Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded"), as_json)
+            raise Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded")
         with contextlib.suppress(Fault):  # a log of a moment may hold nothing to judge
             print("\n".join(in_words(judge(path))), file=sys.stderr)
-        return report(Fault("INTERRUPTED", "stopped by Ctrl-C; the log is closed"), as_json)
+        raise Fault("INTERRUPTED", "stopped by Ctrl-C; the log is closed")
     run = read_run(path)
-    verdict = judge_run(run)
-    table, lines = verdict.as_dict() | {"rig": scenario.rig.name}, [f"rig      {scenario.rig.name}"]
+    margins = None
     if scenario.rig.effects:
-        # another rig than the one the loop was designed for
-        from cockpit.judge.margins import loop_margins, margins_in_words
+        from cockpit.judge.margins import loop_margins
 
         margins = loop_margins(run)
-        table |= {"effects": list(scenario.rig.effects), "loop": margins.as_dict()}
-        lines = [f"{lines[0]}, with {', '.join(scenario.rig.effects)}", *margins_in_words(margins)]
-    print(json.dumps(table) if as_json else "\n".join([headline(verdict), *lines, *in_words(verdict)]))
-    return 0 if verdict.good else 1
+    return RunOutcome(judge_run(run), scenario.rig.name, list(scenario.rig.effects), margins)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import Fault
-from bridge.files import write_json
 from diagnosis.blind.locating import LEAST_SHARE, shares
 from diagnosis.blind.opening import OpenedSet
 from diagnosis.blind.outcomes import Opened
@@ -21,10 +20,10 @@ _SCORED = ("verdict", "effects", "not_distinguishable", "compared_features", "el
 _SCORED_OF_GAP = ("shrinkage", "interval_90", "retuned", "with_effect", "compared")
 
 
-def write_scores(path: Path, found: OpenedSet, methods: dict[str, Scores]) -> None:
-    """Write every score, and for every case its answer and its result. Raises OSError."""
+def kept_scores(found: OpenedSet, methods: dict[str, Scores]) -> dict[str, Any]:
+    """Every score, and for every case its answer and its result: what `pooled` reads."""
     about = {"format": FORMAT, "sealed": found.sealed, "tool": found.tool, "methods": as_json(methods)}
-    write_json(path, about | {"cases": [_row(found, case) for case in found.cases]})
+    return about | {"cases": [_row(found, case) for case in found.cases]}
 
 
 def pooled(paths: Sequence[Path]) -> OpenedSet:

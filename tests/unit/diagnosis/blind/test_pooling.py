@@ -7,9 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
+from bridge.files import write_json
 from cockpit.cli import app
 from diagnosis.blind.opening import OpenedSet, scored
-from diagnosis.blind.pooling import pooled, write_scores
+from diagnosis.blind.pooling import kept_scores, pooled
 from tests.blind.stand_ins import case
 
 CELLS = [["drive_force_N", "slip", "run-01", 9.0], ["mass_accel_mps2", "slip", "run-01", 6.0]]
@@ -41,7 +42,7 @@ def opened_set(number: int) -> OpenedSet:
 def kept(folder: Path, number: int, **other) -> Path:
     found = opened_set(number)._replace(**other)
     path = folder / f"{number}.json"
-    write_scores(path, found, scored(found))
+    write_json(path, kept_scores(found, scored(found)))
     return path
 
 

@@ -1,0 +1,105 @@
+"""`--json`, the same for every command: which word is its file, where the result goes, and errors as JSON."""
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from typer.core import TyperGroup
+
+from bridge.faults import Fault
+from bridge.files import strict_json, write_json
+from cockpit.run.child_process import guarded, report
+from cockpit.run.writable import check_writable, writing
+
+STDOUT = Path("-")
+_OPTION = "--json"
+_SUFFIX = ".json"
+# typer has click inside since 0.27 and beside it before; what it exports is of the same kind in both
+_UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
+
+Json = Annotated[
+    Path | None,
+    typer.Option(
+        _OPTION,
+        metavar="[FILE.json]",
+        help="Print the result as JSON on stdout, or write it to a file whose name ends in .json; words go to stdout then.",
+    ),
+]
+
+
+class JsonGroup(TyperGroup):
+    """A group of commands in which `--json` needs no value; with JSON on stdout a wrong command line is JSON as well."""
+
+    def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
+        """Run a command line, that of the process if none is given."""
+        words = with_places(sys.argv[1:] if args is None else args)
+        if f"{_OPTION}={STDOUT}" not in words:
+            return super().main(words, *more, **options)
+        try:
+            status = super().main(words, *more, **options | {"standalone_mode": False})
+        except _UsageError as error:
+            wrong: Any = error
+            command = wrong.ctx.command_path if wrong.ctx else "stickslip"
+            line = f"{command}: {wrong.format_message().rstrip('.')}; see {command} --help"
+            status = guarded(lambda: report(Fault("CONFIG", line), as_json=True))
+        sys.exit(status or 0)
+
+
+def with_places(words: Sequence[str]) -> list[str]:
+    """The command line with a place for every `--json`: the next word where that is `-` or ends in .json, else stdout."""
+    result: list[str] = []
+    left = list(words)
+    while left:
+        word = left.pop(0)
+        if word == "--":
+            return [*result, word, *left]
+        if word == _OPTION:
+            named = bool(left) and (left[0] == str(STDOUT) or left[0].endswith(_SUFFIX))
+            word = f"{_OPTION}={left.pop(0) if named else STDOUT}"
+        result.append(word)
+    return result
+
+
+def carry_out(work: Callable[[], int | None], as_json: Path | None) -> NoReturn:
+    """Do the work of a command and end with its exit status; a file for JSON that cannot be written is told before."""
+
+    def checked() -> int | None:
+        _check(as_json)
+        return work()
+
+    sys.exit(guarded(checked, as_json == STDOUT))
+
+
+def tell(as_json: Path | None, result: Any, words: Iterable[str], indent: int | None = None) -> None:
+    """Print a result, or write it and print its words. Raises Fault LOG_WRITE.
+
+    Args:
+        as_json: what `--json` says.
+        result: named tuples, dictionaries, lists, numbers and texts.
+        words: lines for a person.
+        indent: of JSON on stdout; one line if not given.
+
+    """
+    if as_json == STDOUT:
+        print(json.dumps(strict_json(result), allow_nan=False, indent=indent))
+        return
+    if as_json is not None:
+        with writing(as_json):  # before anything is printed, which ends where nobody reads on
+            write_json(as_json, result)
+    for line in words:
+        print(line)
+
+
+def _check(as_json: Path | None) -> None:
+    """Raise Fault CONFIG or LOG_WRITE for what is no place for JSON."""
+    if as_json is None or as_json == STDOUT:
+        return
+    if as_json.suffix != _SUFFIX:
+        line = f"{_OPTION}={as_json}: must be - for stdout or end in {_SUFFIX}; choose another name"
+        raise Fault("CONFIG", line)
+    check_writable(_OPTION, as_json)
+    if as_json.is_dir():
+        raise Fault("CONFIG", f"{_OPTION} {as_json}: must be a file, not a folder; choose another")
