@@ -1,7 +1,6 @@
 """`stickslip diagnose`: what makes a rig differ from its description; for one evidence folder or for many."""
 
 import os
-import signal
 import sys
 from collections.abc import Callable
 from contextlib import closing
@@ -15,7 +14,7 @@ import typer
 from bridge.faults import FAULTS, Fault
 from bridge.files import write_json
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
-from cockpit.run.child_process import report
+from cockpit.run.child_process import end_like_ctrl_c, report
 from cockpit.run.writable import check_writable, writing
 
 if TYPE_CHECKING:
@@ -69,8 +68,7 @@ def diagnose(
 
         from diagnosis.diagnose_many import find_sources
 
-        # killed politely is like Ctrl-C: the workers end too
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        end_like_ctrl_c()
         wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster)
         sources = find_sources(evidence)
         one = all(path.resolve() == sources[0].folder for path in evidence)
