@@ -362,9 +362,10 @@ def test_what_was_changed_is_caught(done):
 
 
 def test_what_cannot_be_written_is_known_before_opening(done):
-    result = score(done, "--json", done)
-    assert result.exit_code == 2
-    assert "must be a file" in result.stderr
+    for option in (f"--json={done}", f"--report={done}"):
+        result = score(done, option)
+        assert result.exit_code == 2
+        assert "must be" in result.stderr
     if os.getuid() != 0:
         (done / "locked").mkdir(mode=0o555)
         assert score(done, "--report", done / "locked" / "r.html").exit_code == FAULTS["LOG_WRITE"].exit_status
