@@ -15,6 +15,7 @@ from cockpit.run.child_process import EXTRA_MODULES
 from tests import made_up
 from tests.system.ports import free_endpoint
 
+ROOT = Path(__file__).parents[2]
 STICKSLIP = Path(sys.executable).with_name("stickslip")
 # packages of the project, and modules that its packages, joblib and Python import before anything else
 NAMES = ("bridge", "cockpit", "controller", "diagnosis", "joblib", "json", "numpy", "plant", "scipy", "typing")
@@ -137,7 +138,7 @@ def test_the_missing_extra_as_json(tmp_path: Path, plain: Path) -> None:
 
 
 def test_all_that_the_extras_bring_is_told_of() -> None:
-    extras = tomllib.loads(Path("pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert extras["all"] == ["stickslip[diagnosis,tables]"]
     names = {re.split(r"[\[>=]", line)[0] for line in (*extras["diagnosis"], *extras["tables"])}
     assert names - {"stickslip"} == EXTRA_MODULES

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from tests import made_up
+from tests.system.ports import free_endpoint
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("bridge", "cockpit", "controller", "diagnosis", "plant")
 BASE_MB = 650.0
@@ -68,15 +71,14 @@ def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> 
     files = [path for path in (tmp_path / "base" / "lib").rglob("*") if path.is_file()]
     assert sum(path.stat().st_blocks * 512 for path in files) < BASE_MB * 2**20
     said = run(
-        at / "stickslip", "run", "--lockstep", "--set", "duration_s=1", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path)
-    )
+        at / "stickslip", "run", "--lockstep", "--set", "duration_s=1", "--endpoint", free_endpoint(),
+        cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path),
+    )  # fmt: skip
     assert "blocks   1000, none lost" in said
 
 
 @pytest.mark.nightly
 def test_a_fresh_installation_with_all_diagnoses(wheel: Path, tmp_path: Path) -> None:
-    from tests import made_up
-
     made_up.evidence_folder(tmp_path / "evidence")
     at = installed(tmp_path / "all", f"{wheel}[all]")
     said = run(at / "stickslip", "diagnose", "evidence", "--jobs", "2", cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path))
