@@ -41,15 +41,15 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     tried = trials(problem)
     contest = Contest(retuned_rig(evidence, problem, progress, jobs), tried, jobs)
     contest.decide(progress)
-    unseen = [run for run in runs if run.holdout]
-    outcome = borne_out(contest, Problem(evidence.rig, unseen) if unseen else None, jobs)
-    verdict = with_what_vibrates(outcome.verdict, evidence.runs)
+    held_out = [run for run in runs if run.holdout]
+    outcome = borne_out(contest, Problem(evidence.rig, held_out) if held_out else None, jobs)
+    verdict = with_vibration_findings(outcome.verdict, evidence.runs)
     outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
     progress(f"verdict: {outcome.verdict.kind}", 0.8)
     return assembled(evidence, runs, contest, outcome, tried, began, jobs)
 
 
-def with_what_vibrates(verdict: Verdict, runs: Sequence[Run]) -> Verdict:
+def with_vibration_findings(verdict: Verdict, runs: Sequence[Run]) -> Verdict:
     """The verdict in view of vibration that no model makes: in the force signal, or of the base at other frequencies.
 
     With such a vibration, "no gap" becomes "unexplained"; with a base at other frequencies, so does an effect of the piezo alone.

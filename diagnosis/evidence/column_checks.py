@@ -10,7 +10,7 @@ from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.log.signal_range import look
 from diagnosis.evidence.manifest import RigTable, RunTable
-from diagnosis.evidence.sign_and_unit import told_stiffness_N_per_m
+from diagnosis.evidence.sign_and_unit import apparent_stiffness_N_per_m
 
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
@@ -28,11 +28,13 @@ _GAP_STEPS = 10.0  # times the median step between samples from which a step is 
 # Longest gap, and largest share of gaps in a run. In a longer gap the rig slips unseen, and the model goes on slipping.
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
 _VELOCITY_TOLERANCE = 0.1  # relative difference of the stated drive velocity and the drive position's slope
-_ANOTHER = 3.0  # factor between the two (or another sign) from which the stated velocity is that of another run
-_FURTHEST = 10.0  # times the way of the drive that a position may travel; mm in place of m are a factor of 1000
+_OTHER_RUN_FACTOR = (
+    3.0  # factor between the two (or another sign) from which the stated velocity is that of another run
+)
+_MOST_TRAVEL = 10.0  # times the way of the drive that a position may travel; mm in place of m are a factor of 1000
 _LEAST_TRAVEL = 0.002  # of the way to the first slip that a drive must move; the noise of a drive at rest is less
 _FASTEST = 300.0  # times the Stribeck velocity; mm/s in place of m/s are a factor of 1000
-_ANOTHER_UNIT = 5.0  # factor from which a unit is wrong: an acceleration in g is off by 9.8, N/mm by 1000
+_OTHER_UNIT_FACTOR = 5.0  # factor from which a unit is wrong: an acceleration in g is off by 9.8, N/mm by 1000
 _STRIDE_S = 0.1  # seconds between the positions whose distances add up to a way; with shorter strides noise adds up
 _FEWEST_IN_A_SLIP = 3.0  # samples
 _SHORTEST_S = 1.0  # of a run
@@ -255,7 +257,7 @@ def _too_far(name: str, columns: Columns, rig: RigTable, table: RunTable) -> str
         drive_m = float(np.ptp(columns["drive_position_m"]))
     else:
         return ""
-    furthest_m = _FURTHEST * (drive_m + rig.static_force_N / rig.drive_stiffness_N_per_m)
+    furthest_m = _MOST_TRAVEL * (drive_m + rig.static_force_N / rig.drive_stiffness_N_per_m)
     travel_m = float(np.ptp(columns[name]))
     if travel_m <= furthest_m:
         return ""
@@ -278,7 +280,9 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
             )
             reach_m = rig.static_force_N / (rig.drive_stiffness_N_per_m or math.inf)
             another = (
-                not 1.0 / _ANOTHER < measured_mps / stated_mps < _ANOTHER if stated_mps else abs(travel_m) > reach_m
+                not 1.0 / _OTHER_RUN_FACTOR < measured_mps / stated_mps < _OTHER_RUN_FACTOR
+                if stated_mps
+                else abs(travel_m) > reach_m
             )
             if another:
                 raise Fault("BAD_EVIDENCE", f"{table.file}: drive_position_m: {text}")
@@ -317,19 +321,19 @@ def _check_moves(columns: Columns, rig: RigTable, table: RunTable, note: Note) -
 def _check_bending(columns: Columns, rig: RigTable, note: Note) -> None:
     """Drop a mass acceleration with the wrong sign; note a drive stiffness in another unit."""
     described = rig.drive_stiffness_N_per_m
-    told = told_stiffness_N_per_m(columns["t_s"], columns) if described else None
-    if not described or told is None:
+    apparent = apparent_stiffness_N_per_m(columns["t_s"], columns) if described else None
+    if not described or apparent is None:
         return
-    if told < 0.0:
+    if apparent < 0.0:
         text = (
             "points backwards: the mass accelerates as the force that pulls it bends down; not used; change the sign of"
         )
         note("sign", "mass_accel_mps2", f"{text} channels.mass_accel_mps2.scale")
         del columns["mass_accel_mps2"]
-    elif not 1.0 / _ANOTHER_UNIT < told / described < _ANOTHER_UNIT:
+    elif not 1.0 / _OTHER_UNIT_FACTOR < apparent / described < _OTHER_UNIT_FACTOR:
         text = (
-            f"bends with the acceleration of the mass as a spring of {told:.2g} N/m makes it, rig.drive_stiffness_N_per_m says "
-            f"{described:g}: check the units of these three"
+            f"bends with the acceleration of the mass as a spring of {apparent:.2g} N/m makes it, "
+            f"rig.drive_stiffness_N_per_m says {described:g}: check the units of these three"
         )
         note("units", "drive_force_N", text)
 

@@ -19,7 +19,9 @@ _MULTIPLES = (0.5, 1.5, 2.0, 3.0)  # of the commanded frequency, at which a line
 # fails, 1.05 passes). Too small: the hysteresis of every piezo, some per cent, is reported. Too large: harmonics stay unseen.
 # Counted on 56 synthetic rigs (docs/method/evidence.md).
 _SHARE = 0.05
-_OF_BESIDE = 4.0  # times the amplitude beside the line that the line must have; noise and slips are at both frequencies
+_TIMES_BESIDE = (
+    4.0  # times the amplitude beside the line that the line must have; noise and slips are at both frequencies
+)
 
 
 class Distortion(NamedTuple):
@@ -70,7 +72,7 @@ def distortion(t_s: Floats, columns: Mapping[str, npt.NDArray[np.floating]]) -> 
                 commanded_Hz = float(lock_in.lowest_Hz[own[0]])
                 size, whole = float(np.median(line[own])), float(np.median(base[own]))
                 around = max(float(np.median(each[own])) for each in beside)
-                if _is_apart(multiple * commanded_Hz, commanded_Hz, lock_in.rate_Hz) and size > _OF_BESIDE * around:
+                if _is_apart(multiple * commanded_Hz, commanded_Hz, lock_in.rate_Hz) and size > _TIMES_BESIDE * around:
                     found.append(Distortion(commanded_Hz, multiple, size / (multiple * max(whole, size / 1e3))))
     strongest = max(found, key=lambda one: one.share, default=None)
     return strongest if strongest is not None and strongest.limits > 1.0 else None

@@ -22,11 +22,11 @@ from diagnosis.evidence.manifest import MANIFEST, STANDARD, ChannelMap, Manifest
 from diagnosis.evidence.run_log import columns_of_log
 
 Floats = npt.NDArray[np.float64]
-_LACKING = "column"  # kind of finding: the file lacks a column that the channel map names
+_NO_COLUMN = "column"  # kind of finding: the file lacks a column that the channel map names
 _NEVER_EXACT = ("coulomb_force_N", "static_force_N", "stribeck_velocity_mps", "drive_stiffness_N_per_m")
 # Similarity of two column names (`difflib`) from which one may be a misspelling of the other: one letter, or the case, differs.
 # Too small: unrelated columns are offered. Too large: misspellings stay unseen.
-_ALIKE = 0.85
+_SIMILAR = 0.85
 SHAKE_RATE_HZ = 8000.0  # lowest sampling rate at which the rms within 1 ms is compared; slower has too few samples
 # what is lost without a column, by kind of drive
 _COST_SPRING = {
@@ -102,7 +102,9 @@ def _refuse_misspelt(manifest: Manifest, findings: list[Finding]) -> None:
     """Raise Fault BAD_EVIDENCE for a mapped column that no run has: it is misspelt. A column that some runs lack is missing."""
     tables = sum(not table.file.endswith(".mcap") for table in manifest.run)
     for name in manifest.channels:
-        lacking = [finding for finding in findings if finding.kind == _LACKING and finding.where.endswith(f": {name}")]
+        lacking = [
+            finding for finding in findings if finding.kind == _NO_COLUMN and finding.where.endswith(f": {name}")
+        ]
         if len(lacking) == tables > 0:
             line = f"{lacking[0].where.partition(':')[0]}: {lacking[0].text}"
             raise Fault("BAD_EVIDENCE", f"{line}; no run has it: correct channels.{name}.column")
@@ -147,14 +149,14 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
     """Kind, column and text of each finding about the commanded vibration."""
-    told = [name for name in ("vibration_frequency_Hz", "vibration_amplitude_m") if name in columns]
-    if len(told) == 1:
+    given = [name for name in ("vibration_frequency_Hz", "vibration_amplitude_m") if name in columns]
+    if len(given) == 1:
         yield (
             "missing",
-            told[0],
+            given[0],
             "stands alone: frequency and amplitude are needed, the run counts as one without vibration",
         )
-    for name in told:
+    for name in given:
         if negative := int((columns[name] < 0.0).sum()):
             yield (
                 "sign",
@@ -162,7 +164,7 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
                 f"{negative} samples are negative: must be 0 where it is off, above it else; not used there",
             )
     rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
-    if len(told) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
+    if len(given) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:
         for name in ("mass_accel_mps2", "base_accel_mps2"):
             if name in columns:
                 yield (
@@ -189,7 +191,7 @@ def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, 
                 source = channels[name]
                 if source.column not in table.columns and name != "t_s":
                     text = f"column {source.column}: not in the file; known here: {', '.join(sorted(table.columns)) or 'none'}"
-                    lacking.append(Finding(_LACKING, f"{path.name}: {name}", text))
+                    lacking.append(Finding(_NO_COLUMN, f"{path.name}: {name}", text))
                     continue
                 found[name] = table.column(source.column) * source.scale + source.offset
             elif name in table.columns:
@@ -203,7 +205,7 @@ def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, 
 def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
     """A finding for each unused column whose name is nearly that of a missing standard column."""
     for name in STANDARD:
-        near = [] if name in found else get_close_matches(name, table.columns.keys() - found.keys(), 1, _ALIKE)
+        near = [] if name in found else get_close_matches(name, table.columns.keys() - found.keys(), 1, _SIMILAR)
         for other in near:
             yield Finding(
                 "missing", f"{file}: {name}", f'not there, but {other} is: set channels.{name}.column = "{other}"'

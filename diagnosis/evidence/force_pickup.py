@@ -18,8 +18,8 @@ PICK_UP = "pick-up"  # kind of the finding
 # A vibration of the force is reported above the largest of these three limits. Lower limits report ordinary rigs; higher limits
 # miss a pick-up.
 _SHARE = 0.005  # of the static friction: the most that the roughness of a surface makes
-_OF_SPRING = 3.0  # times the force that the spring carries by the described rig numbers, which are not exact
-_OF_BESIDE = 4.0  # times the amplitude at frequencies beside the commanded one: noise, and quick slips
+_TIMES_SPRING = 3.0  # times the force that the spring carries by the described rig numbers, which are not exact
+_TIMES_BESIDE = 4.0  # times the amplitude at frequencies beside the commanded one: noise, and quick slips
 
 
 class PickUp(NamedTuple):
@@ -76,7 +76,7 @@ def pick_up(rig: RigTable, t_s: Floats, columns: Mapping[str, npt.NDArray[np.flo
         yields = np.abs(stiffness_N_per_m + 1j * angular * (rig.drive_damping_Ns_per_m or 0.0))
         spring_N = float(np.median(yields * accel_mps2[own] / angular**2))
         around_N = max(float(np.median(each[own])) for each in beside_N)
-        limit_N = max(_SHARE * rig.static_force_N, _OF_SPRING * spring_N, _OF_BESIDE * around_N)
+        limit_N = max(_SHARE * rig.static_force_N, _TIMES_SPRING * spring_N, _TIMES_BESIDE * around_N)
         return PickUp(float(np.median(lock_in.lowest_Hz[own])), float(np.median(force_N[own])), spring_N, limit_N)
 
     each = [of(own) for own in lock_in.steady()] or [of(lock_in.used)]

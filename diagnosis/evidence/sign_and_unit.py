@@ -19,10 +19,10 @@ _BESIDE_BINS = 61  # around a vibration that are left out: its remainder in a me
 _FEWEST_BINS = 500  # that a run needs; a stiffness from fewer bins is noise
 # Smallest correlation of force and acceleration for which a stiffness is returned. Too small: runs without slips, noise against
 # noise, give a false stiffness. Too large: wrong signs and units stay unseen. Counted: docs/method/evidence.md.
-_AS_ONE = 0.9
+_LEAST_CORRELATION = 0.9
 
 
-def told_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> float | None:
+def apparent_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> float | None:
     """The drive's stiffness as force and mass acceleration show it; below 0 when one of the two has the wrong sign.
 
     None where the two do not correlate or one is missing. The stiffness leaves out the motion of the drive, so it is good for a
@@ -46,6 +46,6 @@ def told_stiffness_N_per_m(t_s: Floats, columns: Mapping[str, Floats]) -> float 
     moved = accel_mps2[1:-1][quiet]
     if len(moved) < _FEWEST_BINS or np.ptp(moved) == 0.0 or np.ptp(bent) == 0.0:
         return None
-    if abs(float(np.corrcoef(bent, moved)[0, 1])) < _AS_ONE:
+    if abs(float(np.corrcoef(bent, moved)[0, 1])) < _LEAST_CORRELATION:
         return None
     return -float(bent @ moved) / float(moved @ moved)

@@ -32,7 +32,7 @@ _SLOW = np.array([0.25, 0.5, 1.0, 2.0, 4.0])
 _FAST = 8  # bins from the last slow edge to the greatest speed
 # Travel, in presliding lengths F_s / k_t, before features count. Too small: the unknown load on the contact at the start of the
 # run shows as a gap. Too large: short runs lose their features.
-_FORGOTTEN = 20.0
+_FORGETTING_LENGTHS = 20.0
 _FEWEST = 5  # blocks that a bin needs; fewer blocks make its mean noise
 _FRICTION_WAVES_TIME = 72  # half waves: up to 3 Hz in 12 s
 _FRICTION_WAVES_POSITION = 80  # half waves: down to 5 mm on a stroke of 0.2 m
@@ -92,19 +92,19 @@ def friction_share(force_N: Floats, motion: Motion) -> tuple[Floats, npt.NDArray
 
 def moving_s(motion: Motion, rig: RigTable) -> float:
     """Seconds of a run that its features can use."""
-    if float(np.ptp(motion.position_m)) <= _forgotten_m(rig):
+    if float(np.ptp(motion.position_m)) <= _forgetting_m(rig):
         return 0.0
     return max(len(motion.position_m) - _EDGE - _first(motion, rig), 0) * BLOCK_S
 
 
-def _forgotten_m(rig: RigTable) -> float:
-    return _FORGOTTEN * rig.static_force_N / rig.contact_stiffness_N_per_m
+def _forgetting_m(rig: RigTable) -> float:
+    return _FORGETTING_LENGTHS * rig.static_force_N / rig.contact_stiffness_N_per_m
 
 
 def _first(motion: Motion, rig: RigTable) -> int:
     """First block that counts for the features."""
     gone_m = np.abs(motion.position_m - motion.position_m[0])
-    gone = gone_m > _forgotten_m(rig)
+    gone = gone_m > _forgetting_m(rig)
     return max(int(np.argmax(gone)), _EDGE)
 
 

@@ -22,7 +22,7 @@ SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_m
 _FURTHEST_BLOCKS = 5
 # Largest cosine of the angle that the vibration turns by between the two. Too large: the average amplifies noise.
 # Too small: more frequencies find no partner.
-_LEAST_APART = 0.3
+_LARGEST_COSINE = 0.3
 
 
 def reduce_run(run: Run) -> dict[str, Floats]:
@@ -73,9 +73,9 @@ def averaged(frequency_Hz: Floats) -> Averaged:
     values_Hz, which = np.unique(frequency_Hz[shaken], return_inverse=True)
     turned = np.cos(2.0 * np.pi * BLOCK_S * np.outer(values_Hz, np.arange(1, _FURTHEST_BLOCKS + 1)))
     cosine = turned.min(axis=1, initial=1.0)[which]
-    apart = (turned.argmin(axis=1) + 1)[which]
-    own, cosine, apart = (values[cosine < _LEAST_APART] for values in (shaken, cosine, apart))
-    return Averaged(own, np.maximum(own - apart, 0), np.minimum(own + apart, len(frequency_Hz) - 1), cosine)
+    distance = (turned.argmin(axis=1) + 1)[which]
+    own, cosine, distance = (values[cosine < _LARGEST_COSINE] for values in (shaken, cosine, distance))
+    return Averaged(own, np.maximum(own - distance, 0), np.minimum(own + distance, len(frequency_Hz) - 1), cosine)
 
 
 def without_vibration(signals: dict[str, Floats], blocks: Averaged) -> dict[str, Floats]:

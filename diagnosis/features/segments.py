@@ -149,8 +149,10 @@ def _pieces(position_m: Floats) -> Floats:
     for number, (first, last) in enumerate(pieces):
         before, own, after = speeds[number : number + 3]
         # the outer windows of a piece may hold the change of speed
-        begin = first + max(_off(velocity[first:last], own, before, first == 0), int(first > 0))
-        end = last - max(_off(velocity[first:last][::-1], own, after, last == windows), int(last < windows))
+        begin = first + max(_windows_under_way(velocity[first:last], own, before, first == 0), int(first > 0))
+        end = last - max(
+            _windows_under_way(velocity[first:last][::-1], own, after, last == windows), int(last < windows)
+        )
         inner = slice(begin * _WINDOW, end * _WINDOW if end < windows else blocks)
         slope, offset = np.polyfit(np.arange(blocks)[inner], position_m[inner], 1)
         if abs(slope) < _SLOWEST * fastest * BLOCK_S:
@@ -167,7 +169,7 @@ def _pieces(position_m: Floats) -> Floats:
     return result
 
 
-def _off(velocity: Floats, own: float, other: float, at_the_end: bool) -> int:
+def _windows_under_way(velocity: Floats, own: float, other: float, at_the_end: bool) -> int:
     """Number of windows, from the first, in which a piece has not reached its velocity `own`; `other` is the neighbour's.
 
     At an end of the run no neighbour is known; there a drive that starts or stops is below half of its velocity.

@@ -12,7 +12,7 @@ from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
 
 Floats = npt.NDArray[np.floating[Any]]
-_ROUND_ENTRY = 10  # blocks left out around the start of a segment: longer than the delays of a measuring chain
+_ENTRY_MARGIN = 10  # blocks left out around the start of a segment: longer than the delays of a measuring chain
 # Moving means, in slip durations, between which the bend is read. Shorter short mean: noise of the displacement sensors, which
 # grows with the square of frequency; longer: it smears the slip. Longer long mean: a sensor's bow passes for a bend; shorter: the
 # slip is removed. Counted on 60 rigs without a gap (docs/method/features.md).
@@ -32,7 +32,7 @@ def spring_law(
         scale_N, stiffness_N_per_m: typical force and stiffness, which size the columns.
 
     """
-    even = _even(segments, len(force_N), _ROUND_ENTRY)
+    even = _away_from_entries(segments, len(force_N), _ENTRY_MARGIN)
     rate_mps = np.gradient(uniform_filter1d(extension_m, 5), BLOCK_S)[even]
     force_N, extension_m = force_N[even], extension_m[even]
     extension_m = extension_m - extension_m.mean() + force_N.mean() / stiffness_N_per_m
@@ -46,7 +46,7 @@ def spring_law(
     }
     if both:
         columns["direction"] = np.sign(force_N)
-    law, rest = _one_after_the_other(columns, force_N)
+    law, rest = _sequential_fit(columns, force_N)
     law.setdefault("direction", math.nan)
     return law | {"rest": max(rest, 0.0) / len(force_N)}
 
@@ -67,14 +67,14 @@ def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment
         "rate": (later_m - earlier_m) / (2 * short * BLOCK_S),
         "bend": (later_m - 2.0 * level_m + earlier_m) / (short * BLOCK_S) ** 2,
     }
-    even = _even(segments, len(force_N), _ROUND_ENTRY + 2 * short)
+    even = _away_from_entries(segments, len(force_N), _ENTRY_MARGIN + 2 * short)
     fast = {name: (values - uniform_filter1d(values, long))[even] for name, values in columns.items()}
     level_N = uniform_filter1d(force_N, short)
-    law, _ = _one_after_the_other(fast, (level_N - uniform_filter1d(level_N, long))[even])
+    law, _ = _sequential_fit(fast, (level_N - uniform_filter1d(level_N, long))[even])
     return law["bend"]
 
 
-def _even(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[np.bool_]:
+def _away_from_entries(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[np.bool_]:
     """Marks [blocks] all blocks but those within `about` of the start of a segment, where the model takes the measured force."""
     even = np.ones(blocks, np.bool_)
     for segment in segments:
@@ -83,7 +83,7 @@ def _even(segments: Sequence[Segment], blocks: int, about: int) -> npt.NDArray[n
     return even
 
 
-def _one_after_the_other(columns: Mapping[str, Floats], force_N: Floats) -> tuple[dict[str, float], float]:
+def _sequential_fit(columns: Mapping[str, Floats], force_N: Floats) -> tuple[dict[str, float], float]:
     """Coefficient of the force [blocks] on each column, each freed of the columns before it; and the rest's sum of squares.
 
     A fit of all columns at once would pass the noise of one to the other.

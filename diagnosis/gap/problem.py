@@ -53,7 +53,7 @@ class Draw(NamedTuple):
     roughness: Roughness
 
 
-class _Asked(NamedTuple):
+class _Request(NamedTuple):
     """One run of the model to simulate."""
 
     point: Point
@@ -132,16 +132,19 @@ class Problem:
         self, run: Prepared, points: Sequence[Point], draws: Sequence[Draw | None], perhaps: Sequence[Point] = ()
     ) -> list[Signals | None]:
         """Signals of each point, as the sensors show them; None where such a rig cannot be simulated."""
-        asked = [_asked(run, point, draw) for point, draw in zip(points, draws, strict=True)]
+        requests = [_request(run, point, draw) for point, draw in zip(points, draws, strict=True)]
         if self.rig.drive == "force":
-            return [self._led(run, one) for one in asked]
-        raws = self._raw(run, run.commands, asked, perhaps=perhaps)
-        return [None if raw is None else _shown(run, one, raw) for one, raw in zip(asked, raws, strict=True)]
+            return [self._led_signals(run, request) for request in requests]
+        raws = self._raw(run, run.commands, requests, perhaps=perhaps)
+        return [
+            None if raw is None else _sensor_signals(run, request, raw)
+            for request, raw in zip(requests, raws, strict=True)
+        ]
 
-    def _led(self, run: Prepared, one: _Asked) -> Signals | None:
+    def _led_signals(self, run: Prepared, request: _Request) -> Signals | None:
         """Signals of one point with a force drive: among them the force that leads the model along the measured motion."""
-        effects, draw = one.point.effects, one.draw
-        chain = relative(one.point.chain)
+        effects, draw = request.point.effects, request.draw
+        chain = relative(request.point.chain)
         commands = true_commands(run.commands, effects, chain)
         blocks = len(commands.drive)
         noise: Signals = {}
@@ -153,7 +156,7 @@ class Problem:
             # noise on the input force moves the mass; the leading force that corrects this motion is the effect of the noise
             commands = commands._replace(drive=commands.drive + noise["drive_force_N"], motion=motion)
         sensors = {name: table for name, table in effects.items() if name in SENSOR_EFFECTS}
-        (raw,) = self._raw(run, commands, [one], (chain, _hashable(sensors)))
+        (raw,) = self._raw(run, commands, [request], (chain, _hashable(sensors)))
         if raw is None:
             return None
         result = sensed(raw, commands.frequency_Hz, effects, chain)
@@ -168,7 +171,7 @@ class Problem:
         self,
         run: Prepared,
         commands: Commands,
-        asked: Sequence[_Asked],
+        requests: Sequence[_Request],
         inputs: object = None,
         perhaps: Sequence[Point] = (),
     ) -> list[Signals | None]:
@@ -176,14 +179,17 @@ class Problem:
 
         A run without a draw is kept and found again; a run with a draw is simulated each time.
         """
-        keys = [number if one.draw is not None else _key(run, one, inputs) for number, one in enumerate(asked)]
+        keys = [
+            number if request.draw is not None else _key(run, request, inputs)
+            for number, request in enumerate(requests)
+        ]
         found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
-        todo = {key: one for key, one in zip(keys, asked, strict=True) if key not in found}
-        spare: dict[object, _Asked] = {}
+        todo = {key: request for key, request in zip(keys, requests, strict=True) if key not in found}
+        spare: dict[object, _Request] = {}
         if len(todo) % LANES:
-            soon = [_asked(run, point, None) for point in perhaps]
+            soon = [_request(run, point, None) for point in perhaps]
             known = todo.keys() | found.keys() | self._simulated.keys()
-            spare = {key: one for one in soon if (key := _key(run, one, inputs)) not in known}
+            spare = {key: request for request in soon if (key := _key(run, request, inputs)) not in known}
         simulated = self._simulate(commands, [*todo.values(), *spare.values()], len(todo))
         for key, signals in zip([*todo, *spare], simulated, strict=True):
             if key in todo:
@@ -191,28 +197,30 @@ class Problem:
             elif signals is not None:
                 self._simulated[key] = signals
         # What was used last moves to the end and is dropped last: the common start of all trials is needed often.
-        self._simulated |= {key: found[key] for key, one in zip(keys, asked, strict=True) if one.draw is None}
+        self._simulated |= {
+            key: found[key] for key, request in zip(keys, requests, strict=True) if request.draw is None
+        }
         for key in list(self._simulated)[:-_KEPT]:
             del self._simulated[key]
         return [found[key] for key in keys]
 
-    def _simulate(self, commands: Commands, asked: Sequence[_Asked], wanted: int) -> list[Signals | None]:
+    def _simulate(self, commands: Commands, requests: Sequence[_Request], wanted: int) -> list[Signals | None]:
         """Signals of each model, before the sensors.
 
         The first `wanted` are all simulated, and None means that such a rig cannot be; the others only where a lane is free.
         """
         configs: dict[int, RigConfig] = {}
-        for number, one in enumerate(asked):
+        for number, request in enumerate(requests):
             with suppress(ValidationError):
                 configs[number] = rig_config(
-                    self.rig, one.point.values, one.effects, one.draw.roughness if one.draw else None
+                    self.rig, request.point.values, request.effects, request.draw.roughness if request.draw else None
                 )
-        starts = [asked[number].start for number in configs]
-        entries = [asked[number].entries for number in configs]
+        starts = [requests[number].start for number in configs]
+        entries = [requests[number].entries for number in configs]
         possible = sum(number < wanted for number in configs)
         found = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries, possible)
         by_number = dict(zip(configs, found, strict=True))
-        return [by_number.get(number) for number in range(len(asked))]
+        return [by_number.get(number) for number in range(len(requests))]
 
     def _features(self, run: Prepared, signals: Signals) -> Features:
         if self.rig.drive == "force":
@@ -220,12 +228,12 @@ class Problem:
         return spring_features(without_vibration(signals, self._averaged[run.file]), run.commands, self.scales)
 
 
-def _truly(reading_N: float, effects: Effects, t_s: float) -> float:
+def _true_N(reading_N: float, effects: Effects, t_s: float) -> float:
     return float(true_force_N(np.array(reading_N), effects, np.array(t_s)))
 
 
-def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
-    start = run.start._replace(force_N=_truly(run.start.force_N, point.effects, 0.0))
+def _request(run: Prepared, point: Point, draw: Draw | None) -> _Request:
+    start = run.start._replace(force_N=_true_N(run.start.force_N, point.effects, 0.0))
     age_s = point.effects.get(AGEING, {}).get(of_run(AGE_BEFORE, run.file))
     if age_s is not None:
         start = start._replace(age_s=float(age_s))
@@ -233,7 +241,7 @@ def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
         start = start._replace(age_s=AGE_BEFORE_S * math.exp(AGE_SPREAD * float(draw.random.normal())))
     entries = tuple(
         entry._replace(
-            force_N=_truly(entry.force_N, point.effects, entry.block * BLOCK_S),
+            force_N=_true_N(entry.force_N, point.effects, entry.block * BLOCK_S),
             age_s=entry.age_s + start.age_s if entry.from_before and entry.age_s is not None else entry.age_s,
         )
         for entry in run.entries
@@ -242,14 +250,14 @@ def _asked(run: Prepared, point: Point, draw: Draw | None) -> _Asked:
     if draw is not None:
         chain = chain._replace(position_scale=chain.position_scale + _SCALE_SPREAD * float(draw.random.normal()))
         entries = tuple(misread(entry, run.noise, draw.random) for entry in entries)
-    return _Asked(point, draw, _moving(run, point.effects, draw), start, entries, chain)
+    return _Request(point, draw, _rig_effects(run, point.effects, draw), start, entries, chain)
 
 
-def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
+def _rig_effects(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
     """The effects that move the rig, with the numbers that they have in this run."""
     seed = draw.roughness.seed if draw else None
-    shown = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
-    moving = {name: table for name, table in shown.items() if table is not None and name not in SENSOR_EFFECTS}
+    in_this_run = {name: in_run(table, run.file, run.holdout, seed) for name, table in effects.items()}
+    moving = {name: table for name, table in in_this_run.items() if table is not None and name not in SENSOR_EFFECTS}
     if not run.commands.frequency_Hz.any():
         moving = {name: table for name, table in moving.items() if name not in PIEZO_EFFECTS}
     if "before_s" in moving.get("friction-drift", {}):
@@ -257,25 +265,33 @@ def _moving(run: Prepared, effects: Effects, draw: Draw | None) -> Effects:
     return _with_paths(moving, run, draw)
 
 
-def _shown(run: Prepared, one: _Asked, raw: Signals) -> Signals:
+def _sensor_signals(run: Prepared, request: _Request, raw: Signals) -> Signals:
     """A simulated run as its sensors show it: gains, delays, noise, clipping."""
-    result = sensed(raw, run.commands.frequency_Hz, one.point.effects, one.chain)
+    result = sensed(raw, run.commands.frequency_Hz, request.point.effects, request.chain)
     result = {name: result[name] for name in run.signals}
     for name in result:
         if name.endswith("shake_mps2"):
             result[name] = np.hypot(result[name], run.noise.shake_mps2[name])
-    if one.draw is not None:
+    if request.draw is not None:
         for name, values in result.items():
-            result[name] = values + run.noise.drawn(name, len(values), one.draw.random)
+            result[name] = values + run.noise.drawn(name, len(values), request.draw.random)
     for name, (low, high) in run.clipped.items():
         result[name] = np.clip(result[name], low, high)
     return result
 
 
-def _key(run: Prepared, one: _Asked, inputs: object) -> object:
+def _key(run: Prepared, request: _Request, inputs: object) -> object:
     """Key of a run without a draw: all that decides how it goes."""
-    rig = _hashable({"rig": one.point.values})
-    return run.file, one.start.force_N, one.start.age_s, one.entries, inputs, rig, _hashable(one.effects)
+    rig = _hashable({"rig": request.point.values})
+    return (
+        run.file,
+        request.start.force_N,
+        request.start.age_s,
+        request.entries,
+        inputs,
+        rig,
+        _hashable(request.effects),
+    )
 
 
 def _hashable(tables: Mapping[str, Mapping[str, float | str]]) -> object:

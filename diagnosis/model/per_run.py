@@ -55,20 +55,20 @@ def has_own_phases(table: Collection[str]) -> bool:
     return any(is_of_run(name, PHASE) for name in table)
 
 
-def in_run(table: Table, file: str, kept_aside: bool, seed: int | None) -> dict[str, float | str] | None:
+def in_run(table: Table, file: str, held_out: bool, seed: int | None) -> dict[str, float | str] | None:
     """An effect with the parameters that it has in the run `file`; None where only its mean, 0, is known.
 
     Args:
         table: the effect.
         file: of the run.
-        kept_aside: whether the run is held out, so that its phase is unknown.
+        held_out: whether the run is held out, so that its phase is unknown.
         seed: of the draw that takes an unknown phase; None in a prediction.
 
     """
     plain = as_in_rig_file(table)
     if not has_own_phases(table):
         return plain
-    if not kept_aside:
+    if not held_out:
         return plain | {PHASE: table.get(phase_of(file), plain[PHASE])}
     if seed is None:
         return None

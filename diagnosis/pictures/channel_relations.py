@@ -39,7 +39,7 @@ _EXCITER_SHARE = 0.01
 _ROLLED_OFF = 0.5  # roll-off of ordinary accelerometers, see `accel_rolled_off` in `diagnosis.model.sensor_chain`
 _VIBRATION_BLOCKS = 20  # blocks that make one point of the exciter's relation
 _SLIDES_FROM = 2.0  # Stribeck velocities from which the friction law holds; below, presliding decides the force
-_AWAY = 3.0  # standard deviations of the smoothing, kept away from the edges of a slip
+_EDGE_MARGIN = 3.0  # standard deviations of the smoothing, kept away from the edges of a slip
 
 
 class Residual(NamedTuple):
@@ -72,13 +72,13 @@ def _noise_signals(run: Prepared) -> Signals:
     return {name: run.noise.drawn(name, blocks, random) for name in run.signals}
 
 
-def _made(
+def _residual(
     name: str,
     rig: RigTable,
     run: Prepared,
     values: Floats,
     noise: Floats,
-    more: float,
+    sensor_error: float,
     without_vibration: bool = False,
 ) -> Residual:
     """A residual without the blocks beside changes of command.
@@ -96,7 +96,7 @@ def _made(
     kept = kept_blocks(run)
     if without_vibration:
         kept &= run.commands.frequency_Hz == 0.0
-    spread = float(np.sqrt(np.mean(noise[kept] ** 2) + more * more)) if kept.any() else 1.0
+    spread = float(np.sqrt(np.mean(noise[kept] ** 2) + sensor_error * sensor_error)) if kept.any() else 1.0
     over = {key: column[kept] for key, column in motion(rig, run).items()}
     return Residual(name, values[kept], spread, over)
 
@@ -113,7 +113,7 @@ def _spring(rig: RigTable, run: Prepared) -> Residual | None:
         return left - left.mean()  # the zero between the two displacement sensors is not known
 
     force_N = run.signals["drive_force_N"]
-    return _made(
+    return _residual(
         "spring", rig, run, relation(run.signals),
         relation(_noise_signals(run)), _SPRING_SHARE * float(np.ptp(force_N)),
     )  # fmt: skip
@@ -135,7 +135,7 @@ def _curvature(rig: RigTable, run: Prepared) -> Residual | None:
     values, bent = relation(with_drive_path(run))
     noise = _noise_signals(run)
     noise.setdefault("drive_position_m", np.zeros_like(values))
-    return _made(
+    return _residual(
         "curvature", rig, run, values,
         relation(noise)[0], _CURVATURE_SHARE * float(bent.std()), without_vibration=True,
     )  # fmt: skip
@@ -152,7 +152,7 @@ def _motion(rig: RigTable, run: Prepared) -> Residual | None:
         return without_slow(apart), without_slow(accel_mps2)
 
     values, accel_mps2 = relation(run.signals)
-    return _made(
+    return _residual(
         "motion", rig, run, values,
         relation(_noise_signals(run))[0], _MOTION_SHARE * float(accel_mps2.std()), without_vibration=True,
     )  # fmt: skip
@@ -172,7 +172,7 @@ def _drive(rig: RigTable, run: Prepared) -> Residual | None:
     noise = _noise_signals(run)["drive_position_m"]
     travel_m = float(np.median(np.abs(run.commands.drive)))  # in a second
     # a drive that stands still in the log has no noise but rounding: `RESOLVED_M`
-    return _made("drive", rig, run, values, noise, max(_DRIVE_SHARE * travel_m, RESOLVED_M))
+    return _residual("drive", rig, run, values, noise, max(_DRIVE_SHARE * travel_m, RESOLVED_M))
 
 
 def _exciter(run: Prepared) -> Residual | None:
@@ -225,7 +225,7 @@ def _friction(rig: RigTable, run: Prepared) -> Residual | None:
     values = relation(run.signals) - friction_law(rig, velocity_mps)
     # at rest the contact bears any force below the static friction; close to rest presliding decides, not the friction law
     sliding = np.abs(velocity_mps) > _SLIDES_FROM * rig.stribeck_velocity_mps
-    inner = minimum_filter1d(sliding, 2 * math.ceil(_AWAY * max(smooth, 0.4 * smoothing_blocks(rig))) + 1)
+    inner = minimum_filter1d(sliding, 2 * math.ceil(_EDGE_MARGIN * max(smooth, 0.4 * smoothing_blocks(rig))) + 1)
     # under vibration the friction law does not hold
     used = kept_blocks(run) & (run.commands.frequency_Hz == 0.0) & inner
     noise = relation(_noise_signals(run))

@@ -1,7 +1,7 @@
 """The pictures of a diagnosis: measured cycles over predicted ones, and residuals over the variable that explains them."""
 
 from diagnosis.gap.problem import Point, Problem
-from diagnosis.pictures.cycles import Told, Version, force_picture, most_telling, slip_picture, slips_apart
+from diagnosis.pictures.cycles import ShownSegment, Version, force_picture, most_telling, slip_difference, slip_picture
 from diagnosis.pictures.residuals import Overlay, residual_pictures
 from diagnosis.result import Picture
 
@@ -10,47 +10,47 @@ _SLIP_DIFFERS = 0.03  # relative difference of two mean slips from which a close
 
 
 def pictures(
-    problem: Problem, nominal: Point, retuned: Point, named: Point | None, effects: tuple[str, ...]
+    problem: Problem, nominal: Point, baseline: Point, named: Point | None, effects: tuple[str, ...]
 ) -> tuple[Picture, ...]:
     """At most ten pictures: the most telling segment of each run, slips in close-up where they differ, residuals.
 
     Args:
         problem: the runs to show.
         nominal: the rig as described.
-        retuned: the baseline.
+        baseline: the rig without effects, refitted within its tolerances.
         named: the model with the named effects; None when no effect was named.
         effects: the named effects.
 
     """
     models = [
         Overlay("rig as described", "nominal", {run.file: problem.signals(run, nominal) for run in problem.runs}),
-        Overlay("retuned", "retuned", {run.file: problem.signals(run, retuned) for run in problem.runs}),
+        Overlay("retuned", "retuned", {run.file: problem.signals(run, baseline) for run in problem.runs}),
     ]
     if named is not None:
         label = "with " + " and ".join(effects)
         models.append(Overlay(label, "effect", {run.file: problem.signals(run, named) for run in problem.runs}))
     rig = problem.rig.model_copy(
-        update={name: retuned.values[name] for name in problem.rig.tolerance if name in retuned.values}
+        update={name: baseline.values[name] for name in problem.rig.tolerance if name in baseline.values}
     )
     residuals = residual_pictures(rig, problem.runs, problem.scales, models[1:], effects)
     return (*_cycles(problem, models), *residuals)
 
 
 def _cycles(problem: Problem, models: list[Overlay]) -> list[Picture]:
-    told: list[Told] = []
+    shown: list[ShownSegment] = []
     for run in problem.runs:
         versions = [Version("measured", "measured", run.signals)]
         versions += [Version(model.label, model.style, model.signals[run.file]) for model in models]
         if run.commands.segments:
-            told.append(most_telling(run, tuple(versions), problem.scales))
-    told.sort(key=lambda one: -one.apart)
-    told = sorted(told[:_MOST_RUNS], key=lambda one: one.run.file)
-    drawn = [force_picture(one, problem.scales) for one in told]
+            shown.append(most_telling(run, tuple(versions), problem.scales))
+    shown.sort(key=lambda one: -one.difference)
+    shown = sorted(shown[:_MOST_RUNS], key=lambda one: one.run.file)
+    drawn = [force_picture(one, problem.scales) for one in shown]
     for name in ("drive_force_N", "mass_accel_mps2"):
-        with_it = [one for one in told if {"drive_force_N", name} <= one.run.signals.keys()]
+        with_it = [one for one in shown if {"drive_force_N", name} <= one.run.signals.keys()]
         if problem.rig.drive == "spring" and with_it:
-            best = max(with_it, key=lambda one: slips_apart(one, name, problem.scales))
+            best = max(with_it, key=lambda one: slip_difference(one, name, problem.scales))
             picture = slip_picture(best, name, problem.scales)
-            if picture is not None and slips_apart(best, name, problem.scales) > _SLIP_DIFFERS:
+            if picture is not None and slip_difference(best, name, problem.scales) > _SLIP_DIFFERS:
                 drawn.append(picture)
     return drawn

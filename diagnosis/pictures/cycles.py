@@ -27,26 +27,26 @@ class Version(NamedTuple):
     signals: Signals
 
 
-class Told(NamedTuple):
+class ShownSegment(NamedTuple):
     """A segment of a run, and the difference of measurement and baseline there, in static friction forces."""
 
     run: Prepared
     segment: Segment
     versions: tuple[Version, ...]  # the measured one first
-    apart: float
+    difference: float
 
 
-def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -> Told:
+def most_telling(run: Prepared, versions: tuple[Version, ...], scales: Scales) -> ShownSegment:
     """The segment of a run in which measurement and baseline (without a baseline, the last version) differ most."""
-    against = next((one for one in versions if one.style == "retuned"), versions[-1])
-    best = Told(run, run.commands.segments[0], versions, -1.0)
+    baseline = next((one for one in versions if one.style == "retuned"), versions[-1])
+    best = ShownSegment(run, run.commands.segments[0], versions, -1.0)
     for segment in run.commands.segments:
-        apart = _apart(versions[0].signals, against.signals, segment, scales)
+        difference = _difference(versions[0].signals, baseline.signals, segment, scales)
         # where any detail decides whether or when the slide slips, a difference says little
         if segment.at_the_edge or not _cycles_there(versions[0].signals, segment, scales):
-            apart *= 0.3
-        if apart > best.apart:
-            best = Told(run, segment, versions, apart)
+            difference *= 0.3
+        if difference > best.difference:
+            best = ShownSegment(run, segment, versions, difference)
     return best
 
 
@@ -59,7 +59,7 @@ def _cycles_there(signals: Signals, segment: Segment, scales: Scales) -> bool:
     return "drive_force_N" not in signals or len(slips_of(signals, segment, scales).tops) != 1
 
 
-def _apart(measured: Signals, predicted: Signals, segment: Segment, scales: Scales) -> float:
+def _difference(measured: Signals, predicted: Signals, segment: Segment, scales: Scales) -> float:
     if "drive_force_N" not in measured:
         cut = slice(segment.first, segment.last)
         return float(abs(measured["mass_accel_mps2"][cut].std() - predicted["mass_accel_mps2"][cut].std()))
@@ -79,36 +79,38 @@ def _summary(signals: Signals, segment: Segment, scales: Scales) -> Floats:
     return np.array([top_N, bottom_N, level_N, period * scales.force_N]) / scales.force_N
 
 
-def force_picture(told: Told, scales: Scales) -> Picture:
+def force_picture(shown: ShownSegment, scales: Scales) -> Picture:
     """The mean cycle, from slip to slip, where every version has one; else the signal over time."""
-    name = "drive_force_N" if "drive_force_N" in told.run.signals else "mass_accel_mps2"
+    name = "drive_force_N" if "drive_force_N" in shown.run.signals else "mass_accel_mps2"
     # with a force drive the force is not a saw tooth, and its phase is that of the measured motion
-    if name == "drive_force_N" and told.segment.drive_velocity_mps != 0.0:
-        slips = [slips_of(version.signals, told.segment, scales) for version in told.versions]
+    if name == "drive_force_N" and shown.segment.drive_velocity_mps != 0.0:
+        slips = [slips_of(version.signals, shown.segment, scales) for version in shown.versions]
         if all(len(one.middles) >= 2 for one in slips):
-            curves = [_whole_cycle(version, found) for version, found in zip(told.versions, slips, strict=True)]
-            title = f"{_place(told)}: {_mean_of(len(slips[0].middles) - 1)} from slip to slip"
+            curves = [_whole_cycle(version, found) for version, found in zip(shown.versions, slips, strict=True)]
+            title = f"{_place(shown)}: {_mean_of(len(slips[0].middles) - 1)} from slip to slip"
             return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
         if all(len(one.middles) == 1 for one in slips) or (
-            told.segment.first and all(len(one.middles) for one in slips)
+            shown.segment.first and all(len(one.middles) for one in slips)
         ):
             # the phase of stick-slip is chance, so the first slips are aligned
             zeros = [float(one.middles[0]) for one in slips]
-            title = f"{_place(told)}: first slips laid on each other"
-            curves = [_over_time(version, name, told, zero) for version, zero in zip(told.versions, zeros, strict=True)]
+            title = f"{_place(shown)}: first slips laid on each other"
+            curves = [
+                _over_time(version, name, shown, zero) for version, zero in zip(shown.versions, zeros, strict=True)
+            ]
             return Picture("cycle", title, "time after the middle of the first slip [ms]", _AXES[name], tuple(curves))
-    curves = [_over_time(version, name, told, None) for version in told.versions]
-    return Picture("cycle", f"{_place(told)}: over time", "time in the run [s]", _AXES[name], tuple(curves))
+    curves = [_over_time(version, name, shown, None) for version in shown.versions]
+    return Picture("cycle", f"{_place(shown)}: over time", "time in the run [s]", _AXES[name], tuple(curves))
 
 
-def slip_picture(told: Told, name: str, scales: Scales) -> Picture | None:
+def slip_picture(shown: ShownSegment, name: str, scales: Scales) -> Picture | None:
     """The mean slip in close-up; None where a version does not slip."""
     curves: list[Curve] = []
     reach = np.arange(-1.5, 2.5, 0.02, dtype=np.float64) * scales.slip_s / BLOCK_S
     count = 0
-    for version in told.versions:
-        middles = slips_of(version.signals, told.segment, scales).middles
-        values = told.segment.sign * version.signals[name]
+    for version in shown.versions:
+        middles = slips_of(version.signals, shown.segment, scales).middles
+        values = shown.segment.sign * version.signals[name]
         middles = middles[(middles + reach[0] >= 0.0) & (middles + reach[-1] <= len(values) - 1.0)]
         if len(middles) == 0:
             return None
@@ -116,18 +118,18 @@ def slip_picture(told: Told, name: str, scales: Scales) -> Picture | None:
         blocks = np.arange(len(values), dtype=np.float64)
         mean = np.mean([np.interp(middle + reach, blocks, values) for middle in middles], axis=0)
         curves.append(Curve(version.label, reach * BLOCK_S * 1e3, mean, version.style))
-    title = f"{_place(told)}: mean of {count} slips, close up"
+    title = f"{_place(shown)}: mean of {count} slips, close up"
     return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
 
 
-def slips_apart(told: Told, name: str, scales: Scales) -> float:
+def slip_difference(shown: ShownSegment, name: str, scales: Scales) -> float:
     """Difference of measurement and baseline in the mean slip, relative to the slip; 0 where one of them does not slip."""
-    picture = slip_picture(told, name, scales)
+    picture = slip_picture(shown, name, scales)
     if picture is None:
         return 0.0
     measured = picture.curves[0].y
-    against = next((curve for curve in picture.curves if curve.style == "retuned"), picture.curves[-1]).y
-    return float((measured - against).std() / (measured.std() + 1e-12))
+    baseline = next((curve for curve in picture.curves if curve.style == "retuned"), picture.curves[-1]).y
+    return float((measured - baseline).std() / (measured.std() + 1e-12))
 
 
 def _whole_cycle(version: Version, slips: Slips) -> Curve:
@@ -143,9 +145,9 @@ def _whole_cycle(version: Version, slips: Slips) -> Curve:
     return Curve(version.label, share * float(periods.mean()) * BLOCK_S * 1e3, np.mean(cycles, axis=0), version.style)
 
 
-def _over_time(version: Version, name: str, told: Told, zero: float | None) -> Curve:
+def _over_time(version: Version, name: str, shown: ShownSegment, zero: float | None) -> Curve:
     """A whole segment over time: in the run [s], or with `zero` after this block [ms]."""
-    segment = told.segment
+    segment = shown.segment
     values = version.signals[name][segment.first : segment.last]
     block = max(len(values) // _POINTS, 1)
     whole = len(values) // block * block
@@ -155,9 +157,9 @@ def _over_time(version: Version, name: str, told: Told, zero: float | None) -> C
     return Curve(version.label, x, mean, version.style)
 
 
-def _place(told: Told) -> str:
-    segment = told.segment
-    words = [told.run.file.rsplit(".", 1)[0] + (" (kept for judging)" if told.run.holdout else "")]
+def _place(shown: ShownSegment) -> str:
+    segment = shown.segment
+    words = [shown.run.file.rsplit(".", 1)[0] + (" (kept for judging)" if shown.run.holdout else "")]
     if segment.drive_velocity_mps != 0.0:
         words.append(f"{segment.drive_velocity_mps * 1e3:.3g} mm/s")
     if segment.frequency_Hz > 0.0:

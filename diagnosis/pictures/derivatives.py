@@ -17,7 +17,7 @@ Floats = npt.NDArray[np.floating[Any]]
 # 0.14 is 5 ms on the paper's spring, where a slip keeps 90 % of its acceleration.
 _SMOOTH_SHARE = 0.14
 _SMOOTH_FREE = 5.0  # blocks, with a force drive, where no slip gives a time scale
-_BRISK = 0.4  # share of this smoothing for a first derivative, which needs less
+_FIRST_SHARE = 0.4  # share of this smoothing for a first derivative, which needs less
 _EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle
 _END_BLOCKS = 20  # left out at the ends of a run
 _SLOW_S = 0.08  # time constant of a high-pass at 2 Hz: accelerometers do not show what is slower than 0.5 Hz
@@ -57,8 +57,8 @@ def kept_blocks(run: Prepared) -> npt.NDArray[np.bool_]:
     commands = run.commands
     changes = np.zeros(len(commands.drive))
     if any(segment.drive_velocity_mps != 0.0 for segment in commands.segments):
-        for told in (commands.drive, commands.frequency_Hz, commands.amplitude_m):
-            changes[1:] += np.diff(told) != 0.0
+        for command in (commands.drive, commands.frequency_Hz, commands.amplitude_m):
+            changes[1:] += np.diff(command) != 0.0
     kept = maximum_filter1d(changes, 2 * _EDGE_BLOCKS + 1) == 0.0
     kept[:_END_BLOCKS] = kept[-_END_BLOCKS:] = False
     return kept
@@ -78,7 +78,7 @@ def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
     blocks = len(run.commands.drive)
     over: dict[str, Floats] = {"time_s": (np.arange(blocks, dtype=np.float64) + 0.5) * BLOCK_S}
     spring = rig.drive == "spring"
-    brisk = _BRISK * smoothing_blocks(rig)
+    smooth_first = _FIRST_SHARE * smoothing_blocks(rig)
     drive_m = with_drive_path(run)["drive_position_m"] if spring or "drive_position_m" in signals else None
     if drive_m is not None:
         over["drive_position_m"] = drive_m
@@ -86,8 +86,8 @@ def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
     if position_m is None and spring and drive_m is not None and "drive_force_N" in signals:
         position_m = drive_m - signals["drive_force_N"] / (rig.drive_stiffness_N_per_m or 1.0)
     if position_m is not None:
-        velocity_mps = derivative(position_m, brisk)
-        over |= {"position_m": position_m, "velocity_mps": velocity_mps, "dwell_s": _since(velocity_mps)}
+        velocity_mps = derivative(position_m, smooth_first)
+        over |= {"position_m": position_m, "velocity_mps": velocity_mps, "dwell_s": _since_motion_s(velocity_mps)}
         if drive_m is not None and spring:
             extension_m = drive_m - position_m
             force_N = signals.get("drive_force_N")
@@ -95,15 +95,15 @@ def motion(rig: RigTable, run: Prepared) -> dict[str, Floats]:
                 # the zero of the extension is not known: chosen so that the spring law holds on average
                 extension_m = extension_m - extension_m.mean() + force_N.mean() / (rig.drive_stiffness_N_per_m or 1.0)
             over["extension_m"] = extension_m
-            over["extension_rate_mps"] = derivative(extension_m, brisk)
+            over["extension_rate_mps"] = derivative(extension_m, smooth_first)
     if "drive_force_N" in signals:
         over["force_N"] = signals["drive_force_N"]
     if "mass_accel_mps2" in signals:
-        over["acceleration_mps2"] = gaussian_filter1d(signals["mass_accel_mps2"], brisk)
+        over["acceleration_mps2"] = gaussian_filter1d(signals["mass_accel_mps2"], smooth_first)
     return over
 
 
-def _since(velocity_mps: Floats) -> Floats:
+def _since_motion_s(velocity_mps: Floats) -> Floats:
     """Time since the mass last moved faster than 2 mm/s, [blocks], s."""
     at = np.arange(len(velocity_mps), dtype=np.float64)
     last = np.maximum.accumulate(np.where(np.abs(velocity_mps) > _MOVES_MPS, at, 0.0))

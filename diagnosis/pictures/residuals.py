@@ -92,8 +92,8 @@ def _series(rig: RigTable, run: Prepared, scales: Scales, over: Over) -> _Series
 def _without_levels(values: Floats, frequency_Hz: Floats) -> Floats:
     """`values` less their mean at each frequency, which would hide a dependence on the force."""
     result = values.copy()
-    for told_Hz in np.unique(frequency_Hz):
-        at = frequency_Hz == told_Hz
+    for each_Hz in np.unique(frequency_Hz):
+        at = frequency_Hz == each_Hz
         result[at] -= values[at].mean()
     return result
 

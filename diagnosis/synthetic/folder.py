@@ -16,7 +16,7 @@ from bridge.tables.writers import ArrowTable
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
 from diagnosis.evidence.manifest_text import manifest_text
 from diagnosis.synthetic.protocols import AXIS_PLANS, FORCE_PROTOCOL, PROTOCOLS, AxisPlan
-from diagnosis.synthetic.runs import MadeRig, axis_run, spring_run
+from diagnosis.synthetic.runs import DrawnRig, axis_run, spring_run
 from diagnosis.synthetic.sensors import draw_chain
 from plant.config import RigConfig
 
@@ -102,9 +102,9 @@ def make_evidence(folder: Path, case: Case, seed: int) -> None:
         file = f"run-{number:02d}.parquet"
         velocity_mps = None
         if isinstance(plan, AxisPlan):
-            columns = axis_run(random, _later(rig, before_s), plan)
+            columns = axis_run(random, _after_earlier_runs(rig, before_s), plan)
         else:
-            columns = spring_run(random, _later(rig, before_s), plan, float(track_m[plan.track]))
+            columns = spring_run(random, _after_earlier_runs(rig, before_s), plan, float(track_m[plan.track]))
             if len(plan.velocity) == 1:
                 velocity_mps = plan.velocity[0][1]
         before_s += plan.duration_s
@@ -115,7 +115,7 @@ def make_evidence(folder: Path, case: Case, seed: int) -> None:
     (folder / MANIFEST).write_text(manifest_text(table, runs, []))
 
 
-def _later(rig: MadeRig, before_s: float) -> MadeRig:
+def _after_earlier_runs(rig: DrawnRig, before_s: float) -> DrawnRig:
     """The rig after `before_s` seconds of earlier runs."""
     effects = rig.config.effects
     if "before_s" not in effects.get("friction-drift", {}):
@@ -142,7 +142,7 @@ def _rig_table(rig: RigConfig, drive: str, tolerances: Mapping[str, float]) -> R
     return validate(RigTable, {"drive": drive, **values, "tolerance": known}, "the described rig")
 
 
-def _draw_rig(random: np.random.Generator, described: RigConfig, table: RigTable, case: Case) -> MadeRig:
+def _draw_rig(random: np.random.Generator, described: RigConfig, table: RigTable, case: Case) -> DrawnRig:
     slow = case.rate_Hz < _FASTEST_BLOCK_HZ
     rate_Hz = _OVERSAMPLED_HZ if slow else case.rate_Hz
     average = round(rate_Hz / case.rate_Hz)
@@ -181,4 +181,4 @@ def _draw_rig(random: np.random.Generator, described: RigConfig, table: RigTable
         "solver": {"step_s": 1e-5, "block_s": 1e-3, "samples_per_block": round(rate_Hz / 1000.0)},
         "effects": {name: dict(numbers) for name, numbers in case.effects.items()},
     }
-    return MadeRig(validate(RigConfig, config, "the drawn rig"), chain, rate_Hz, average)
+    return DrawnRig(validate(RigConfig, config, "the drawn rig"), chain, rate_Hz, average)

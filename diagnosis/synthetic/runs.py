@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bridge.wire.messages import CHANNELS
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.synthetic.protocols import AxisPlan, RunPlan
-from diagnosis.synthetic.sensors import MadeChain, measured
+from diagnosis.synthetic.sensors import DrawnChain, measured
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.effects.formulas import even_m, extension_m
@@ -23,16 +23,16 @@ _SAME_PLACE_M = 2e-5  # standard deviation of the place at which a run starts
 _PRIMER_M = 1e-15  # amplitude that turns the exciter's phase without moving the rig
 
 
-class MadeRig(NamedTuple):
+class DrawnRig(NamedTuple):
     """The drawn rig, which is measured."""
 
     config: RigConfig
-    chain: MadeChain
+    chain: DrawnChain
     rate_Hz: float  # of the simulation
     average: int  # samples of the simulation that make one sample of the record
 
 
-def spring_run(random: np.random.Generator, rig: MadeRig, plan: RunPlan, start_m: float) -> Columns:
+def spring_run(random: np.random.Generator, rig: DrawnRig, plan: RunPlan, start_m: float) -> Columns:
     """Drag the slide through a spring, from about `start_m` on; the columns of the run, [samples] each, SI units."""
     params, state = build(rig.config)
     blocks = round(plan.duration_s / BLOCK_S)
@@ -46,8 +46,8 @@ def spring_run(random: np.random.Generator, rig: MadeRig, plan: RunPlan, start_m
         frequency_Hz[at:], amplitude_m[at:] = step.frequency_Hz, step.amplitude_m
     analogue = np.empty((len(CHANNELS), blocks * round(rig.rate_Hz * BLOCK_S)))
     truth = np.empty((len(TRUTH), analogue.shape[1]))
-    told_Hz, told_m = _primed(random, frequency_Hz, amplitude_m)
-    run_blocks(params, state, velocity_mps, told_Hz, told_m, analogue, truth)
+    commanded_Hz, commanded_m = _primed(random, frequency_Hz, amplitude_m)
+    run_blocks(params, state, velocity_mps, commanded_Hz, commanded_m, analogue, truth)
     rows = _averaged(measured(random, rig.chain, analogue, rig.rate_Hz), rig.average)
     columns: Columns = {"t_s": np.arange(rows.shape[1]) * rig.average / rig.rate_Hz}
     columns |= {name: values.astype(np.float32) for name, values in zip(CHANNELS, rows, strict=True)}
@@ -58,7 +58,7 @@ def spring_run(random: np.random.Generator, rig: MadeRig, plan: RunPlan, start_m
     return columns
 
 
-def axis_run(random: np.random.Generator, rig: MadeRig, plan: AxisPlan) -> Columns:
+def axis_run(random: np.random.Generator, rig: DrawnRig, plan: AxisPlan) -> Columns:
     """Let a motor with a PD controller move the mass to and fro; the columns of the run, [samples of the controller] each.
 
     The force of a sample acts from the time of that sample to the next.
@@ -110,11 +110,11 @@ def _at_rest(random: np.random.Generator, params: Any, state: Any, force_N: floa
 
 def _primed(random: np.random.Generator, frequency_Hz: Floats, amplitude_m: Floats) -> tuple[Floats, Floats]:
     """The commands to the piezo, with a block of `_PRIMER_M` before each start, which turns the phase by a random angle."""
-    told_Hz, told_m = frequency_Hz.copy(), amplitude_m.copy()
+    commanded_Hz, commanded_m = frequency_Hz.copy(), amplitude_m.copy()
     for start in np.flatnonzero((amplitude_m[1:] > 0.0) & (amplitude_m[:-1] == 0.0)):
-        told_Hz[start] = random.uniform(0.5, 1.5) / BLOCK_S
-        told_m[start] = _PRIMER_M
-    return told_Hz, told_m
+        commanded_Hz[start] = random.uniform(0.5, 1.5) / BLOCK_S
+        commanded_m[start] = _PRIMER_M
+    return commanded_Hz, commanded_m
 
 
 def _averaged(rows: Floats, average: int) -> Floats:

@@ -16,7 +16,7 @@ Floats = npt.NDArray[np.float64]
 _REFERENCE_HZ = 20_000.0  # the noise levels are rms values of 20 kHz records
 
 
-class MadeChain(NamedTuple):
+class DrawnChain(NamedTuple):
     """One measuring chain; arrays have one value for each of `plant.records.CHANNELS`."""
 
     sensors: SensorsConfig  # bandwidths, range and resolution
@@ -27,7 +27,7 @@ class MadeChain(NamedTuple):
     drift_N: float  # drift of the force over a run
 
 
-def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale: float) -> MadeChain:
+def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale: float) -> DrawnChain:
     """Draw a chain; `force_scale` is the static friction over that of the paper's pair, and scales the errors of the force."""
     force_N = force_scale * _log_uniform(random, 0.005, 0.040)
     accel_mps2 = _log_uniform(random, 0.0015, 0.05)
@@ -43,7 +43,7 @@ def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale:
         name: f_Hz for (name, f_Hz), is_open in zip(open_to.items(), wide_open, strict=True) if is_open
     }
     changed["position_linearity"] = random.uniform(0.0, sensors.position_linearity)
-    return MadeChain(
+    return DrawnChain(
         sensors.model_copy(update=changed),
         noise,
         random.uniform(0.0, 1.0),
@@ -53,7 +53,7 @@ def draw_chain(random: np.random.Generator, sensors: SensorsConfig, force_scale:
     )
 
 
-def measured(random: np.random.Generator, chain: MadeChain, analogue: Floats, rate_Hz: float) -> Floats:
+def measured(random: np.random.Generator, chain: DrawnChain, analogue: Floats, rate_Hz: float) -> Floats:
     """The signals [5, samples] that the chain reports for the analogue signals [5, samples], in the order of `CHANNELS`."""
     samples = analogue.shape[1]
     t_s = np.arange(samples) / rate_Hz

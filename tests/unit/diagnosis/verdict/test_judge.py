@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.diagnose import with_what_vibrates
+from diagnosis.diagnose import with_vibration_findings
 from diagnosis.evidence.exciter_harmonics import Distortion
 from diagnosis.evidence.folder import Run
 from diagnosis.evidence.force_pickup import PickUp
@@ -64,14 +64,16 @@ def test_harmonics_take_a_piezo_s_name_and_a_pick_up_takes_none():
     picked_up = plain._replace(pick_up=PickUp(2500.0, 0.3, 1e-5, 0.1))
     distorted = plain._replace(distortion=Distortion(2500.0, 2.0, 0.1))
     effect = judge(fit(400.0), [fit(50.0, "piezo-resonance")], [], EXPECTED)
-    assert with_what_vibrates(effect, [plain, picked_up]).kind == "effect"
-    assert with_what_vibrates(effect, [plain, distorted]).kind == "unexplained"
+    assert with_vibration_findings(effect, [plain, picked_up]).kind == "effect"
+    assert with_vibration_findings(effect, [plain, distorted]).kind == "unexplained"
     other = judge(fit(400.0), [fit(50.0, "coulomb-level")], [], EXPECTED)
-    assert with_what_vibrates(other, [distorted]).kind == "effect"
+    assert with_vibration_findings(other, [distorted]).kind == "effect"
     nothing = judge(fit(50.0), [fit(48.0, "coulomb-level")], [], EXPECTED)
-    assert with_what_vibrates(nothing, [plain]).kind == "no-gap"
+    assert with_vibration_findings(nothing, [plain]).kind == "no-gap"
     assert (
-        with_what_vibrates(nothing, [picked_up]).kind == with_what_vibrates(nothing, [distorted]).kind == "unexplained"
+        with_vibration_findings(nothing, [picked_up]).kind
+        == with_vibration_findings(nothing, [distorted]).kind
+        == "unexplained"
     )
 
 
