@@ -93,7 +93,7 @@ def load_evidence(folder: Path) -> Evidence:
     if len(runs) > 1 and not any(run.holdout for run in runs):
         # the last run is held out, and the finding says so: a run that is added later moves the choice
         runs[-1] = runs[-1]._replace(holdout=True)
-        text = "no run is marked holdout: this one is kept for judging; mark one to choose for yourself"
+        text = "no run is marked holdout: this one is held out; mark one to choose for yourself"
         findings.append(Finding("holdout", runs[-1].file, text))
     return Evidence(folder, manifest.rig, tuple(runs), tuple(findings))
 

@@ -159,7 +159,7 @@ def _over_time(version: Version, name: str, shown: ShownSegment, zero: float | N
 
 def _place(shown: ShownSegment) -> str:
     segment = shown.segment
-    words = [shown.run.file.rsplit(".", 1)[0] + (" (kept for judging)" if shown.run.holdout else "")]
+    words = [shown.run.file.rsplit(".", 1)[0] + (" (held out)" if shown.run.holdout else "")]
     if segment.drive_velocity_mps != 0.0:
         words.append(f"{segment.drive_velocity_mps * 1e3:.3g} mm/s")
     if segment.frequency_Hz > 0.0:
