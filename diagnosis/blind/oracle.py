@@ -71,20 +71,20 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     evidence = load_evidence(folder)
     runs = prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
-    fitter, retuned, roughness, _ = retuned_rig(evidence, problem, _untold)
+    fitter, baseline, roughness, _ = retuned_rig(evidence, problem, _untold)
     tried = trials(problem)
-    best: Fit = retuned
+    best: Fit = baseline
     for effect in effects:  # each effect is added to the fit with the effects before it
         own = [trial for trial in tried if trial.hypothesis.effects == (effect,)]
         origins = [Origin(best, KNEE)]
-        if best is retuned:
+        if best is baseline:
             origins.append(Origin(fitter.described(np.zeros(len(fitter.nuisances))), FAR_KNEE))
         found = refitted(fitter, origins, screened(fitter, origins, own))
         if not found:
             return None
         best = found[0]
-    unseen = Problem(evidence.rig, [run for run in runs if run.holdout])
-    return HeldOut(unseen, fitter.nuisances, best, retuned, roughness).closed_by(best).shrinkage
+    held_out = Problem(evidence.rig, [run for run in runs if run.holdout])
+    return HeldOut(held_out, fitter.nuisances, best, baseline, roughness).closed_by(best).shrinkage
 
 
 def _untold(_said: str, _share: float) -> None:

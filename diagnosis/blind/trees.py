@@ -123,6 +123,6 @@ def _training(folder: Path, number: int) -> tuple[list[Row], list[str]]:
 
 def _drawn(random: np.random.Generator, trial: Trial) -> Effects:
     """Tables of an effect with random coordinates around the trial's start, spread by their priors."""
-    axes = trial.hypothesis.coordinates
-    w = trial.w + np.array([axis.prior for axis in axes]) * random.standard_normal(len(axes))
+    coordinates = trial.hypothesis.coordinates
+    w = trial.w + np.array([coordinate.prior for coordinate in coordinates]) * random.standard_normal(len(coordinates))
     return trial.hypothesis.tables(w)

@@ -33,7 +33,7 @@ class Fit(NamedTuple):
         Raises numpy.linalg.LinAlgError when the columns hold values that are not finite.
         """
         prior = np.concatenate(
-            [np.ones(len(self.deviations)), [axis.prior**-2 for axis in self.hypothesis.coordinates]]
+            [np.ones(len(self.deviations)), [coordinate.prior**-2 for coordinate in self.hypothesis.coordinates]]
         )
         result: Floats = np.linalg.inv(self.columns.T @ self.columns + np.diag(prior))
         return result
@@ -41,7 +41,7 @@ class Fit(NamedTuple):
 
 def prior_of(hypothesis: Hypothesis, deviations: Floats) -> Floats:
     """Inverse prior standard deviations [nuisances + coordinates]: 1 for a nuisance, as deviations count in tolerances."""
-    return np.concatenate([np.ones(len(deviations)), [1.0 / axis.prior for axis in hypothesis.coordinates]])
+    return np.concatenate([np.ones(len(deviations)), [1.0 / coordinate.prior for coordinate in hypothesis.coordinates]])
 
 
 def step_within(normal: Floats, gradient: Floats, at: Floats, most: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:

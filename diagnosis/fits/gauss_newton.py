@@ -68,19 +68,19 @@ _NO_LESS, _ASTRAY = 0.97, 1.5
 _STEPS = (0.5, -1.0, 0.25)
 
 
-def _axis_steps(hypothesis: Hypothesis, w: Floats) -> Floats:
+def _coordinate_steps(hypothesis: Hypothesis, w: Floats) -> Floats:
     """How far each coordinate moves for its derivative [coordinates]."""
     steps = np.zeros(len(w))
-    for i, axis in enumerate(hypothesis.coordinates):
-        steps[i] = 0.15 * min(axis.prior, 1.0) if axis.logarithmic else 0.25 * max(abs(w[i]), 0.4)
-        if axis.prior < _NARROW:  # the period of a wave that passes many times
-            steps[i] = 0.02 * axis.prior
+    for i, coordinate in enumerate(hypothesis.coordinates):
+        steps[i] = 0.15 * min(coordinate.prior, 1.0) if coordinate.logarithmic else 0.25 * max(abs(w[i]), 0.4)
+        if coordinate.prior < _NARROW:  # the period of a wave that passes many times
+            steps[i] = 0.02 * coordinate.prior
     return steps
 
 
 def _beside(hypothesis: Hypothesis, deviations: Floats, w: Floats) -> list[At]:
     """The points that the derivatives of all coordinates need."""
-    return [(deviations, hypothesis.tables(ahead)) for ahead in w + np.diag(_axis_steps(hypothesis, w))]
+    return [(deviations, hypothesis.tables(ahead)) for ahead in w + np.diag(_coordinate_steps(hypothesis, w))]
 
 
 class _Place(NamedTuple):
@@ -198,11 +198,11 @@ class Fitter:
             deviations, w = fit.deviations, fit.w
         return (yield from self.fitting(hypothesis, deviations, w, _NEAR))
 
-    def trying(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, base_chi2: float) -> Work[Fit]:
-        """As `refitting`, but stop after the first steps where chi2 is about that of the baseline, `base_chi2`."""
+    def trying(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, baseline_chi2: float) -> Work[Fit]:
+        """As `refitting`, but stop after the first steps where chi2 is about that of the baseline, `baseline_chi2`."""
         fit = yield from self.fitting(hypothesis, deviations, w, _FAR)
         fit = yield from self._judging(fit)
-        if _NO_LESS * base_chi2 < fit.chi2 < _ASTRAY * base_chi2:
+        if _NO_LESS * baseline_chi2 < fit.chi2 < _ASTRAY * baseline_chi2:
             return fit
         return (yield from self.fitting(hypothesis, fit.deviations, fit.w, _NEAR))
 
@@ -236,8 +236,10 @@ class Fitter:
         for step in range(stage.steps + 1):
             if step == stage.steps and not stage.columns:
                 break
-            axis_rates = yield from self._axis_rates(hypothesis, here.at[:own], here.at[own:], here.predicted)
-            rates = np.column_stack([self._with_levels(nuisance_rates, axis_rates, hypothesis, here.at), axis_rates])
+            effect_rates = yield from self._effect_rates(hypothesis, here.at[:own], here.at[own:], here.predicted)
+            rates = np.column_stack(
+                [self._with_levels(nuisance_rates, effect_rates, hypothesis, here.at), effect_rates]
+            )
             columns = self.floor.whitening @ (rates * here.slope[:, None])
             if step == stage.steps:
                 break
@@ -296,17 +298,17 @@ class Fitter:
         (there,) = yield Question([(all_at_once[:own], hypothesis.tables(all_at_once[own:]))])
         return rates, min(*better, self._placed(hypothesis, all_at_once, there, knee), key=lambda one: one.chi2)
 
-    def _with_levels(self, nuisance_rates: Floats, axis_rates: Floats, hypothesis: Hypothesis, now: Floats) -> Floats:
+    def _with_levels(self, nuisance_rates: Floats, effect_rates: Floats, hypothesis: Hypothesis, now: Floats) -> Floats:
         """The nuisances' derivatives; a rig number that an effect changes takes the derivative of that effect."""
         rates = nuisance_rates.copy()
-        for column, axis, w in zip(
-            axis_rates.T, hypothesis.coordinates, now[len(self.nuisances) :].tolist(), strict=True
+        for column, coordinate, w in zip(
+            effect_rates.T, hypothesis.coordinates, now[len(self.nuisances) :].tolist(), strict=True
         ):
-            name = LEVELS.get(axis.effect)
+            name = LEVELS.get(coordinate.effect)
             if name in self.nuisances.rig_names:
                 i = self.nuisances.rig_names.index(name)
                 growth = self.nuisances.growth(name, float(now[i]))
-                rates[:, i] = column * growth * (1.0 + axis.value(w)) / axis.scale
+                rates[:, i] = column * growth * (1.0 + coordinate.value(w)) / coordinate.scale
         return rates
 
     @staticmethod
@@ -322,8 +324,8 @@ class Fitter:
         steps = np.diag(aside - deviations)
         return np.column_stack([self._rate(here, *one) for one in zip(there, steps.tolist(), strict=True)])
 
-    def _axis_rates(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, here: Floats) -> Work[Floats]:
-        steps = _axis_steps(hypothesis, w)
+    def _effect_rates(self, hypothesis: Hypothesis, deviations: Floats, w: Floats, here: Floats) -> Work[Floats]:
+        steps = _coordinate_steps(hypothesis, w)
         columns = np.zeros((int(self.floor.compared.sum()), len(w)))
         there = yield Question(_beside(hypothesis, deviations, w))
         for i, one in enumerate(there):

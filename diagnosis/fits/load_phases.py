@@ -40,8 +40,8 @@ def starts_by_run(fitter: Fitter, origin: Fit, trials: list[Trial], jobs: int = 
     slowest_Hz = 0.0
     for trial in trials:
         if trial.hypothesis.forms == {EFFECT: FORM}:
-            axes = {axis.name: axis for axis in trial.hypothesis.coordinates}
-            frequency = axes["frequency_Hz"]
+            coordinates = {coordinate.name: coordinate for coordinate in trial.hypothesis.coordinates}
+            frequency = coordinates["frequency_Hz"]
             slowest_Hz = frequency.low
             waves[frequency.scale] = Wave(1.0 / frequency.scale, 0.0, 0.0, spread=frequency.prior)
     shares = each(jobs, _in_best_phases, fitter, [(origin, list(waves.values())[i::jobs]) for i in range(jobs)])

@@ -32,21 +32,21 @@ def alone(pairs: list[Fit]) -> list[Start]:
     best = min(pairs, key=lambda fit: fit.chi2)
     starts: list[Start] = []
     for name, form in best.hypothesis.forms.items():
-        own = [i for i, axis in enumerate(best.hypothesis.coordinates) if axis.effect == name]
+        own = [i for i, coordinate in enumerate(best.hypothesis.coordinates) if coordinate.effect == name]
         starts.append(
             (Hypothesis({name: form}, tuple(best.hypothesis.coordinates[i] for i in own)), best.deviations, best.w[own])
         )
     return starts
 
 
-def contenders(retuned: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> list[Fit]:
+def contenders(baseline: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float) -> list[Fit]:
     """The single effects to restart: the first few.
 
     Where only a pair explains the gap: the best single effect, if the pair contains it or rivals are close, and those rivals.
     """
     if not pairs or much_left(pairs[0], expected_chi2) or not much_left(singles[0], expected_chi2):
         return singles[:_CONTENDERS]
-    rivals = [fit for fit in close(retuned, singles, _RIVALS)[:_CONTENDERS] if fit is not singles[0]]
+    rivals = [fit for fit in close(baseline, singles, _RIVALS)[:_CONTENDERS] if fit is not singles[0]]
     return [fit for fit in singles[:1] if rivals or fit.hypothesis.effects[0] in pairs[0].hypothesis.effects] + rivals
 
 
@@ -59,7 +59,7 @@ def rival_pairs(singles: list[Fit], pairs: list[Fit]) -> list[Fit]:
     ]
 
 
-def starts_of(contenders: list[Fit], retuned: Fit, sizes: tuple[float, ...]) -> list[Start]:
+def starts_of(contenders: list[Fit], baseline: Fit, sizes: tuple[float, ...]) -> list[Start]:
     """Starts for those contenders that are close to the best one.
 
     Each starts with the nuisances of the described rig and of the baseline, there also with `sizes` times its first coordinate.
@@ -67,8 +67,8 @@ def starts_of(contenders: list[Fit], retuned: Fit, sizes: tuple[float, ...]) -> 
     """
     if not contenders:
         return []
-    best, *rest = close(retuned, contenders)
-    nuisances = (np.zeros_like(retuned.deviations), retuned.deviations)
+    best, *rest = close(baseline, contenders)
+    nuisances = (np.zeros_like(baseline.deviations), baseline.deviations)
     starts = [
         (fit.hypothesis, deviations, w)
         for fit in (best, *rest)
@@ -86,6 +86,6 @@ def _resized(fit: Fit, size: float) -> Floats:
     return w
 
 
-def close(retuned: Fit, fits: list[Fit], share: float = _CONTENDS) -> list[Fit]:
+def close(baseline: Fit, fits: list[Fit], share: float = _CONTENDS) -> list[Fit]:
     """The fits that close more than this share of what the best one, the first, closes of the baseline's chi2."""
-    return [fit for fit in fits if retuned.chi2 - fit.chi2 > share * (retuned.chi2 - fits[0].chi2)]
+    return [fit for fit in fits if baseline.chi2 - fit.chi2 > share * (baseline.chi2 - fits[0].chi2)]

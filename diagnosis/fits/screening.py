@@ -54,7 +54,7 @@ class Directions:
     """
 
     def __init__(self, fit: Fit, most: Floats) -> None:
-        held = [1.0] * len(fit.deviations) + [1.0 / axis.prior for axis in fit.hypothesis.coordinates]
+        held = [1.0] * len(fit.deviations) + [1.0 / coordinate.prior for coordinate in fit.hypothesis.coordinates]
         self._at = np.concatenate([fit.deviations, fit.w])
         columns = np.vstack([fit.columns, np.diag(held)])
         self.residual = np.concatenate([fit.residual, -np.array(held) * self._at])

@@ -59,13 +59,13 @@ def assembled(
         jobs: processes.
 
     """
-    fitter, retuned = contest.rig.fitter, contest.rig.fit
+    fitter, baseline = contest.rig.fitter, contest.rig.fit
     verdict, best, _, held_out = outcome
     nuisances = fitter.nuisances
-    cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(retuned.deviations, {})))
+    cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(baseline.deviations, {})))
     judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
     if held_out is not None:
-        cells += _cells(held_out.floor, held_out.differences(retuned.deviations, retuned.hypothesis, retuned.w))
+        cells += _cells(held_out.floor, held_out.differences(baseline.deviations, baseline.hypothesis, baseline.w))
         judged = _judged(contest, outcome, held_out, tried, jobs)
     cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
@@ -75,7 +75,7 @@ def assembled(
         by_effect |= dict.fromkeys(verdict.named.hypothesis.effects, verdict.named)
     elif verdict.ranked and is_random(verdict.ranked[0].fit.hypothesis):
         by_effect[verdict.ranked[0].fit.hypothesis.effects[0]] = verdict.ranked[0].fit
-    alone = {"none": retuned.chi2} | {fit.hypothesis.effects[0]: fit.chi2 for fit in reversed(contest.singles)}
+    alone = {"none": baseline.chi2} | {fit.hypothesis.effects[0]: fit.chi2 for fit in reversed(contest.singles)}
     candidates = tuple(
         _candidate(name, probability, by_effect.get(name))._replace(chi2=alone.get(name))
         for name, probability in verdict.probabilities.items()
@@ -84,7 +84,7 @@ def assembled(
     effects = best.hypothesis.effects if verdict.named else ()
     followed = [one for one in verdict.ranked if not is_random(one.fit.hypothesis)]
     alike = imitators(fitter, followed, verdict.scale) if refittable(verdict) else ()
-    leaders = [fit for fit in (verdict.named or retuned, verdict.runner_up) if fit is not None]
+    leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
     if verdict.outside:
         if any(run.pick_up for run in evidence.runs):
             following = Experiment(UNCOUPLE, "No effect of the library makes the force signal vibrate so.", None)
@@ -106,11 +106,11 @@ def assembled(
         pictures=pictures(
             Problem(evidence.rig, runs),
             nuisances.point(np.zeros(len(nuisances)), {}),
-            nuisances.point(retuned.deviations, {}),
+            nuisances.point(baseline.deviations, {}),
             named,
             effects,
         ),
-        compared_features=len(retuned.residual),
+        compared_features=len(baseline.residual),
         elapsed_s=time.monotonic() - began,
     )
     return done._replace(summary=summary(done))
@@ -127,14 +127,14 @@ def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
 
 def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: list[Trial], jobs: int) -> Gap:
     verdict, best, gone, _ = outcome
-    fitter, retuned = contest.rig.fitter, contest.rig.fit
+    fitter, baseline = contest.rig.fitter, contest.rig.fit
     closed = held_out.closed_by(best)
     compared = [
         _shrinkage(" and ".join(fit.hypothesis.effects), held_out.closed_by(fit))
         for fit in compared_fits(verdict, gone)
     ]
-    compared.append(_shrinkage("parameters alone", held_out.closed_by(retuned)))
-    blend = flexible_differences(fitter, retuned, tried, held_out, jobs)
+    compared.append(_shrinkage("parameters alone", held_out.closed_by(baseline)))
+    blend = flexible_differences(fitter, baseline, tried, held_out, jobs)
     compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))
     named = verdict.named is not None
     return Gap(
@@ -192,18 +192,18 @@ def _candidate(name: str, probability: float, fit: Fit | None) -> Candidate:
     own = len(fit.deviations)
     deviation = np.sqrt(np.diag(fit.covariance()))[own:]
     parameters = {
-        axis.name: estimate_of(axis, float(w), float(spread))
-        for axis, w, spread in zip(fit.hypothesis.coordinates, fit.w, deviation, strict=True)
-        if axis.effect == name
+        coordinate.name: estimate_of(coordinate, float(w), float(spread))
+        for coordinate, w, spread in zip(fit.hypothesis.coordinates, fit.w, deviation, strict=True)
+        if coordinate.effect == name
     }
     return Candidate(name, probability, fit.hypothesis.forms[name], parameters)
 
 
-def estimate_of(axis: Coordinate, w: float, deviation: float) -> Estimate:
+def estimate_of(coordinate: Coordinate, w: float, deviation: float) -> Estimate:
     """A parameter with its 90 % interval, from the value of its coordinate and that value's standard deviation."""
-    value, half = axis.value(w), 1.645 * deviation
-    if is_phase(axis.name):  # half a turn either way at most, and no wrap where an end passes pi
-        half = min(half * axis.scale, math.pi)
+    value, half = coordinate.value(w), 1.645 * deviation
+    if is_phase(coordinate.name):  # half a turn either way at most, and no wrap where an end passes pi
+        half = min(half * coordinate.scale, math.pi)
         return Estimate(value, (value - half, value + half))
-    low, high = sorted((axis.value(w - half), axis.value(w + half)))
+    low, high = sorted((coordinate.value(w - half), coordinate.value(w + half)))
     return Estimate(value, (low, high))

@@ -22,34 +22,34 @@ Floats = npt.NDArray[np.floating[Any]]
 _STEP = 0.5
 
 
-def flexible_differences(fitter: Fitter, base: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
+def flexible_differences(fitter: Fitter, baseline: Fit, trials: list[Trial], held_out: HeldOut, jobs: int) -> Floats:
     """Differences on the held-out runs, in floors [compared], under the blend that is fitted to the other runs.
 
     Args:
         fitter: of the fitted runs.
-        base: the baseline.
+        baseline: the rig without effects, refitted within its tolerances.
         trials: the library's trials; the first trial of every effect takes part.
         held_out: the held-out runs.
         jobs: processes.
 
     """
     trials = list({trial.hypothesis.effects: trial for trial in reversed(trials)}.values())
-    directions = Directions(base, fitter.most)
-    here = fitter.predicted(base.deviations, {})
+    directions = Directions(baseline, fitter.most)
+    here = fitter.predicted(baseline.deviations, {})
     _, slope = fitter.whitened(here)
-    shown = each(jobs, _shown, fitter, [(base.deviations, trials[i::jobs]) for i in range(jobs)])
+    shown = each(jobs, _shown, fitter, [(baseline.deviations, trials[i::jobs]) for i in range(jobs)])
     columns = [fitter.column(here, shown[i % jobs][i // jobs], slope) for i in range(len(trials))]
     free = np.stack([directions.freed(column) for column in columns], axis=1)
     shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
     blended = np.stack(columns, axis=1) @ shares
-    moved = directions.moved(blended, 1.0) - base.deviations
-    points = [fitter.nuisances.point(base.deviations, {})]
-    points += [fitter.nuisances.point(base.deviations, trial.hypothesis.tables(trial.w)) for trial in trials]
-    points += [fitter.nuisances.point(ahead, {}) for ahead in base.deviations + _STEP * np.eye(len(moved))]
-    unseen, *others = held_out.problem.predicted_many(points)
-    total = unseen.copy()
+    moved = directions.moved(blended, 1.0) - baseline.deviations
+    points = [fitter.nuisances.point(baseline.deviations, {})]
+    points += [fitter.nuisances.point(baseline.deviations, trial.hypothesis.tables(trial.w)) for trial in trials]
+    points += [fitter.nuisances.point(ahead, {}) for ahead in baseline.deviations + _STEP * np.eye(len(moved))]
+    unmoved, *others = held_out.problem.predicted_many(points)
+    total = unmoved.copy()
     for share, there in zip([*shares, *(moved / _STEP)], others, strict=True):
-        total += share * _finite(there - unseen)
+        total += share * _finite(there - unmoved)
     return held_out.differences_of(total)
 
 

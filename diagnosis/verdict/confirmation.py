@@ -24,22 +24,22 @@ class Confirmation(NamedTuple):
     held_out: HeldOut | None  # None where the evidence holds out no run
 
 
-def borne_out(contest: Contest, unseen: Problem | None, jobs: int) -> Confirmation:
+def borne_out(contest: Contest, held_out_problem: Problem | None, jobs: int) -> Confirmation:
     """The verdict of a contest if the held-out runs confirm it, otherwise the verdict that remains.
 
     Args:
         contest: what was fitted, and the verdict over it.
-        unseen: the problem of the held-out runs; None keeps the verdict.
+        held_out_problem: the problem of the held-out runs; None keeps the verdict.
         jobs: processes.
 
     """
     rig, verdict = contest.rig, contest.verdict
     best = verdict.named or rig.fit
-    if unseen is None:
+    if held_out_problem is None:
         return Confirmation(verdict, best, None, None)
 
     def on(fit: Fit) -> HeldOut:
-        return HeldOut(unseen, rig.fitter.nuisances, fit, rig.fit, rig.roughness, jobs)
+        return HeldOut(held_out_problem, rig.fitter.nuisances, fit, rig.fit, rig.roughness, jobs)
 
     expected = rig.expected_chi2 / len(rig.fit.residual)
     held_out, gone = on(best), None

@@ -71,13 +71,13 @@ class Verdict(NamedTuple):
     outside: bool = False  # whether the runs show a vibration that no feature compares and no effect makes
 
 
-def _left_by_right(base: Fit, best: RankedFit, expected_chi2: float) -> float:
+def _left_by_right(baseline: Fit, best: RankedFit, expected_chi2: float) -> float:
     """The largest chi2 that a right explanation leaves; the expected chi2 where noise hides the slips."""
-    if hidden_by_noise(base, expected_chi2):
+    if hidden_by_noise(baseline, expected_chi2):
         return expected_chi2
     one = len(best.fit.hypothesis.effects) == 1 and not best.scatters and not _is_exact(best.fit)
     mismatch = _MISMATCH_OF_ONE if one else _MISMATCH
-    return MUCH * expected_chi2 + mismatch * max(base.chi2 - expected_chi2, 0.0)
+    return MUCH * expected_chi2 + mismatch * max(baseline.chi2 - expected_chi2, 0.0)
 
 
 def _is_exact(fit: Fit) -> bool:
@@ -91,11 +91,11 @@ def occam(fit: Fit) -> float:
         return 0.0
     own = len(fit.deviations)
     _, volume = np.linalg.slogdet(fit.covariance()[own:, own:])
-    return sum(math.log(axis.prior) for axis in fit.hypothesis.coordinates) - 0.5 * float(volume)
+    return sum(math.log(coordinate.prior) for coordinate in fit.hypothesis.coordinates) - 0.5 * float(volume)
 
 
 def judge(
-    base: Fit,
+    baseline: Fit,
     singles: list[Fit],
     pairs: list[Fit],
     expected_chi2: float,
@@ -105,20 +105,20 @@ def judge(
     """The verdict over single effects and pairs of effects.
 
     Args:
-        base: the baseline.
+        baseline: the rig without effects, refitted within its tolerances.
         singles, pairs: the best fit of every single effect and of every pair, the lowest chi2 first.
         expected_chi2: chi2 of a perfect model.
         random: effects that vary at random; each is judged alone and on top of the best single effects.
         refuted: whether the held-out runs refute the effect that wins here.
 
     """
-    alone, doubles, scale = _models(base, singles, pairs, expected_chi2, random)
+    alone, doubles, scale = _models(baseline, singles, pairs, expected_chi2, random)
     ranked = sorted(alone, key=lambda one: -one.evidence)
     double = max(doubles, key=lambda one: one.evidence, default=None)
-    if double is not None and ranked and not _pays(double, ranked[0], base, expected_chi2):
+    if double is not None and ranked and not _pays(double, ranked[0], baseline, expected_chi2):
         double = None
     best = double or (ranked[0] if ranked else None)
-    scores = _of_no_effect(base, best, scale, expected_chi2) | _of_effects(ranked, double)
+    scores = _of_no_effect(baseline, best, scale, expected_chi2) | _of_effects(ranked, double)
     top = max(scores, key=lambda name: scores[name])
     a_load = best is not None and best.scatters and best.fit.hypothesis.effects == (LOAD,) == (top,)
     behind = _REFUTED if refuted else _IN_BURSTS if a_load and any(one.in_bursts for one in random) else 0.0
@@ -144,7 +144,7 @@ def judge(
 
 
 def _models(
-    base: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
+    baseline: Fit, singles: list[Fit], pairs: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
 ) -> tuple[list[RankedFit], list[RankedFit], float]:
     """Single effects and pairs with their evidence, and the misfit that all evidence is divided by."""
 
@@ -155,16 +155,16 @@ def _models(
             others = [one for one in singles if effect.effect not in one.hypothesis.effects][:_UNDER_RANDOM]
             # a real track has more than the two waves of its form; without its random part the rest would be named as a load
             own = [one for one in singles[:_UNDER_RANDOM] if effect.effect in one.hypothesis.effects]
-            found += [(fit, effect.effect, effect.on(fit, noise)) for fit in (base, *others, *own)]
+            found += [(fit, effect.effect, effect.on(fit, noise)) for fit in (baseline, *others, *own)]
         return found
 
     closest = scattered(JITTER)
-    fits = [base, *singles, *pairs, *(one.fit for *_, one in closest)]
+    fits = [baseline, *singles, *pairs, *(one.fit for *_, one in closest)]
     scale = max(min(fit.chi2 for fit in fits) / expected_chi2, 1.0)
 
     def model(fit: Fit) -> RankedFit:
-        closer = chi2_of(base.residual) - chi2_of(fit.residual)
-        likelier = (base.chi2 - fit.chi2) - closer
+        closer = chi2_of(baseline.residual) - chi2_of(fit.residual)
+        likelier = (baseline.chi2 - fit.chi2) - closer
         return RankedFit(fit, 0.5 * closer / (scale * JITTER) + 0.5 * likelier - occam(fit))
 
     alone = [model(fit) for fit in singles]
@@ -172,7 +172,7 @@ def _models(
     for (under, effect, both), (*_, close) in zip(scattered(scale * JITTER), closest, strict=True):
         if close.fit.chi2 > NEVER_WITHOUT_GAP * expected_chi2:
             continue  # a random path is so free that it leaves no more than this where it is the cause
-        if under is base:
+        if under is baseline:
             alone.append(RankedFit(both.fit, both.gained, scatters=True))
         elif effect in under.hypothesis.effects:
             if both.gained > 0.0:
@@ -184,27 +184,29 @@ def _models(
     return alone, doubles, scale
 
 
-def _pays(double: RankedFit, first: RankedFit, base: Fit, expected_chi2: float) -> bool:
+def _pays(double: RankedFit, first: RankedFit, baseline: Fit, expected_chi2: float) -> bool:
     """Whether a second effect gains enough to be named beside the best single effect."""
     taken = first.fit.chi2 - double.fit.chi2
     closed = taken / max(first.fit.chi2 - expected_chi2, 1.0)
-    adds = taken / max(base.chi2 - double.fit.chi2, 1.0)
+    adds = taken / max(baseline.chi2 - double.fit.chi2, 1.0)
     completes = much_left(first.fit, expected_chi2) and not much_left(double.fit, expected_chi2)
     # A random path takes nearly any rest, so it is not added to a single effect that is explained by itself.
-    needless = double.scatters and first.fit.chi2 <= _left_by_right(base, first, expected_chi2)
+    needless = double.scatters and first.fit.chi2 <= _left_by_right(baseline, first, expected_chi2)
     is_mismatch = adds < _SECOND_ADDS and not completes and not _is_exact(first.fit)
     gained = double.evidence - first.evidence
     return gained >= _COST_OF_SECOND and closed >= _SECOND_CLOSES and not is_mismatch and not needless
 
 
-def _of_no_effect(base: Fit, best: RankedFit | None, scale: float, expected_chi2: float) -> dict[str, float]:
+def _of_no_effect(baseline: Fit, best: RankedFit | None, scale: float, expected_chi2: float) -> dict[str, float]:
     """The log evidence of `none` and of `unexplained`."""
-    certain = max(base.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
+    certain = max(baseline.chi2 - NEVER_WITHOUT_GAP * expected_chi2, 0.0)
     against_none = 0.5 * certain / JITTER
     none = COST_OF_EFFECT - against_none
-    unknown = 0.5 * (base.chi2 - expected_chi2) / (scale * JITTER)
+    unknown = 0.5 * (baseline.chi2 - expected_chi2) / (scale * JITTER)
     if best is not None:  # the unknown model pays as much for its freedom as the best model of the library
-        unknown = best.evidence + 0.5 * (best.fit.chi2 - _left_by_right(base, best, expected_chi2)) / (scale * JITTER)
+        unknown = best.evidence + 0.5 * (best.fit.chi2 - _left_by_right(baseline, best, expected_chi2)) / (
+            scale * JITTER
+        )
     unknown -= _COST_OF_UNKNOWN
     if against_none > 0.0:
         return {"none": none, "unexplained": max(unknown, min(against_none, COST_OF_EFFECT))}
@@ -231,13 +233,13 @@ def is_of_one_place(fit: Fit) -> bool:
 
 
 def of_another_place(
-    base: Fit, singles: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
+    baseline: Fit, singles: list[Fit], expected_chi2: float, random: Sequence[RandomFriction]
 ) -> Verdict | None:
     """The verdict without the waves of the track, if friction that varies at random then wins; otherwise None.
 
     For a verdict that a held-out run on another stretch of the track refutes: there the scatter may fit where the waves do not.
     """
-    verdict = judge(base, [fit for fit in singles if not is_of_one_place(fit)], [], expected_chi2, random)
+    verdict = judge(baseline, [fit for fit in singles if not is_of_one_place(fit)], [], expected_chi2, random)
     return verdict if verdict.named is not None and is_random(verdict.named.hypothesis) else None
 
 
