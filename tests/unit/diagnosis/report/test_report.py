@@ -143,7 +143,7 @@ def test_numbers_that_are_none(tmp_path):
     assert "width: nan" not in page
 
 
-def test_without_a_run_kept_aside_there_is_no_chart_but_what_to_do(tmp_path):
+def test_without_a_held_out_run_there_is_no_chart_but_what_to_do(tmp_path):
     made = made_up.diagnosis()
     alone = made.gap._replace(runs=(), nominal=NAN, retuned=NAN, with_effect=NAN, floor=NAN, compared=())
     page = page_of(made._replace(gap=alone), tmp_path)
@@ -187,7 +187,7 @@ def test_what_scatters_at_random_says_what_else_would(form, said):
     assert ("as normal-load-fluctuation at random would (probability 30 %)" in told) is said
 
 
-def test_words_fit_what_the_runs_kept_aside_say():
+def test_words_fit_what_the_held_out_runs_say():
     made = made_up.diagnosis()
     far = made._replace(verdict="no-gap", effects=(), gap=made.gap._replace(retuned=3.4))
     assert "these runs cannot tell, the held-out runs are 3.4 noise floors off" in in_words.headline(far)
@@ -287,7 +287,7 @@ def test_a_number_known_exactly_has_not_moved():
     assert tail.shift_sd == pytest.approx(-0.3)
 
 
-def test_a_name_that_the_runs_kept_aside_do_not_test_says_so(tmp_path):
+def test_a_name_that_the_held_out_runs_do_not_test_says_so(tmp_path):
     made = made_up.diagnosis()
     untested = made._replace(gap=made.gap._replace(retuned=1.0, with_effect=1.0, shrinkage=None, interval_90=None))
     assert any(

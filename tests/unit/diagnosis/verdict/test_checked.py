@@ -53,7 +53,7 @@ def test_where_all_fall_nothing_is_named(monkeypatch, found):
     assert verdict.named is None
 
 
-def test_what_the_runs_kept_aside_refute_is_what_they_were_asked_about(monkeypatch):
+def test_what_the_held_out_runs_refute_is_what_they_were_asked_about(monkeypatch):
     """Two effects that did not pay beside the name that fell would pay beside the next one."""
     middles = {("coulomb-level",): fit(124.0, "coulomb-level"), ("drive-backlash",): fit(67.0, "drive-backlash")}
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""What the runs kept aside make of a verdict: held-out runs that leave what a test says, and verdicts over made-up fits."""
+"""What the held-out runs make of a verdict: runs that leave what a test says, and verdicts over made-up fits."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -28,7 +28,7 @@ def outcome(
     left: float = 1.0,
     refuted: tuple[Fit, ...] = (),
 ) -> Confirmation:
-    """Where `named` wins the contest, in floors of the runs kept aside, which refute some fits."""
+    """Where `named` wins the contest, in floors of the held-out runs, which refute some fits."""
     base = fit(GAP)
 
     def verdict(*fits: Fit, **more: Any):

@@ -1,4 +1,4 @@
-"""Which names a run kept aside may refute: those that say what it will show."""
+"""Which names a held-out run may refute: those that say what it will show."""
 
 import math
 from types import SimpleNamespace

@@ -105,7 +105,7 @@ def test_two_effects_must_leave_less_than_one():
     assert judge(fit(4000.0), [single], [double], EXPECTED).kind == "unexplained"
 
 
-def test_what_the_runs_kept_aside_refute_is_unexplained():
+def test_what_the_held_out_runs_refute_is_unexplained():
     named = fit(50.0, "coulomb-level")
     verdict = judge(fit(400.0), [named], [], EXPECTED, refuted=True)
     assert (verdict.kind, verdict.named, verdict.refuted) == ("unexplained", None, ("coulomb-level",))
@@ -171,7 +171,7 @@ def test_no_verdict_is_surer_than_such_verdicts_were():
         assert sum(probabilities.values()) == pytest.approx(1.0)
 
 
-def test_a_name_that_leaves_much_of_the_runs_kept_aside_is_less_sure():
+def test_a_name_that_leaves_much_of_the_held_out_runs_is_less_sure():
     pairs = [fit(50.0, "coulomb-level", "drive-backlash")]
     for verdict in (
         judge(fit(4000.0), [fit(50.0, "coulomb-level")], [], EXPECTED),
@@ -224,7 +224,7 @@ def test_friction_that_scatters_must_pay_for_its_path(single, left, gained, kind
     assert sorted(verdict.named.hypothesis.effects if verdict.named else []) == effects
 
 
-def test_what_was_refuted_is_compared_on_the_runs_kept_aside_also_where_it_scatters():
+def test_what_was_refuted_is_compared_on_the_held_out_runs_also_where_it_scatters():
     singles, scatter = [fit(900.0, "coulomb-level")], [Scatter(50.0, 100.0, effect=TRACK)]
     gone = judge(fit(1000.0), singles, [], EXPECTED, scatter).named
     verdict = judge(fit(1000.0), singles, [], EXPECTED, scatter, refuted=True)
