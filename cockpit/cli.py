@@ -10,6 +10,7 @@ import typer
 
 from cockpit.commands.blind import blind_app
 from cockpit.commands.diagnose import diagnose
+from cockpit.commands.example import example
 from cockpit.commands.explain import explain
 from cockpit.commands.json_option import JsonGroup
 from cockpit.commands.log import log_app
@@ -73,6 +74,7 @@ app.command(
         "stickslip diagnose evidence/ --jobs 2 --report reports",
     ),
 )(diagnose)
+app.command("example", epilog=_examples("stickslip example runs/example", "stickslip diagnose runs/example"))(example)
 app.add_typer(
     log_app,
     name="log",

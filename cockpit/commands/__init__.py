@@ -5,7 +5,9 @@ processes                   one of them alone: plant, controller, record; stop
 replay                      a log through today's controller, simulated again, or back on the bus
 pictures                    plot, map, reproduce
 log, blind                  groups of commands
+example                     evidence of a made-up rig
 diagnose, diagnose_output   evidence to a diagnosis; its progress and its words on a terminal
 explain, scenarios          what there is to know without a run
+json_option                 `--json` of every command
 options                     what several commands have
 """

@@ -1,15 +1,13 @@
 """`stickslip log ...`: look into a log, check it, make a cut one whole, turn it into tables and tables into evidence."""
 
 import math
-import sys
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cockpit.commands.json_option import STDOUT, Json, JsonGroup, carry_out, tell
+from cockpit.commands.options import watched_share
 
 if TYPE_CHECKING:
     from bridge.log.logfile import Damage
@@ -59,20 +57,6 @@ def _lost(damage: "Damage") -> str:
     return "lost: " + ", ".join(parts) if parts else ""
 
 
-@contextmanager
-def _progress(text: str, as_json: Path | None) -> Generator[Callable[[float], None]]:
-    """A bar on stderr for a person who watches; yields the function to call with the share done."""
-    if as_json == STDOUT or not sys.stderr.isatty():
-        yield lambda _share: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(text, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
-
-
 @log_app.command("export")
 def log_export(
     path: LogArgument,
@@ -94,7 +78,7 @@ def log_export(
         from_s = time_s(f"--from {start}", start, "12.5s") if start else -math.inf
         until_s = time_s(f"--until {end}", end, "20s") if end else math.inf
         names = [name.strip() for name in topic.split(",")] if topic else STREAMING
-        with _progress(f"exporting {path.name}", as_json) as progress:
+        with watched_share(f"exporting {path.name}", quiet=as_json == STDOUT) as progress:
             written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress)
         words = [f"{name:<8} {rows} rows" for name, rows in written.rows.items()]
         words += [str(file) for file in written.files] or ["nothing to write: no message of these topics in this time"]
@@ -136,7 +120,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
     def work() -> int:
         from bridge.log.log_check import check_log
 
-        with _progress(f"checking {path.name}", as_json) as progress:
+        with watched_share(f"checking {path.name}", quiet=as_json == STDOUT) as progress:
             check = check_log(path, progress)
         counts = ", ".join(f"{name} {count}" for name, count in check.messages.items())
         late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())

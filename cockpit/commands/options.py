@@ -1,5 +1,8 @@
-"""Options that several commands have, as typer wants them."""
+"""Options that several commands have, as typer wants them; a bar for those that take a while."""
 
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -34,3 +37,17 @@ def as_settings(settings: list[str], seed: int | None, endpoint: str | None, pre
     if prefix is not None:
         result.append(f'bus.prefix="{prefix}"')
     return result
+
+
+@contextmanager
+def watched_share(text: str, quiet: bool) -> Generator[Callable[[float], None]]:
+    """A bar on stderr for a person who watches; yields the function to call with the share done."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda _share: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(text, total=1.0)
+        yield lambda share: bar.update(task, completed=share)

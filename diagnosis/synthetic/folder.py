@@ -5,7 +5,7 @@ chain, the start of a run; and by the effects of the case. The folder holds the 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -79,8 +79,8 @@ def axis_rig() -> RigConfig:
     return validate(RigConfig, table, "a linear axis")
 
 
-def make_evidence(folder: Path, case: Case, seed: int) -> None:
-    """Make an evidence folder; the same case and seed give the same bytes.
+def make_evidence(folder: Path, case: Case, seed: int, progress: Callable[[float], None] = lambda _share: None) -> None:
+    """Make an evidence folder; the same case and seed give the same bytes. `progress` hears the share of the runs done.
 
     Raises ValueError when the protocol is unknown or the rate does not fit, and Fault CONFIG when the rig cannot be.
     """
@@ -112,6 +112,7 @@ def make_evidence(folder: Path, case: Case, seed: int) -> None:
         writer.append({name: values for name, values in columns.items() if name not in case.leave_out})
         writer.finish()
         runs.append(RunTable(file=file, drive_velocity_mps=velocity_mps, holdout=plan.holdout))
+        progress(number / len(plans))
     (folder / MANIFEST).write_text(manifest_text(table, runs, []))
 
 

@@ -1,0 +1,85 @@
+"""`stickslip example`: evidence of a made-up rig with a hidden fault, for a first diagnosis."""
+
+from enum import StrEnum
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, NamedTuple
+
+import typer
+
+from bridge.faults import Fault
+from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
+from cockpit.commands.options import watched_share
+from cockpit.run.child_process import end_like_ctrl_c
+from cockpit.run.writable import check_writable, writing
+
+
+class EffectName(StrEnum):
+    """Faults to choose from."""
+
+    none = "none"
+    drive_damping = "drive-damping"
+    drive_backlash = "drive-backlash"
+    force_sensor_gain = "force-sensor-gain"
+
+
+# sizes that a diagnosis of these runs names
+_EFFECTS: dict[EffectName, dict[str, dict[str, float | str]]] = {
+    EffectName.none: {},
+    EffectName.drive_damping: {"drive-damping": {"damping_Ns_per_m": 12.0}},
+    EffectName.drive_backlash: {"drive-backlash": {"gap_m": 1e-4}},
+    EffectName.force_sensor_gain: {"force-sensor-gain": {"ratio": 0.1}},
+}
+_HIDDEN = EffectName.drive_damping
+
+
+class Example(NamedTuple):
+    """What was made."""
+
+    folder: str
+    runs: list[str]  # data files
+    held_out: list[str]  # those of them that no number is fitted to
+    seed: int
+
+
+def example(
+    folder: Annotated[Path, typer.Argument(help="The evidence folder to make; it must not be there yet.")],
+    seed: Annotated[int, typer.Option(min=0, help="Of the rig's own numbers, noise and surface.")] = 1,
+    effect: Annotated[
+        EffectName | None,
+        typer.Option(help="A fault that you choose, in place of a hidden one; none: the rig is as described."),
+    ] = None,
+    as_json: Json = None,
+) -> None:
+    """Make evidence of a rig with a hidden fault: four runs as they would be measured, for a first diagnosis."""
+
+    def work() -> None:
+        from diagnosis.evidence.manifest import read_manifest
+        from diagnosis.synthetic.folder import Case, make_evidence
+
+        end_like_ctrl_c()
+        if folder.exists() or folder.is_symlink():
+            raise Fault("CONFIG", f"{folder}: is there already; nothing was written; choose another folder")
+        check_writable("FOLDER", folder)
+        beside = next(parent for parent in folder.absolute().parents if parent.exists())
+        with (
+            writing(folder),
+            TemporaryDirectory(prefix=".stickslip-", dir=beside) as part,
+            watched_share(f"making {folder}", quiet=as_json == STDOUT) as progress,
+        ):
+            make_evidence(Path(part, "made"), Case("ladder", _EFFECTS[effect or _HIDDEN]), seed, progress)
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            Path(part, "made").rename(folder)
+        runs = read_manifest(folder).run
+        made = Example(str(folder), [run.file for run in runs], [run.file for run in runs if run.holdout], seed)
+        rig = f"a rig with {effect}" if effect else "a rig with a hidden fault"
+        tell(
+            as_json,
+            made,
+            [
+                f"{folder}: {len(runs)} runs of {rig}, {len(made.held_out)} of them held out; manifest.toml describes the rig",
+                f"next     stickslip diagnose {folder}",
+            ],
+        )
+
+    carry_out(work, as_json)

@@ -1,0 +1,92 @@
+"""`stickslip example`: a first evidence, made whole or not at all."""
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from cockpit.cli import app
+from diagnosis.evidence.folder import load_evidence
+from diagnosis.synthetic import folder as making
+from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
+from plant.effects.library import EFFECTS
+
+SHORT = (RunPlan(((0.0, 5e-4),), duration_s=1.0), RunPlan(((0.0, 5e-4),), duration_s=1.0, holdout=True))
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """Two runs of a second, made in an empty working folder."""
+    monkeypatch.setitem(PROTOCOLS, "ladder", SHORT)
+    monkeypatch.chdir(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def example(*arguments: str):
+    return CliRunner().invoke(app, ["example", *arguments])
+
+
+def test_an_example_can_be_read_and_does_not_tell_its_fault() -> None:
+    result = example("runs/example")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[-1] == "next     stickslip diagnose runs/example"
+    evidence = load_evidence(Path("runs/example"))
+    assert [run.holdout for run in evidence.runs] == [False, True]
+    for text in (result.output, Path("runs/example/manifest.toml").read_text()):
+        assert not [name for name in EFFECTS if name in text]
+
+
+def test_the_seed_and_a_chosen_fault_make_another_one() -> None:
+    for name, options in {"a": [], "b": [], "c": ["--seed", "2"], "d": ["--effect", "none"]}.items():
+        assert example(name, *options).exit_code == 0
+    runs = {name: Path(name, "run-01.parquet").read_bytes() for name in "abcd"}
+    assert runs["a"] == runs["b"]
+    assert len(set(runs.values())) == 3
+
+
+def test_json_lists_the_runs() -> None:
+    told = json.loads(example("made", "--json").stdout)
+    assert told == {
+        "folder": "made",
+        "runs": ["run-01.parquet", "run-02.parquet"],
+        "held_out": ["run-02.parquet"],
+        "seed": 1,
+    }
+
+
+@pytest.mark.parametrize("there", ["folder", "file", "link"])
+def test_nothing_is_overwritten(there: str, tmp_path: Path) -> None:
+    made = tmp_path / "made"
+    {"folder": made.mkdir, "file": made.touch, "link": lambda: made.symlink_to("nowhere")}[there]()
+    result = example("made")
+    assert result.exit_code == 2
+    assert "made: is there already; nothing was written" in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["made"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_leaves_nothing_behind(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = making.spring_run
+
+    def interrupted(*arguments):
+        if list(tmp_path.rglob("run-01.parquet")):
+            os.kill(os.getpid(), number)
+        return made(*arguments)
+
+    monkeypatch.setattr(making, "spring_run", interrupted)
+    result = example("new/example")
+    assert result.exit_code == 130
+    assert "INTERRUPTED" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    result = example("file/example")
+    assert result.exit_code == 5
+    assert "LOG_WRITE" in result.stderr
