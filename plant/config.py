@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, Two, read_toml, validate
-from plant.effects.library import LONGEST_DELAY, checked
+from plant.effects.library import checked
+from plant.effects.sensors import LONGEST_DELAY
 from plant.pairs import PAIRS
 
 Positive = Annotated[float, Field(gt=0)]

@@ -82,3 +82,19 @@ def step(
         1.0 + half * (h_d + damping)
     )
     return 2.0 * v_mid - v, v_mid, z
+
+
+@kernel
+def elasto_plastic_share(z: float, v_r: float, g: float, k_t: float, breakaway_ratio: float) -> float:
+    """Share alpha of sliding in the bristle's motion: elastic, then a sine, 1 as in LuGre (Dupont et al. 2002, eq. 14)."""
+    elastic = 1e-6  # of 0, which the contact divides by
+    if z * v_r <= 0.0:
+        return elastic
+    reach = math.fabs(z) * k_t / g  # 1 in steady sliding
+    if reach <= breakaway_ratio:
+        return elastic
+    if reach >= 1.0:
+        return 1.0
+    return elastic + (1.0 - elastic) * (
+        0.5 + 0.5 * math.sin(math.pi * (reach - 0.5 * (1.0 + breakaway_ratio)) / (1.0 - breakaway_ratio))
+    )

@@ -11,34 +11,16 @@ from typing import Any
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
+from plant.contact import elasto_plastic_share
 from plant.contact import step as contact_step
-from plant.effects.formulas import ageing_N, elasto_plastic_share, late_mps, level, spring_N, wave
+from plant.effects.drive import spring_N, unevenness
+from plant.effects.friction import level
+from plant.effects.friction_memory import ageing_N, late_mps
+from plant.effects.piezo import heat_share, load_share
+from plant.effects.sensors import force_reading_N
+from plant.effects.structure import base_free_mps, base_give, frame_gain_mps
+from plant.effects.waves import TWO_PI
 from plant.piezo import accepted, delivered_share
-from plant.records import DELAY_LINE
-
-TWO_PI = 2.0 * math.pi
-
-
-@kernel
-def _force_reading(p: Record, s: Record, force_N: float, t_s: float) -> float:
-    """What the force sensor's faults make of its signal; once a sample."""
-    if p.force_lag_s > 0.0:
-        share = 1.0 - math.exp(-p.dt_s * p.steps_per_sample / p.force_lag_s)
-        for i in range(int(p.force_lag_order)):
-            s.force_lag[i] += share * (force_N - s.force_lag[i])
-            force_N = s.force_lag[i]
-    if p.force_delay_s > 0.0:
-        s.delay_line[s.delay_at] = force_N
-        back = p.force_delay_s / (p.dt_s * p.steps_per_sample)
-        whole = math.floor(back)
-        newer = s.delay_line[(s.delay_at - int(whole)) % DELAY_LINE]
-        older = s.delay_line[(s.delay_at - int(whole) - 1) % DELAY_LINE]
-        force_N = newer + (back - whole) * (older - newer)
-        s.delay_at = (s.delay_at + 1) % DELAY_LINE
-    offset_N = p.force_bias_N + p.force_drift_N_per_s * t_s
-    if p.force_settling_s > 0.0:
-        offset_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
-    return force_N * (1.0 + p.force_ratio) + offset_N / p.force_gain  # which is applied to all of it, where it is read
 
 
 @kernel
@@ -96,10 +78,10 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         base_velocity_mid = 0.0
         base_accel = 0.0
         base_ramp = 0.0
-        base_free_mps = 0.0
+        free_mps = 0.0
         accel = 0.0
         drive_velocity_mps = drive
-        h_d_now, h_d_step, F_c_now, F_s_now, sliding_share, base_give = h_d, h_d, F_c, F_s, 1.0, 0.0
+        h_d_now, h_d_step, F_c_now, F_s_now, sliding_share, gives = h_d, h_d, F_c, F_s, 1.0, 0.0
         force_N, slack = s.drive_N, False
         # only the disturbed kernel looks at what follows
         t_s = s.t_s
@@ -109,17 +91,17 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         lag_share = 1.0 - math.exp(-dt / p.lag_s) if p.lag_s > 0.0 else 1.0
         frame_omega, base_omega = TWO_PI * p.frame_Hz, TWO_PI * p.base_Hz
         frame_loss, base_loss = p.frame_damping_ratio * frame_omega * dt, p.base_damping_ratio * base_omega * dt
-        if disturbed and p.base_m_per_N != 0.0:  # of a mass of 1 / (compliance omega^2)
-            base_give = 0.5 * dt * p.base_m_per_N * base_omega * base_omega / (1.0 + base_loss)
+        if disturbed and p.base_m_per_N != 0.0:
+            gives = base_give(dt, base_omega, base_loss, p.base_m_per_N)
         # where friction falls at once the bristle's damper pushes: more than this, and the step would be unstable
-        least_N_per_m = k_t / (1.0 + 1.0 / (dt * h_t * (1.0 / m + 2.0 * base_give / dt))) if h_t > 0.0 else 0.0
+        least_N_per_m = k_t / (1.0 + 1.0 / (dt * h_t * (1.0 / m + 2.0 * gives / dt))) if h_t > 0.0 else 0.0
         block_s = samples * steps_per_sample * dt
         vibrating_s = s.vibrating_s if vibrating else 0.0
-        heat_share, sag_per_N = 1.0, 0.0
+        warm_share, sag_per_N = 1.0, 0.0
         if p.sag_settling_s == 0.0:
             sag_per_N = p.sag_ratio / F_s
         else:
-            heat_share -= p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * block_s) / p.sag_settling_s))
+            warm_share = heat_share(p, vibrating_s + 0.5 * block_s)
         if disturbed and p.force_driven:
             drive_velocity_mps = 0.0
         # turned on from step to step: a sine in each step made a rig whose load varies a third slower
@@ -147,7 +129,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                         u0 = max(u0 - u0_step, target_m)
                     share_now = share
                     if disturbed and p.sag_ratio != 0.0:
-                        share_now *= heat_share * max(1.0 - sag_per_N * math.fabs(force_N), 0.0)
+                        share_now *= warm_share * load_share(sag_per_N, force_N)
                     base_ramp = share_now * (u0 - u0_before) / dt if u0_step > 0.0 else 0.0
                     peak = share_now * u0 * omega
                     base_velocity = peak * cos_phi + base_ramp * sin_phi
@@ -159,14 +141,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     sin_phi = sin_mid * cos_half + cos_mid * sin_half
                 if disturbed:
                     if p.ripple_ratio != 0.0:
-                        turns = p.ripple_frequency_Hz * (t_s + 0.5 * dt)
-                        if p.ripple_wavelength_m > 0.0:
-                            turns = (even_m + 0.5 * dt * drive) / p.ripple_wavelength_m
-                            even_m += dt * drive
-                        angle_rad = TWO_PI * turns + p.ripple_phase_rad
-                        drive_velocity_mps = drive * (
-                            1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
-                        )
+                        drive_velocity_mps = drive * unevenness(p, t_s + 0.5 * dt, even_m + 0.5 * dt * drive)
+                        even_m += dt * drive
                     anchor_mps = drive_velocity_mps - frame_mps
                     extension_m = s_d - frame_m - x
                     pull_N = drive if p.force_driven else spring_N(p, extension_m + 0.5 * dt * (anchor_mps - v))
@@ -188,9 +164,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed:
                     v_r -= base_mps
                     if p.base_m_per_N != 0.0:
-                        spring_mps2 = base_omega * base_omega * (base_m + 0.5 * dt * base_mps)
-                        base_free_mps = (base_mps - 0.5 * dt * spring_mps2) / (1.0 + base_loss)
-                        base_mid_mps += base_free_mps
+                        free_mps = base_free_mps(dt, base_omega, base_loss, base_m, base_mps)
+                        base_mid_mps += free_mps
                     friction = level(p, t_s, x - base_m, v_r, load_sin, load_cos)
                     load_sin, load_cos = (
                         load_sin * load_cos_step + load_cos * load_sin_step,
@@ -224,7 +199,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed and p.elasto_plastic:
                     sliding_share = elasto_plastic_share(z, v_r, g, k_t, p.elastic_ratio)
                 v, v_mid, z = contact_step(
-                    dt, z_dt, m, h_d_step, k_t, h_t, damping, g, sliding_share, base_give, disturbed,
+                    dt, z_dt, m, h_d_step, k_t, h_t, damping, g, sliding_share, gives, disturbed,
                     pull_N, anchor_mps, base_mid_mps, v, v_r, z, v_r_before, g_before,
                 )  # fmt: skip
                 z_dt = dt
@@ -235,8 +210,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed:
                     t_s += dt
                     if p.base_m_per_N != 0.0:
-                        base_gain_mps = base_give * (pull_N + h_d_step * (anchor_mps - v_mid) - m * accel)
-                        base_mean_mps = base_free_mps + base_gain_mps
+                        base_gain_mps = gives * (pull_N + h_d_step * (anchor_mps - v_mid) - m * accel)
+                        base_mean_mps = free_mps + base_gain_mps
                         base_m += dt * base_mean_mps
                         yield_mps2 = 2.0 * (base_mean_mps - base_mps) / dt
                         base_mps = 2.0 * base_mean_mps - base_mps
@@ -249,11 +224,10 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                             arm_N += p.relaxing_Ns_per_m * (1.0 - arm_keep) * (anchor_mps - v_mid)
                         spring_force_N += arm_N
                     force_N = drive if p.force_driven else spring_force_N
-                    if p.frame_m_per_N != 0.0:  # m q'' = F_d - q / c - damping, m = 1 / (c omega^2)
-                        per_m = dt * frame_omega * frame_omega
-                        gain_mps = per_m * (force_N * p.frame_m_per_N - frame_m) - 2.0 * frame_loss * frame_mps
-                        # implicit, as a light frame on a strong damper would blow up
-                        frame_mps += gain_mps / (1.0 + frame_loss + per_m * p.frame_m_per_N * h_d_now)
+                    if p.frame_m_per_N != 0.0:
+                        frame_mps += frame_gain_mps(
+                            dt, frame_omega, frame_loss, p.frame_m_per_N, h_d_now, force_N, frame_m, frame_mps
+                        )
                 else:
                     force_N = k_d * (s_d - x) + h_d * (drive_velocity_mps - v)
                 force_f += force_share * (force_N - force_f)
@@ -264,7 +238,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 mass_slow_f += slow_share * (mass_f - mass_slow_f)
                 base_slow_f += slow_share * (base_f - base_slow_f)
             if disturbed:
-                analogue[0, sample] = _force_reading(p, s, force_f, t_s)
+                analogue[0, sample] = force_reading_N(p, s, force_f, t_s)
                 analogue[1, sample] = (1.0 + p.mass_accel_ratio) * (mass_f - mass_slow_f)
                 analogue[2, sample] = (1.0 + p.base_accel_ratio) * (base_f - base_slow_f)
             else:

@@ -14,7 +14,11 @@ import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from plant import four_rigs_step as at
-from plant.effects.formulas import TWO_PI, ageing_N, extension_m, level, wave
+from plant.effects.drive import extension_m, unevenness, yield_m
+from plant.effects.friction import level
+from plant.effects.friction_memory import ageing_N
+from plant.effects.piezo import heat_share, load_share
+from plant.effects.waves import TWO_PI
 from plant.four_rigs_step import LANES
 from plant.piezo import delivered_share
 
@@ -58,9 +62,7 @@ def advance_lanes(
         w[at.PER_V_S + i], w[at.TAIL + i] = 1.0 / p.v_s, p.stribeck_tail
         w[at.AT_ONCE + i] = 1.0 if p.disturbed else math.inf
         w[at.SLACK + i], w[at.KNEE + i], w[at.KNEE_RATIO + i] = 0.5 * p.gap_m, p.knee_m, p.knee_ratio
-        w[at.HARDENING + i], w[at.YIELD + i] = p.hardening_per_m2, math.inf
-        if p.hardening_per_m2 < 0.0:
-            w[at.YIELD + i] = math.sqrt(-1.0 / (3.0 * p.hardening_per_m2))
+        w[at.HARDENING + i], w[at.YIELD + i] = p.hardening_per_m2, yield_m(p.hardening_per_m2)
         w[at.RELAXING + i], w[at.QUADRATIC + i] = p.relaxing_Ns_per_m, p.quadratic_Ns2_per_m2
         w[at.FORWARD + i], w[at.BACKWARD + i] = p.forward_ratio, p.backward_ratio
         w[at.KINETIC_BACKWARD + i], w[at.LATE_SHARE + i] = p.kinetic_backward_ratio, p.late_share
@@ -128,7 +130,7 @@ def advance_lanes(
             p = params[i]
             share = delivered_share(p, frequency_Hz[block]) if vibrating else 1.0
             if p.sag_settling_s > 0.0:
-                share *= 1.0 - p.sag_ratio * (1.0 - math.exp(-(vibrating_s + 0.5 * block_s) / p.sag_settling_s))
+                share *= heat_share(p, vibrating_s + 0.5 * block_s)
             w[at.SHARE + i] = w[at.DELIVERED + i] = share
             w[at.DRIVE + i] = drive[block]
             if dt != dt_before:
@@ -148,14 +150,8 @@ def advance_lanes(
                 sin_phi = sin_mid * cos_half + cos_mid * sin_half
             if ripples:
                 for i in range(LANES):
-                    p = params[i]
-                    turns = p.ripple_frequency_Hz * (t_s + 0.5 * dt)
-                    if p.ripple_wavelength_m > 0.0:
-                        turns = (state[i].even_m + travelled_m + 0.5 * dt * drive[block]) / p.ripple_wavelength_m
-                    angle_rad = TWO_PI * turns + p.ripple_phase_rad
-                    w[at.DRIVE + i] = drive[block] * (
-                        1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
-                    )
+                    even_m = state[i].even_m + travelled_m + 0.5 * dt * drive[block]
+                    w[at.DRIVE + i] = drive[block] * unevenness(params[i], t_s + 0.5 * dt, even_m)
             if settles:
                 for i in range(LANES):
                     w[at.SETTLED + i] = -w[at.SETTLING + i] * at.gone(
@@ -163,8 +159,7 @@ def advance_lanes(
                     )
             if sags:
                 for i in range(LANES):
-                    sag = max(1.0 - w[at.SAG_PER_N + i] * math.fabs(w[at.FORCE + i]), 0.0)
-                    w[at.DELIVERED + i] = w[at.SHARE + i] * sag
+                    w[at.DELIVERED + i] = w[at.SHARE + i] * load_share(w[at.SAG_PER_N + i], w[at.FORCE + i])
             at.approach(w, dt, t_s, base_mps)
             if varies:
                 for i in range(LANES):

@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
-from plant.effects.formulas import TWO_PI, late_mps, with_second
+from plant.effects.drive import spring_law_N
+from plant.effects.friction_memory import late_mps
+from plant.effects.waves import TWO_PI, with_second
 
 Floats = npt.NDArray[np.floating[Any]]
 # A register of AVX2. Eight take 1.9 times as long as four, and most questions are of few rigs: one in 58 % of the 372 calls of a
@@ -60,12 +62,9 @@ def gone(a: float) -> float:
 
 @kernel
 def _spring_N(w: Floats, i: int, extension_m: float) -> float:
-    """As `plant.effects.formulas.spring_N`, without its branches."""
-    slack_m, yield_m, knee_m = w[SLACK + i], w[YIELD + i], w[KNEE + i]
-    e = extension_m - min(max(extension_m, -slack_m), slack_m)
-    e = min(max(e, -yield_m), yield_m)
-    knee_N = w[KNEE_RATIO + i] * w[K_D + i] * (e - min(max(e, -knee_m), knee_m))
-    return w[K_D + i] * e * (1.0 + w[HARDENING + i] * e * e) + knee_N
+    return spring_law_N(
+        w[K_D + i], w[SLACK + i], w[YIELD + i], w[HARDENING + i], w[KNEE + i], w[KNEE_RATIO + i], extension_m
+    )
 
 
 @kernel

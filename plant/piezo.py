@@ -7,6 +7,7 @@ the ramp of u0 is over. The phase continues through a change of frequency; it re
 import math
 
 from bridge.kernel import Record, kernel
+from plant.effects.piezo import mode_gain, roll_off
 
 
 @kernel
@@ -18,13 +19,11 @@ def delivered_share(p: Record, frequency_Hz: float) -> float:
         damped = 2.0 * p.mount_damping_ratio * r
         squared = (1.0 - r * r) * (1.0 - r * r) + damped * damped
         if p.mode_ratio > 0.0:
-            moved = p.mode_ratio * r * r / squared
-            share *= math.hypot(1.0 + moved * (1.0 - r * r), moved * damped)
+            share *= mode_gain(p.mode_ratio, r, damped, squared)
         else:
             share /= math.sqrt(squared)
     if p.rolloff_Hz > 0.0:
-        r = frequency_Hz / p.rolloff_Hz
-        share /= math.sqrt(1.0 + r * r) if p.rolloff_order == 1.0 else 1.0 + r * r
+        share /= roll_off(p, frequency_Hz)
     return share
 
 

@@ -10,7 +10,7 @@ from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Commands
 from plant.config import RigConfig
-from plant.effects.formulas import even_m, extension_m
+from plant.effects.drive import even_m, extension_m
 from plant.records import build
 
 Floats = npt.NDArray[np.floating[Any]]

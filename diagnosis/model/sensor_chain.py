@@ -13,7 +13,8 @@ from scipy.signal import lfilter
 
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.model.rig import Effects
-from plant.effects.library import EFFECTS, LAG_ORDERS
+from plant.effects.library import EFFECTS
+from plant.effects.sensors import LAG_ORDERS
 
 Floats = npt.NDArray[np.floating[Any]]
 Signals = dict[str, Floats]

@@ -12,7 +12,7 @@ from diagnosis.synthetic.protocols import AxisPlan, RunPlan
 from diagnosis.synthetic.sensors import DrawnChain, measured
 from plant.config import RigConfig
 from plant.core import advance_disturbed
-from plant.effects.formulas import even_m, extension_m
+from plant.effects.drive import even_m, extension_m
 from plant.records import TRUTH, build
 from plant.simulate import run_blocks
 

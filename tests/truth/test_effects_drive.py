@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from plant.effects.formulas import even_m, extension_m
+from plant.effects.drive import even_m, extension_m
 from plant.records import build
 from plant.simulate import simulate
 from tests.effects_rig import BLOCK_S, DISTURBED, HEAVY_KG, NO_FRICTION, NOMINAL, TAU, advance_by, rig, run

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from plant.effects.formulas import level
+from plant.effects.friction import level
 from plant.records import build
 from tests.effects_rig import HEAVY_KG, TAU, rig, run, stribeck_N, towed
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from plant.effects.formulas import late_mps
-from plant.effects.library import LONGEST_LAG_S
+from plant.effects.friction_memory import LONGEST_LAG_S, late_mps
 from plant.records import build
 from tests.effects_rig import BLOCK_S, HEAVY_KG, TAU, rig, run, stribeck_N
 

@@ -7,7 +7,7 @@ from scipy.special import gammainc
 
 from bridge.wire.messages import CHANNELS, sensor_block
 from plant.core import advance_disturbed
-from plant.effects.library import LONGEST_DELAY
+from plant.effects.sensors import LONGEST_DELAY
 from plant.node import PlantNode
 from plant.records import TRUTH, build
 from tests.effects_rig import HEAVY_KG, TAU, rig, run

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.effects.formulas import smooth_noise
+from plant.effects.waves import smooth_noise
 from tests.effects_rig import rig, towed
 
 CONTACT = rig().contact

@@ -10,7 +10,7 @@ from diagnosis.features.slips import find_slips
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
-from plant.effects.library import LAG_ORDERS
+from plant.effects.sensors import LAG_ORDERS
 from tests.prepared import prepared
 
 

@@ -1,0 +1,183 @@
+"""The drive: its spring and what damps it, and how evenly it moves.
+
+Sources: hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994.
+"""
+
+import math
+from typing import Any, Final
+
+from bridge.kernel import Record, kernel
+from plant.effects.row import WAVE_SHAPE, Effect, Form, Parameter, one_form, ratio, wave_shape
+from plant.effects.waves import TWO_PI, wave
+
+_EVENED = 200  # rounds, of half a step each: whole ones swing ever wider where the speed more than doubles
+_HALVINGS = 44
+
+
+@kernel
+def spring_law_N(
+    k_d: float,
+    slack_m: float,
+    yield_m: float,
+    hardening_per_m2: float,
+    knee_m: float,
+    knee_ratio: float,
+    extension_m: float,
+) -> float:
+    """Force of a spring with backlash, hardening and a knee, without a branch: for kernels of one rig and of several."""
+    e = extension_m - min(max(extension_m, -slack_m), slack_m)
+    e = min(max(e, -yield_m), yield_m)
+    knee_N = knee_ratio * k_d * (e - min(max(e, -knee_m), knee_m))
+    return k_d * e * (1.0 + hardening_per_m2 * e * e) + knee_N
+
+
+@kernel
+def yield_m(hardening_per_m2: float) -> float:
+    """Extension at which a softening spring has its largest force: the law would let it push beyond, the further the harder."""
+    return math.sqrt(-1.0 / (3.0 * hardening_per_m2)) if hardening_per_m2 < 0.0 else math.inf
+
+
+@kernel
+def spring_N(p: Record, extension_m: float) -> float:
+    """Force of the drive's spring."""
+    most_m = yield_m(p.hardening_per_m2)
+    return spring_law_N(p.k_d, 0.5 * p.gap_m, most_m, p.hardening_per_m2, p.knee_m, p.knee_ratio, extension_m)
+
+
+@kernel
+def extension_m(p: Record, force_N: float) -> float:
+    """Of the drive's spring, where it has this force: by halving, to 1e-12 of that of a linear spring.
+
+    The softest spring, bilinear with a ratio of -0.9, is extended ten times as far.
+    """
+    found_m = 0.0
+    step_m = 10.0 * force_N / p.k_d + math.copysign(0.5 * p.gap_m, force_N)
+    for _ in range(_HALVINGS):
+        step_m *= 0.5
+        if math.fabs(spring_N(p, found_m + step_m)) < math.fabs(force_N):
+            found_m += step_m
+    return found_m
+
+
+@kernel
+def unevenness(p: Record, t_s: float, even_m: float) -> float:
+    """Velocity of an uneven drive over that of an even one, which would be at `even_m` now."""
+    turns = p.ripple_frequency_Hz * t_s
+    if p.ripple_wavelength_m > 0.0:
+        turns = even_m / p.ripple_wavelength_m
+    angle_rad = TWO_PI * turns + p.ripple_phase_rad
+    return 1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
+
+
+@kernel
+def even_m(p: Record, drive_m: float) -> float:
+    """Where an even drive would be when one with a screw's lead errors is at `drive_m`.
+
+    The errors are the integral of the velocity's ripple over the even position, without a mean.
+    """
+    found_m = drive_m
+    if p.ripple_wavelength_m > 0.0:
+        per_rad_m = p.ripple_wavelength_m / TWO_PI
+        for _ in range(_EVENED):
+            sin = math.sin(found_m / per_rad_m + p.ripple_phase_rad)
+            cos = math.cos(found_m / per_rad_m + p.ripple_phase_rad)
+            error = p.ripple_cos_2 * sin * cos - cos - 0.5 * p.ripple_sin_2 * (2.0 * cos * cos - 1.0)
+            found_m += 0.5 * (drive_m - p.ripple_ratio * per_rad_m * error - found_m)
+    return found_m
+
+
+def _set_damping(p: Any, form: str, value: dict[str, float]) -> None:
+    if form == "viscous":
+        p.h_d += value["damping_Ns_per_m"]
+    else:
+        p.relaxing_Ns_per_m, p.relaxation_s = value["damping_Ns_per_m"], value["relaxation_s"]
+
+
+def _set_stiffness(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.k_d *= 1.0 + value["ratio"]
+
+
+def _set_hardening(p: Any, form: str, value: dict[str, float]) -> None:
+    p.hardening_per_m2 = value["ratio"] * 1e6 if form == "cubic" else 0.0
+    p.knee_m, p.knee_ratio = value.get("knee_m", 0.0), value["ratio"] if form == "bilinear" else 0.0
+
+
+def _set_backlash(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.gap_m = value["gap_m"]
+
+
+def _set_ripple(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.ripple_ratio = value["ratio"]
+    p.ripple_phase_rad, p.ripple_sin_2, p.ripple_cos_2 = wave_shape(value)
+    p.ripple_wavelength_m, p.ripple_frequency_Hz = value.get("wavelength_m", 0.0), value.get("frequency_Hz", 0.0)
+
+
+_SPRING = ("spring",)
+_DAMPING = Parameter("damping_Ns_per_m", 0.0, 1e6, 10.0)
+_UNEVEN = ratio(0.05, 0.0, 0.95)
+DRIVE: Final = {
+    "drive-damping": Effect(
+        "drive",
+        {
+            "viscous": Form("h_d grows by damping", (_DAMPING,)),
+            "relaxing": Form(
+                "a damper beside the spring that hangs on a spring of its own, damping / relaxation_s (Maxwell)",
+                (_DAMPING, Parameter("relaxation_s", 1e-4, 100.0, 4e-3)),
+            ),
+        },
+        _set_damping,
+        numbers=("relaxing_Ns_per_m", "relaxation_s"),
+        switches=("relaxing_Ns_per_m",),
+        memory=(("arm_N", "f8"),),
+        drives=_SPRING,
+    ),
+    "drive-stiffness": Effect(
+        "drive", one_form("k_d times 1 + ratio", ratio(0.1)), _set_stiffness, drives=_SPRING, first=True
+    ),
+    "drive-hardening": Effect(
+        "drive",
+        {
+            "cubic": Form(
+                "k_d e (1 + ratio (e / 1 mm)^2); a softening one yields at its largest force",
+                (ratio(0.05, -0.2, 10.0),),
+            ),
+            "bilinear": Form(
+                "k_d e, beyond |e| = knee_m with the stiffness k_d (1 + ratio)",
+                (ratio(0.2), Parameter("knee_m", 1e-6, 1.0, 1e-3)),
+            ),
+        },
+        _set_hardening,
+        numbers=("hardening_per_m2", "knee_m", "knee_ratio"),
+        switches=("hardening_per_m2", "knee_ratio"),
+        drives=_SPRING,
+    ),
+    "drive-backlash": Effect(
+        "drive",
+        one_form("no force over a gap of gap_m around e = 0", Parameter("gap_m", 0.0, 0.1, 1e-4)),
+        _set_backlash,
+        numbers=("gap_m",),
+        switches=("gap_m",),
+        drives=_SPRING,
+    ),
+    "drive-speed-ripple": Effect(
+        "drive",
+        {
+            "screw": Form(
+                "drive velocity times 1 + ratio w(2 pi s_e / wavelength_m + phase): the motor turns evenly",
+                (_UNEVEN, Parameter("wavelength_m", 1e-5, 1.0, 1e-3), *WAVE_SHAPE),
+            ),
+            "time": Form(
+                "drive velocity times 1 + ratio w(2 pi frequency_Hz t + phase)",
+                (_UNEVEN, Parameter("frequency_Hz", 1e-3, 1e3, 1.0), *WAVE_SHAPE),
+            ),
+        },
+        _set_ripple,
+        numbers=(
+            *("ripple_ratio", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
+            *("ripple_sin_2", "ripple_cos_2"),
+        ),
+        switches=("ripple_ratio",),
+        memory=(("even_m", "f8"),),
+        drives=_SPRING,
+    ),
+}

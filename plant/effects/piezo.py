@@ -1,0 +1,102 @@
+"""What the exciter delivers of what it is told: over frequency, under load, and as it warms up.
+
+Source: a mode that takes part by a share: Ewins, Modal Testing, 2000.
+"""
+
+import math
+from typing import Any, Final
+
+from bridge.kernel import Record, kernel
+from plant.effects.row import Effect, Form, Parameter, ratio
+
+
+@kernel
+def roll_off(p: Record, frequency_Hz: float) -> float:
+    """What the amplitude is divided by at this frequency."""
+    r = frequency_Hz / p.rolloff_Hz
+    return math.sqrt(1.0 + r * r) if p.rolloff_order == 1.0 else 1.0 + r * r
+
+
+@kernel
+def mode_gain(mode_ratio: float, r: float, damped: float, squared: float) -> float:
+    """Gain of a rigid path beside a mode that takes part by a share.
+
+    Args:
+        mode_ratio: the share.
+        r: frequency over that of the mode; damped: 2 damping_ratio r; squared: (1 - r^2)^2 + damped^2.
+
+    """
+    moved = mode_ratio * r * r / squared
+    return math.hypot(1.0 + moved * (1.0 - r * r), moved * damped)
+
+
+@kernel
+def heat_share(p: Record, vibrating_s: float) -> float:
+    """Share of the amplitude that is left after the exciter has been on so long."""
+    return 1.0 - p.sag_ratio * (1.0 - math.exp(-vibrating_s / p.sag_settling_s))
+
+
+@kernel
+def load_share(sag_per_N: float, force_N: float) -> float:
+    """Share of the amplitude that is left under this drive force."""
+    return max(1.0 - sag_per_N * math.fabs(force_N), 0.0)
+
+
+def _set_roll_off(p: Any, form: str, value: dict[str, float]) -> None:
+    p.rolloff_Hz, p.rolloff_order = value["corner_Hz"], 1.0 if form == "first-order" else 2.0
+
+
+def _set_resonance(p: Any, form: str, value: dict[str, float]) -> None:
+    p.mount_resonance_Hz, p.mount_damping_ratio = value["resonance_Hz"], value["damping_ratio"]
+    if form == "mode":
+        p.mode_ratio = value["ratio"]
+        p.mount_resonance_Hz *= value["ratio"] > 0.0  # a mode that takes no part leaves a rigid mount
+
+
+def _set_sag(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.sag_ratio, p.sag_settling_s = value["ratio"], value.get("settling_s", 0.0)
+
+
+_MODE = (Parameter("resonance_Hz", 100.0, 1e6, 8000.0), Parameter("damping_ratio", 0.005, 2.0, 0.05))
+_SAG = ratio(0.2, -0.9, 0.9)
+PIEZO: Final = {
+    "piezo-roll-off": Effect(
+        "piezo",
+        {
+            "first-order": Form(
+                "amplitude / sqrt(1 + (f / corner_Hz)^2)", (Parameter("corner_Hz", 50.0, 1e7, 3000.0),)
+            ),
+            "second-order": Form("amplitude / (1 + (f / corner_Hz)^2)", (Parameter("corner_Hz", 50.0, 1e7, 5000.0),)),
+        },
+        _set_roll_off,
+        numbers=("rolloff_Hz", "rolloff_order"),
+    ),
+    "piezo-resonance": Effect(
+        "piezo",
+        {
+            "mount": Form(
+                "amplitude times the gain of a mass on a spring, instead of what the rig's own mount does", _MODE
+            ),
+            "mode": Form(
+                "amplitude times |1 + ratio r^2 / (1 - r^2 + 2 i damping_ratio r)|, r = f / resonance_Hz, likewise instead",
+                (ratio(0.3, 0.0, 10.0), *_MODE),
+            ),
+        },
+        _set_resonance,
+        numbers=("mode_ratio",),
+    ),
+    "piezo-sag": Effect(
+        "piezo",
+        {
+            "load": Form("amplitude times 1 - ratio |F_d| / F_s", (_SAG,)),
+            "heat": Form(
+                "amplitude times 1 - ratio (1 - exp(-t / settling_s)), t since the piezo was switched on",
+                (_SAG, Parameter("settling_s", 0.05, 1e4, 3.0)),
+            ),
+        },
+        _set_sag,
+        numbers=("sag_ratio", "sag_settling_s"),
+        switches=("sag_ratio",),
+        memory=(("vibrating_s", "f8"),),
+    ),
+}

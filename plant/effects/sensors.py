@@ -1,0 +1,121 @@
+"""Faults of the sensors: of the force, its gain, zero, lag and delay; of the accelerations, their gain."""
+
+import math
+from typing import Any, Final
+
+from bridge.kernel import Record, kernel
+from plant.effects.row import Effect, Form, Parameter, one_form, ratio
+
+LONGEST_DELAY: Final = 254  # samples; 12.7 ms at 20 kHz
+LAG_ORDERS: Final = {"first-order": 1, "second-order": 2, "fourth-order": 4}  # low-passes of a slow force sensor
+_DELAY_LINE = LONGEST_DELAY + 2  # the delayed sample, the one before it, the one of now
+
+
+@kernel
+def force_reading_N(p: Record, s: Record, force_N: float, t_s: float) -> float:
+    """What the force sensor's faults make of its signal; once a sample."""
+    if p.force_lag_s > 0.0:
+        share = 1.0 - math.exp(-p.dt_s * p.steps_per_sample / p.force_lag_s)
+        for i in range(int(p.force_lag_order)):
+            s.force_lag[i] += share * (force_N - s.force_lag[i])
+            force_N = s.force_lag[i]
+    if p.force_delay_s > 0.0:
+        s.delay_line[s.delay_at] = force_N
+        back = p.force_delay_s / (p.dt_s * p.steps_per_sample)
+        whole = math.floor(back)
+        newer = s.delay_line[(s.delay_at - int(whole)) % _DELAY_LINE]
+        older = s.delay_line[(s.delay_at - int(whole) - 1) % _DELAY_LINE]
+        force_N = newer + (back - whole) * (older - newer)
+        s.delay_at = (s.delay_at + 1) % _DELAY_LINE
+    offset_N = p.force_bias_N + p.force_drift_N_per_s * t_s
+    if p.force_settling_s > 0.0:
+        offset_N += p.force_drift_N * (1.0 - math.exp(-t_s / p.force_settling_s))
+    return force_N * (1.0 + p.force_ratio) + offset_N / p.force_gain  # which is applied to all of it, where it is read
+
+
+def _set_force_gain(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.force_ratio = value["ratio"]
+
+
+def _set_bias(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.force_bias_N = value["bias_N"]
+
+
+def _set_drift(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.force_drift_N_per_s = value.get("rate_N_per_s", 0.0)
+    p.force_drift_N, p.force_settling_s = value.get("drift_N", 0.0), value.get("settling_s", 0.0)
+
+
+def _set_lag(p: Any, form: str, value: dict[str, float]) -> None:
+    p.force_lag_s, p.force_lag_order = value["lag_s"], LAG_ORDERS[form]
+
+
+def _set_delay(p: Any, _form: str, value: dict[str, float]) -> None:
+    p.force_delay_s = value["delay_s"]
+
+
+def _set_accelerometer(p: Any, form: str, value: dict[str, float]) -> None:
+    p.mass_accel_ratio = 0.0 if form == "base" else value["ratio"]
+    p.base_accel_ratio = 0.0 if form == "mass" else value["ratio"]
+
+
+SENSORS: Final = {
+    "force-sensor-gain": Effect(
+        "sensor",
+        one_form("reading times 1 + ratio", ratio(0.05)),
+        _set_force_gain,
+        numbers=("force_ratio",),
+        switches=("force_ratio",),
+    ),
+    "force-sensor-bias": Effect(
+        "sensor",
+        one_form("reading plus bias_N", Parameter("bias_N", -1e5, 1e5, 0.5)),
+        _set_bias,
+        numbers=("force_bias_N",),
+        switches=("force_bias_N",),
+    ),
+    "force-sensor-drift": Effect(
+        "sensor",
+        {
+            "linear": Form("reading plus rate t", (Parameter("rate_N_per_s", -1e3, 1e3, 0.05),)),
+            "settling": Form(
+                "reading plus drift_N (1 - exp(-t / settling_s))",
+                (Parameter("drift_N", -1e5, 1e5, 0.5), Parameter("settling_s", 0.1, 1e4, 5.0)),
+            ),
+        },
+        _set_drift,
+        numbers=("force_drift_N_per_s", "force_drift_N", "force_settling_s"),
+        switches=("force_drift_N_per_s", "force_drift_N"),
+    ),
+    "force-sensor-lag": Effect(
+        "sensor",
+        {
+            "first-order": Form("reading through a first-order low-pass", (Parameter("lag_s", 0.0, 1.0, 1e-3),)),
+            "second-order": Form("reading through two equal low-passes", (Parameter("lag_s", 0.0, 1.0, 5e-4),)),
+            "fourth-order": Form("reading through four equal low-passes", (Parameter("lag_s", 0.0, 1.0, 2.5e-4),)),
+        },
+        _set_lag,
+        numbers=("force_lag_s", "force_lag_order"),
+        switches=("force_lag_s",),
+        memory=(("force_lag", "f8", (max(LAG_ORDERS.values()),)),),
+    ),
+    "force-sensor-delay": Effect(
+        "sensor",
+        one_form("reading comes delay_s later", Parameter("delay_s", 0.0, 0.012, 1e-3)),
+        _set_delay,
+        numbers=("force_delay_s",),
+        switches=("force_delay_s",),
+        memory=(("delay_line", "f8", (_DELAY_LINE,)), ("delay_at", "i8")),
+    ),
+    "accelerometer-gain": Effect(
+        "sensor",
+        {
+            "both": Form("both accelerations times 1 + ratio", (ratio(0.05),)),
+            "mass": Form("acceleration of the mass times 1 + ratio", (ratio(0.05),)),
+            "base": Form("acceleration of the base times 1 + ratio", (ratio(0.05),)),
+        },
+        _set_accelerometer,
+        numbers=("mass_accel_ratio", "base_accel_ratio"),
+        switches=("mass_accel_ratio", "base_accel_ratio"),
+    ),
+}

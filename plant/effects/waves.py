@@ -1,0 +1,36 @@
+"""Waves and smooth noise, which several effects are made of."""
+
+import math
+
+from bridge.kernel import kernel
+
+TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def _value(index: float, seed: float) -> float:
+    """A number of unit variance that belongs to a lattice point: the same on every machine, no generator needed."""
+    mixed = math.sin(index * 12.9898 + seed * 78.233) * 43758.5453
+    return (mixed - math.floor(mixed) - 0.5) * math.sqrt(12.0)
+
+
+@kernel
+def smooth_noise(at: float, seed: float) -> float:
+    """Noise with mean 0 and variance 1, smooth, with a new value at every whole number."""
+    index = math.floor(at)
+    share = at - index
+    share = share * share * (3.0 - 2.0 * share)
+    # the mean of (1 - share)^2 + share^2 over a cell is 26/35
+    return (_value(index, seed) * (1.0 - share) + _value(index + 1.0, seed) * share) / math.sqrt(26.0 / 35.0)
+
+
+@kernel
+def wave(angle_rad: float, second_sin: float, second_cos: float) -> float:
+    """A sine with its second harmonic."""
+    return with_second(math.sin(angle_rad), math.cos(angle_rad), second_sin, second_cos)
+
+
+@kernel
+def with_second(sin: float, cos: float, second_sin: float, second_cos: float) -> float:
+    """A sine with its second harmonic, from the sine and the cosine of its angle."""
+    return sin + second_sin * 2.0 * sin * cos + second_cos * (1.0 - 2.0 * sin * sin)
