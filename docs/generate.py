@@ -14,7 +14,8 @@ from cockpit import cli
 from cockpit.run.scenario import Scenario
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest import Manifest
-from plant.effects.library import EFFECTS, Form
+from plant.effects.library import EFFECTS
+from plant.effects.row import Form
 from plant.pairs import PAIRS
 
 FOLDER = Path(__file__).parent / "reference"

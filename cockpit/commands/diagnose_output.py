@@ -42,7 +42,7 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
 def in_a_line(outcome: "FolderResult") -> str:
     """What became of one folder among many."""
     if outcome.diagnosis is not None:
-        # the run that was kept aside unasked is no fault of the data
+        # the run that was held out unasked is no fault of the data
         doubts = sum(finding.kind != "holdout" for finding in outcome.diagnosis.findings)
         told = f"; {doubts} findings about its data, see --json" if doubts else ""
         return f"{outcome.source.name}: {words.headline(outcome.diagnosis)}{told}"

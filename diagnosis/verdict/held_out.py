@@ -198,7 +198,7 @@ class HeldOut:
 
 
 def _follows(table: Table) -> bool:
-    """Whether a prediction follows an effect through a run that was kept aside."""
+    """Whether a prediction follows an effect through a held-out run."""
     return table["form"] != RANDOM and not has_own_phases(table)
 
 

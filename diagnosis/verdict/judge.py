@@ -32,7 +32,7 @@ _MISMATCH_OF_ONE, _MISMATCH = 0.12, 0.012
 # amplifier that gives less above a knee, taken for a gain, 0.09.
 _EXACT = frozenset({"force-sensor-gain", "force-sensor-bias", "drive-stiffness"})
 _COST_OF_UNKNOWN = 4.0  # log evidence: effects of the library are likelier than others
-_REFUTED = 12.0  # log evidence by which `unexplained` is ahead of what the runs kept aside do not bear out
+_REFUTED = 12.0  # log evidence by which `unexplained` is ahead of what the held-out runs do not bear out
 # Log evidence by which `unexplained` is ahead of a load that varies at random over time where friction comes in bursts, as debris
 # does: what each of them scatters is alike.
 _IN_BURSTS = 2.5

@@ -25,7 +25,7 @@ _MISTAKEN_EFFECT = _Mistaken(0.0, 0.01, 0.01)
 _MISTAKEN_PAIR = _Mistaken(0.0, 0.04, 0.21)
 # Of 8 on development cases: what scatters may be bursts, or noise that nobody described.
 _MISTAKEN_RANDOM = _Mistaken(0.0, 0.25, 0.13)
-# Of a name that leaves more of the runs kept aside than right ones do, on top. Of four on opened cases and measured logs two
+# Of a name that leaves more of the held-out runs than right ones do, on top. Of four on opened cases and measured logs two
 # are right, both a slider's track.
 MISTAKEN_DOUBTFUL = _Mistaken(0.0, 0.25, 0.15)
 

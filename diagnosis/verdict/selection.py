@@ -97,7 +97,7 @@ class Contest:
         self._overturned = self.verdict is not found
 
     def refuted(self) -> Verdict:
-        """The verdict where the runs kept aside do not bear out what is named."""
+        """The verdict where the held-out runs do not bear out what is named."""
         return self._judged(refuted=True)
 
     def without_random(self) -> Verdict:
