@@ -20,7 +20,8 @@ from diagnosis.gap.floor import Floor, compress, floor_of, replicates
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Draw, Problem
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.hypotheses.trials import Trial, trials
+from diagnosis.hypotheses.starts import Trial
+from diagnosis.hypotheses.trials import trials
 from diagnosis.model.rig import Effects
 
 Floats = npt.NDArray[np.floating[Any]]

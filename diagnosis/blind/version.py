@@ -2,7 +2,8 @@
 
 Scores of different versions are never mixed, and a sealed set costs hours. So the hash covers the definitions that an answer
 depends on and no others: it changes with a number, a formula or a rule, and stays the same when a comment, a docstring or an
-import changes, a definition moves to another file, or the words and pictures of the report are improved.
+import changes, a definition moves to another file, or the words and pictures of the report or of
+the catalogue of effects are improved.
 """
 
 import ast
@@ -15,6 +16,8 @@ from pathlib import Path
 JUDGED = ("plant", "diagnosis")
 # scoring, the words and pictures of a finished answer, and the plant as a process
 NOT_JUDGED = ("diagnosis/blind", "diagnosis/report", "diagnosis/pictures", "plant/app.py", "plant/node.py")
+# of a row of `diagnosis.hypotheses.catalogue`: what words and pictures make of an answer
+_NOT_JUDGED_KEYWORDS = {"words", "shown_by", "shown_twice"}
 
 
 def tool_version(*further: str) -> str:
@@ -62,6 +65,8 @@ def _canonical(node: ast.AST) -> str:
     definition = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
     for name, field in ast.iter_fields(node):
         value = _without_docstring(field) if definition and name == "body" else field
+        if isinstance(node, ast.Call) and name == "keywords":
+            value = [keyword for keyword in node.keywords if keyword.arg not in _NOT_JUDGED_KEYWORDS]
         if value not in (None, []):
             parts.append(f"{name}={_text(value)}")
     return f"{type(node).__name__}({', '.join(parts)})"

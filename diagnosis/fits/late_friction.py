@@ -14,7 +14,7 @@ import numpy.typing as npt
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import Start, refits
-from diagnosis.hypotheses.trials import Trial
+from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]

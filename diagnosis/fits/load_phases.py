@@ -15,7 +15,7 @@ import numpy.typing as npt
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
 from diagnosis.fits.refits import Start
-from diagnosis.hypotheses.trials import Trial, wave_trial
+from diagnosis.hypotheses.starts import Trial, wave_trial
 from diagnosis.hypotheses.waves import Wave
 from diagnosis.model.per_run import PHASE, phase_of
 from diagnosis.processes import each

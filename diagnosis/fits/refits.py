@@ -11,7 +11,7 @@ from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Screened
 from diagnosis.hypotheses.hypothesis import Hypothesis
-from diagnosis.hypotheses.trials import Trial
+from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]

@@ -10,7 +10,7 @@ from diagnosis.fits.fit import Fit, step_within
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.gap.floor import KNEE
 from diagnosis.hypotheses.hypothesis import Hypothesis
-from diagnosis.hypotheses.trials import Trial
+from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]

@@ -19,7 +19,7 @@ from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.refits import Start, best_of_each, each_beside, refits
 from diagnosis.fits.screening import Origin, Screened, beside_origin
 from diagnosis.hypotheses.hypothesis import LEVELS, NOTHING, Hypothesis
-from diagnosis.hypotheses.trials import Trial
+from diagnosis.hypotheses.starts import Trial
 
 Floats = npt.NDArray[np.floating[Any]]
 _QUICK = 8  # trials of a screening that get two steps of a refit,

@@ -1,43 +1,9 @@
-"""Which residual is drawn over which variable for an effect, and how residuals and variables are labelled."""
+"""How residuals and variables are labelled, and what a residual is drawn over where no effect says so."""
 
 from typing import Final, NamedTuple
 
-Over = tuple[str, str]  # residual, variable
-BREAKAWAY = "breakaway"
-_FRICTION: Final = (("friction", "velocity_mps"),)
-_LATE: Final = (("spring", "extension_rate_mps"), ("curvature", "acceleration_mps2"))
-_SPRING: Final = (("spring", "extension_m"), ("curvature", "acceleration_mps2"))
-_EXCITER: Final = (("exciter", "frequency_Hz"),)
-# first what shows the effect best; the next where its channels are missing
-SHOWN_BY: Final[dict[str, tuple[Over, ...]]] = {
-    "static-friction-ageing": ((BREAKAWAY, "dwell_s"),),
-    "static-level": ((BREAKAWAY, "dwell_s"),),
-    "position-dependent-friction": (("friction", "position_m"), (BREAKAWAY, "position_m"), (BREAKAWAY, "time_s")),
-    "normal-load-fluctuation": (("friction", "time_s"), (BREAKAWAY, "time_s")),
-    "friction-drift": ((BREAKAWAY, "time_s"), ("friction", "time_s")),
-    "direction-dependent-friction": ((BREAKAWAY, "direction"), *_FRICTION),
-    "frictional-lag": _FRICTION,
-    "viscous-friction": _FRICTION,
-    "coulomb-level": _FRICTION,
-    "stribeck-velocity": _FRICTION,
-    "drive-damping": _LATE,
-    "drive-stiffness": _SPRING,
-    "drive-hardening": _SPRING,
-    "drive-backlash": _SPRING,
-    "drive-speed-ripple": (("drive", "drive_position_m"), (BREAKAWAY, "time_s")),
-    "frame-compliance": _LATE,
-    "base-compliance": _FRICTION,
-    "piezo-roll-off": _EXCITER,
-    "piezo-resonance": _EXCITER,
-    "piezo-sag": (("exciter", "force_N"), ("exciter", "time_s")),
-    "force-sensor-gain": _SPRING,
-    "force-sensor-bias": _FRICTION,
-    "force-sensor-drift": (("spring", "time_s"), (BREAKAWAY, "time_s")),
-    "force-sensor-lag": _LATE,
-    "force-sensor-delay": _LATE,
-    "accelerometer-gain": (("motion", "acceleration_mps2"), ("curvature", "acceleration_mps2"), *_EXCITER),
-}
-SHOWN_TWICE: Final = {"piezo-sag"}  # its two formulas show over different variables
+from diagnosis.hypotheses.catalogue_row import BREAKAWAY
+
 USUALLY_OVER: Final = {
     "spring": "extension_m",
     "curvature": "acceleration_mps2",

@@ -8,7 +8,9 @@ import numpy.typing as npt
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.gap.prepare import Prepared
-from diagnosis.pictures.axes import BREAKAWAY, SHOWN_BY, SHOWN_TWICE, TITLES, USUALLY_OVER, Over, X, Y
+from diagnosis.hypotheses.catalogue import CATALOGUE
+from diagnosis.hypotheses.catalogue_row import BREAKAWAY, Over
+from diagnosis.pictures.axes import TITLES, USUALLY_OVER, X, Y
 from diagnosis.pictures.breakaways import breakaways
 from diagnosis.pictures.channel_relations import parity_residuals
 from diagnosis.pictures.cycles import Style
@@ -51,8 +53,9 @@ def residual_pictures(
     """
     wanted: list[Over] = []
     for effect in effects:
-        possible = [over for over in SHOWN_BY[effect] if any(len(one.x) for one in _all(rig, runs, scales, over))]
-        wanted += [over for over in possible[: 2 if effect in SHOWN_TWICE else 1] if over not in wanted]
+        row = CATALOGUE[effect]
+        possible = [over for over in row.shown_by if any(len(one.x) for one in _all(rig, runs, scales, over))]
+        wanted += [over for over in possible[: 2 if row.shown_twice else 1] if over not in wanted]
     for over in _standing_out(rig, runs):
         if len(wanted) < max(2, len(effects) + 1) and over[0] not in {residual for residual, _ in wanted}:
             wanted.append(over)

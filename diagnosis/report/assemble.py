@@ -21,7 +21,7 @@ from diagnosis.gap.measure import DEFINITION, cell_names, cell_squares, differen
 from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import Coordinate
-from diagnosis.hypotheses.trials import Trial
+from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.pictures.choice import pictures
 from diagnosis.report.summary import summary

@@ -4,35 +4,10 @@ import math
 from typing import Final
 
 from bridge.units import decimals_of, fixed_digits, name_and_unit, percent, prefixed, times
+from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.result import Diagnosis, Estimate
 
-EFFECT_WORDS: Final = {
-    "static-friction-ageing": "the longer the contact rests, the more force it takes to break it away",
-    "frictional-lag": "friction follows a change of speed a little late",
-    "viscous-friction": "friction grows with speed, as with thick oil",
-    "position-dependent-friction": "friction changes along the way, and is the same again at the same place",
-    "direction-dependent-friction": "friction differs between forward and backward",
-    "normal-load-fluctuation": "what presses the surfaces together goes up and down",
-    "friction-drift": "friction wanders slowly over the run, as with running in or warming up",
-    "coulomb-level": "sliding friction is further from the described value than its tolerance allows",
-    "static-level": "breakaway friction is further from the described value than its tolerance allows",
-    "stribeck-velocity": "the speed over which friction falls is further from the described value than its tolerance allows",
-    "drive-damping": "the drive damps its own oscillation, as a rubber coupling does",
-    "drive-stiffness": "the drive is stiffer or softer than its tolerance allows",
-    "drive-hardening": "the drive becomes stiffer or softer the further it is loaded",
-    "drive-backlash": "play in the drive: it moves a little without any force when the load changes sign",
-    "drive-speed-ripple": "the drive runs unevenly, for example once a turn of its screw",
-    "frame-compliance": "what holds the drive yields and swings",
-    "base-compliance": "what holds the base yields and swings",
-    "piezo-roll-off": "the piezo moves less than commanded at high frequency",
-    "piezo-resonance": "the piezo moves more than commanded near its own resonance",
-    "piezo-sag": "the piezo moves less than commanded under load or when warm",
-    "force-sensor-gain": "the force sensor reads too much or too little by a constant share",
-    "force-sensor-bias": "the force sensor reads too much or too little by a constant force",
-    "force-sensor-drift": "the zero of the force sensor wanders",
-    "force-sensor-lag": "the force sensor smooths: its reading creeps after the force",
-    "force-sensor-delay": "the force reading comes late but unchanged",
-    "accelerometer-gain": "the accelerometer reads too much or too little by a constant share",
+EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "none": "the rig as described, inside its tolerances, is enough",
     "unexplained": "there is a gap, and nothing in the library closes it",
 }

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.screening import Directions
-from diagnosis.hypotheses.trials import Trial
+from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
 from diagnosis.verdict.held_out import HeldOut
 

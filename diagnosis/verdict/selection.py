@@ -20,7 +20,7 @@ from diagnosis.fits.screening import Origin, screened
 from diagnosis.fits.search import middle_fits, pairs_of_effects, pairs_with, refitted, refitted_rest
 from diagnosis.gap.floor import KNEE
 from diagnosis.hypotheses.hypothesis import NOTHING
-from diagnosis.hypotheses.trials import Trial
+from diagnosis.hypotheses.starts import Trial
 from diagnosis.verdict.judge import COST_OF_EFFECT, Verdict, judge, of_another_place, refittable
 
 Progress = Callable[[str, float], None]

@@ -20,6 +20,9 @@ class Fit:
     """A fit."""
 
     chi2 = 0.0
+
+
+ROW = Row(words="it rests", shown_by=("friction", "time_s"), forms={"": 0.1})
 '''
 
 
@@ -39,6 +42,8 @@ def digest(tmp_path, **files: str) -> str:
         ("Say what it does.", "Say it better."),
         ('    """A fit."""\n', ""),
         ("import math", "import math\nimport os"),
+        ("it rests", "it sleeps"),
+        ('"time_s"', '"position_m"'),
     ],
 )
 def test_words_do_not_change_the_version(tmp_path, old, new):
@@ -47,7 +52,8 @@ def test_words_do_not_change_the_version(tmp_path, old, new):
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [("3.0", "3.1"), ("* LIMIT", "/ LIMIT"), ("chi2 = 0.0", "chi2 = 0"), ("-> float", "-> int")]
+    ("old", "new"),
+    [("3.0", "3.1"), ("* LIMIT", "/ LIMIT"), ("chi2 = 0.0", "chi2 = 0"), ("-> float", "-> int"), ("0.1}", "0.2}")],
 )
 def test_what_is_computed_changes_the_version(tmp_path, old, new):
     assert old in BEFORE

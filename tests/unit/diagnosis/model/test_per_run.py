@@ -10,7 +10,8 @@ from diagnosis.gap.floor import floor_of, replicates
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.nuisances import Nuisances
-from diagnosis.hypotheses.trials import trials, wave_trial
+from diagnosis.hypotheses.starts import wave_trial
+from diagnosis.hypotheses.trials import trials
 from diagnosis.hypotheses.waves import Wave
 from diagnosis.model.per_run import as_in_rig_file, has_own_phases, in_run, is_phase, phase_of
 from diagnosis.model.rig import Roughness

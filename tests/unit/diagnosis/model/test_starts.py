@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.ringing import ringing_Hz
-from diagnosis.hypotheses.trials import wave_trial
+from diagnosis.hypotheses.starts import wave_trial
 from diagnosis.hypotheses.waves import Wave, drive_waves, friction_series, friction_waves_beside, two_friction_waves
 from diagnosis.model.predict import predict
 from diagnosis.model.rig import rig_config

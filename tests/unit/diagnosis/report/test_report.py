@@ -259,12 +259,6 @@ def test_an_estimate_in_words(name, estimate, words):
     assert in_words.estimate_in_words(name, estimate) == words
 
 
-def test_every_effect_of_the_library_has_words():
-    from plant.effects.library import EFFECTS
-
-    assert in_words.EFFECT_WORDS.keys() >= EFFECTS.keys()
-
-
 def test_what_is_nearly_sure_is_not_certain():
     assert [units.percent(share) for share in (0.0, 1e-4, 0.004, 0.93, 0.996, 0.9999, 1.0, NAN, None)] == [
         "0 %",

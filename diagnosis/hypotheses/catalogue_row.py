@@ -1,0 +1,60 @@
+"""What the diagnosis has to know of an effect beside its physics, and the words that several rows share."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from diagnosis.hypotheses.scales import Scale, Sizes
+from diagnosis.hypotheses.starts import Starts, at_scale
+
+
+@dataclass(frozen=True)
+class Tried:
+    """How a form is tried. What `scale` leaves out stays at its default."""
+
+    scale: Callable[[Sizes], dict[str, Scale]]  # of the free parameters, on a rig of these sizes
+    starts: Starts = at_scale
+
+
+Over = tuple[str, str]  # a residual, and the variable that it is drawn over: names of `pictures.axes`
+
+
+class Row(NamedTuple):
+    """An effect in the diagnosis."""
+
+    words: str  # what it means on a machine
+    shown_by: tuple[Over, ...]  # what shows it best; the next where its channels are missing
+    forms: dict[str, Tried]
+    check: str = ""  # by hand; else that of the place where it acts
+    check_against: dict[str, str] = {}  # what tells it from another effect by hand; stands in the row of one of the two
+    shown_twice: bool = False  # its formulas show over different variables: the first two are drawn
+
+
+BREAKAWAY: Final = "breakaway"
+OVER_SPEED: Final = (("friction", "velocity_mps"),)
+OF_RATE: Final = (("spring", "extension_rate_mps"), ("curvature", "acceleration_mps2"))
+OF_EXTENSION: Final = (("spring", "extension_m"), ("curvature", "acceleration_mps2"))
+OF_EXCITER: Final = (("exciter", "frequency_Hz"),)
+
+WEIGHT: Final = "Hang a known weight on the force sensor, and read it empty: its gain and its zero are then known."
+ZERO: Final = "Unload the force sensor and read it for ten minutes: a zero that wanders is seen at once."
+TAP: Final = (
+    "Hold the mass still and tap the drive with a small hammer: a late or smoothed force reading shows against the "
+    "accelerometer, damping and compliance of the drive as ringing."
+)
+FRAME: Final = (
+    "Put an accelerometer on what holds the drive, then on the base, and tap: what swings there is seen directly."
+)
+SHAKER: Final = "Put both accelerometers on one calibrated shaker, or turn them over: gravity makes 2 g of difference."
+SWEEP: Final = (
+    "Sweep the piezo from 0.5 to 5 kHz at rest and look at the base accelerometer: it shows what is delivered."
+)
+DRIVE: Final = (
+    "Measure the drive position with a second sensor, unloaded: an uneven drive is uneven without the mass, too."
+)
+TRACK: Final = (
+    "Drag along the same track twice, the second time at another speed: what belongs to the place comes back there."
+)
+SPEEDS: Final = "Drag at 0.2, 1 and 5 times the present speed, and hold the drive for 1, 10 and 60 s in between."
+REVERSE: Final = "Drag to and fro over the same track."
+REPEAT: Final = "Repeat one run unchanged after a pause of ten minutes: what drifts does not come back."
