@@ -8,7 +8,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo test check docs reference bench blind real bless lock proto clean
+.PHONY: demo test check docs reference bench blind real bless lock proto schemas clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -60,6 +60,9 @@ lock: ## needs uv
 
 proto: $(READY) ## after a change of bridge/wire/stickslip.proto
 	$(BIN)/python -m grpc_tools.protoc -I bridge/wire --python_out=bridge/wire --pyi_out=bridge/wire bridge/wire/stickslip.proto
+
+schemas: $(READY) ## after a change of a format
+	$(BIN)/stickslip schema --out deploy/schemas
 
 clean:
 	rm -rf $(VENV) runs

@@ -19,6 +19,7 @@ from cockpit.commands.processes import controller, operator_stop, plant, record
 from cockpit.commands.replay import replay_command
 from cockpit.commands.run import run
 from cockpit.commands.scenarios import scenarios
+from cockpit.commands.schema import schema
 
 app = typer.Typer(
     cls=JsonGroup,
@@ -87,6 +88,7 @@ app.add_typer(
 app.add_typer(blind_app, name="blind")
 app.command("reproduce")(reproduce)
 app.command("scenarios")(scenarios)
+app.command("schema")(schema)
 app.command("explain")(explain)
 
 

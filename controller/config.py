@@ -22,27 +22,40 @@ class OnsetConfig(Strict):
 
     # Window of the slope of the force. Shorter: noise looks like stick. Longer: stick is seen late.
     # A slope is five sigma in (300 sigma^2 / (f_s (k_d v_d)^2))^(1/3) = 9 ms at 20 mN and 5.85 N/s; the default is twice that.
-    window_s: Positive = 0.02
-    velocity_window_s: Positive = 0.04  # window of the slope of the drive position, v_d
-    stick_force_rate: Annotated[float, Field(gt=0, lt=1)] = 0.5  # share of k_d v_d above which the contact sticks
+    window_s: Positive = Field(default=0.02, description="Window of the slope of the force.")
+    velocity_window_s: Positive = Field(default=0.04, description="Window of the slope of the drive position, v_d.")
+    stick_force_rate: Annotated[float, Field(gt=0, lt=1)] = Field(
+        default=0.5, description="Share of k_d v_d above which the contact sticks."
+    )
     # Fall of the force over 3 ms that makes a slip: 0.5 N on the paper's rig. Smaller: noise (0.01 N) counts. Larger: small slips
     # do not.
-    slip_drop_N: Positive = 0.15
-    slip_burst_mps2: Positive = 0.2  # rms of the slide's acceleration that confirms a slip; the paper's rig reaches 2.6
-    standstill_mps: Positive = 2e-5  # drive velocity up to which the drive stands
-    breakaway_force_N: NotNegative = 0.0  # 0: learnt from the measured slips
+    slip_drop_N: Positive = Field(default=0.15, description="Fall of the force over 3 ms that makes a slip.")
+    slip_burst_mps2: Positive = Field(  # the paper's rig reaches 2.6
+        default=0.2, description="Rms of the slide's acceleration that confirms a slip."
+    )
+    standstill_mps: Positive = Field(default=2e-5, description="Drive velocity up to which the drive stands.")
+    breakaway_force_N: NotNegative = Field(default=0.0, description="0: learnt from the measured slips.")
 
 
 class PolicyConfig(Strict):
     """When to vibrate and when to stop."""
 
-    enabled_from_s: NotNegative = 0.0  # from the start of the run
-    gentle_ratio: Annotated[float, Field(ge=1.05, le=1.5)] = 1.12  # v_a / v_d while breakaway is near
+    enabled_from_s: NotNegative = Field(default=0.0, description="From the start of the run.")
+    gentle_ratio: Annotated[float, Field(ge=1.05, le=1.5)] = Field(
+        default=1.12, description="v_a / v_d while breakaway is near."
+    )
     # Shares of the breakaway force from which a vibration starts gently, or not at all. Larger: the vibration causes the slip
     # that it should prevent (above 0.85 on the paper's rig). Smaller: the controller waits out more slips.
-    gentle_from: Share = 0.8
-    too_late_from: Share = 0.85
-    probe_every_s: Positive = 30.0  # doubles with every probe that finds the vibration still needed
+    gentle_from: Share = Field(
+        default=0.8, description="Share of the breakaway force from which a vibration starts gently."
+    )
+    too_late_from: Share = Field(
+        default=0.85, description="Share of the breakaway force from which no vibration starts."
+    )
+    probe_every_s: Positive = Field(
+        default=30.0,
+        description="Doubles with every probe that finds the vibration still needed, up to probe_every_max_s.",
+    )
     probe_every_max_s: Positive = 600.0
     probe_fade_s: Positive = 0.5
     probe_hold_s: Positive = 3.0
@@ -53,24 +66,31 @@ class AmplitudeConfig(Strict):
 
     # Share of the logarithmic error that one block corrects. Larger: the loop rings. Smaller: it settles late.
     # Phase margin 60 degrees and gain margin 6.3 with this filter and commands 2 blocks late: controller/loop_design.py.
-    gain: Positive = 0.0826
-    filter_s: Positive = 0.005  # time constant of the demodulated amplitude
-    accel_bandwidth_Hz: Positive = 10000.0  # of the base accelerometer; its roll-off at f is corrected
+    gain: Positive = Field(default=0.0826, description="Share of the logarithmic error that one block corrects.")
+    filter_s: Positive = Field(default=0.005, description="Time constant of the demodulated amplitude.")
+    accel_bandwidth_Hz: Positive = Field(
+        default=10000.0,
+        description="Of the base accelerometer; its roll-off at the vibration's frequency is corrected.",
+    )
 
 
 class LimitsConfig(Strict):
     """Limits that no policy can exceed, and the set point of v_a / v_d."""
 
-    v_ratio: Annotated[float, Field(ge=1.05, le=3.0)] = 1.2
+    v_ratio: Annotated[float, Field(ge=1.05, le=3.0)] = Field(default=1.2, description="Set point of v_a / v_d.")
     amplitude_max_m: Positive = 1e-7
     velocity_max_mps: Positive = 5e-3
     slew_m_per_s: Positive = 1e-6
     frequency_min_Hz: Positive = 500.0
     frequency_max_Hz: Positive = 5000.0
     # the carrier of the displacement transducers is 4.8 kHz: a vibration near it beats with it
-    forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = [(4600.0, 5000.0)]
+    forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
+        default=[(4600.0, 5000.0)], description="Bands [low, high] in which nothing is vibrated."
+    )
     # silence after which the vibration ramps down: longer vibrates a rig that has frozen, shorter ramps down for a late block
-    stale_after_s: Annotated[float, Field(gt=0, le=5.0)] = 0.02
+    stale_after_s: Annotated[float, Field(gt=0, le=5.0)] = Field(
+        default=0.02, description="Silence after which the vibration ramps down."
+    )
 
 
 class ControllerConfig(Strict):
@@ -79,7 +99,9 @@ class ControllerConfig(Strict):
     block_s: Positive = 1e-3
     samples_per_block: Annotated[int, Field(ge=4, le=200)] = 20
     drive_stiffness_N_per_m: Positive = 11700.0
-    contact_resonance_Hz: NotNegative = 1144.0  # sqrt(k_t / m) / 2 pi of the steel pair
+    contact_resonance_Hz: NotNegative = Field(
+        default=1144.0, description="sqrt(k_t / m) / 2 pi of the contact; the vibration keeps above 2.2 times this."
+    )
     onset: OnsetConfig = OnsetConfig()
     policy: PolicyConfig = PolicyConfig()
     amplitude: AmplitudeConfig = AmplitudeConfig()

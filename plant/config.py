@@ -22,21 +22,28 @@ _FEWEST_STEPS_A_PERIOD = 20
 class ContactConfig(Strict):
     """The friction pair. `pair` fills in the numbers of a known pair; each number may be overridden."""
 
-    pair: str = ""
+    pair: str = Field(default="", description="A known pair, which fills in the numbers.")
     stiffness_N_per_m: Positive
     damping_Ns_per_m: NotNegative
     viscous_damping_Ns_per_m: NotNegative = 0.0
     coulomb_force_N: Positive
     static_force_N: Positive
     stribeck_velocity_mps: Positive = 0.0005  # source [15] of the paper; the same for every pair
-    # share of the Stribeck curve that falls with 1 / (1 + q^2), q = v / v_s (Hess and Soom 1990); the rest falls with exp(-q^2)
-    stribeck_tail: Annotated[float, Field(ge=-2, le=2)] = 0.0
+    stribeck_tail: Annotated[float, Field(ge=-2, le=2)] = Field(  # Hess and Soom 1990
+        0.0,
+        description="Share of the Stribeck curve that falls with 1 / (1 + q^2), q = v / v_s; the rest with exp(-q^2).",
+    )
     backbone: Literal["lugre", "elasto-plastic"] = "lugre"
-    elastic_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.7  # elasto-plastic: elastic up to this share of its reach
-    # rough surface: rms scatter of friction along the track, over the mean; the length of one value; the seed of the track
-    roughness_ratio: Annotated[float, Field(ge=0, le=0.3)] = 0.0
-    roughness_length_m: Positive = 2e-4
-    roughness_seed: Annotated[int, Field(ge=0, le=1_000_000)] = 0
+    elastic_ratio: Annotated[float, Field(ge=0, lt=1)] = Field(
+        default=0.7, description="Of the elasto-plastic backbone: elastic up to this share of its reach."
+    )
+    roughness_ratio: Annotated[float, Field(ge=0, le=0.3)] = Field(
+        default=0.0, description="Rough surface: rms scatter of friction along the track, over the mean."
+    )
+    roughness_length_m: Positive = Field(default=2e-4, description="Rough surface: length of one value.")
+    roughness_seed: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
+        default=0, description="Rough surface: which track."
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -68,7 +75,9 @@ class DriveConfig(Strict):
 
     stiffness_N_per_m: Positive = 11700.0
     damping_Ns_per_m: NotNegative = 0.0
-    profile: Annotated[list[Two], Field(min_length=1)] = [(0.0, 0.0005)]
+    profile: Annotated[list[Two], Field(min_length=1)] = Field(
+        default=[(0.0, 0.0005)], description="[[time_s, velocity_mps], ...], linear in between."
+    )
 
     @model_validator(mode="after")
     def _time_goes_forward(self) -> "DriveConfig":
@@ -86,11 +95,13 @@ class PiezoConfig(Strict):
     amplitude_max_m: Positive = 1e-7
     frequency_min_Hz: Positive = 500.0
     frequency_max_Hz: Positive = 5000.0
-    # 1 um/s reaches the paper's 0.02 um in 20 ms; 0 means at once, as in the paper's own calculation
-    amplitude_slew_m_per_s: NotNegative = 1e-6
+    # 1 um/s reaches the paper's 0.02 um in 20 ms
+    amplitude_slew_m_per_s: NotNegative = Field(
+        default=1e-6, description="0: at once, as in the paper's own calculation."
+    )
     command_timeout_s: Annotated[float, Field(gt=0, le=5.0)] = 0.05
     delivered_ratio: Positive = 1.0
-    mount_resonance_Hz: NotNegative = 0.0  # 0: rigid mount
+    mount_resonance_Hz: NotNegative = Field(default=0.0, description="0: a rigid mount.")
     mount_damping_ratio: Positive = 0.05
 
 
@@ -132,9 +143,7 @@ class RigConfig(Strict):
     piezo: PiezoConfig = PiezoConfig()
     sensors: SensorsConfig = SensorsConfig()
     solver: SolverConfig = SolverConfig()
-    effects: dict[
-        str, dict[str, float | str]
-    ] = {}  # [effects.NAME] as in plant/effects/library.py; none: the nominal rig
+    effects: dict[str, dict[str, float | str]] = Field(default={}, description="[effects.NAME]; none: the ideal rig.")
 
     # before pydantic, which gives two errors for a value that is neither a number nor a word
     @model_validator(mode="before")

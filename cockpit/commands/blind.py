@@ -3,7 +3,7 @@
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -42,6 +42,13 @@ def blind_make(as_json: Json = None) -> None:
     carry_out(work, as_json)
 
 
+class SetDone(NamedTuple):
+    """A set of which every case has a result."""
+
+    folder: str
+    diagnosed: int  # cases that had none before
+
+
 @blind_app.command("run")
 def blind_run(folder: SetArgument, jobs: Jobs = None, as_json: Json = None) -> None:
     """Diagnose every case that has no result yet, without the key. It can be stopped and taken up again."""
@@ -60,7 +67,7 @@ def blind_run(folder: SetArgument, jobs: Jobs = None, as_json: Json = None) -> N
                 left_min = (time.monotonic() - began) / done * (todo - done) / 60.0
                 progress(f"{done} of {todo}, {left_min:.0f} min left: {in_a_line(outcome)}", done / todo)
         words = [f"all cases have results    {folder}", f"next    stickslip blind score {folder} --key KEY"]
-        tell(as_json, {"set": folder, "diagnosed": todo}, words)
+        tell(as_json, SetDone(str(folder), todo), words)
 
     carry_out(work, as_json)
 

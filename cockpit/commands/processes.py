@@ -34,6 +34,19 @@ class Served(NamedTuple):
         return f"{self.role:<8} {self.blocks} blocks on {self.endpoint}"
 
 
+class Recorded(NamedTuple):
+    """What `record` wrote."""
+
+    log: str
+
+
+class Taken(NamedTuple):
+    """A word that a controller took."""
+
+    endpoint: str
+    taken: str  # the word, and whose it was
+
+
 def plant(
     scenario: ScenarioName = DEFAULT_SCENARIO,
     settings: Settings = [],  # noqa: B006
@@ -117,7 +130,7 @@ def record(
 
         about, stop = about_run(made, lockstep), stop_event(child)
         record_all(path, made.bus, ["plant", "controller"], about, lockstep, stop, ready)
-        tell(as_json, {"log": path}, [f"log      {path}"])
+        tell(as_json, Recorded(str(path)), [f"log      {path}"])
 
     carry_out(work, as_json)
 
@@ -138,6 +151,6 @@ def operator_stop(
 
         made = load_scenario(scenario, as_settings([], None, endpoint, prefix))
         taken = say(made.bus, wire.Operator.RESET if reset else wire.Operator.STOP)
-        tell(as_json, {"endpoint": made.bus.endpoint, "taken": taken}, [f"taken    {taken}"])
+        tell(as_json, Taken(made.bus.endpoint, taken), [f"taken    {taken}"])
 
     carry_out(work, as_json)

@@ -1,6 +1,15 @@
 """`stickslip scenarios`: what comes with the project."""
 
+from typing import NamedTuple
+
 from cockpit.commands.json_option import Json, carry_out, tell
+
+
+class Known(NamedTuple):
+    """What there is."""
+
+    scenarios: dict[str, str]  # with what each is about
+    rigs: list[str]
 
 
 def scenarios(as_json: Json = None) -> None:
@@ -16,6 +25,6 @@ def scenarios(as_json: Json = None) -> None:
         }
         rigs = [path.stem for path in sorted(deploy_folder().glob("rigs/*.toml"))]
         words = [f"{name:<24} {description}" for name, description in found.items()]
-        tell(as_json, {"scenarios": found, "rigs": rigs}, [*words, f"rigs: {', '.join(rigs)}"])
+        tell(as_json, Known(found, rigs), [*words, f"rigs: {', '.join(rigs)}"])
 
     carry_out(work, as_json)

@@ -44,7 +44,9 @@ _ASSUMED_TOLERANCE = 0.3  # relative, of the numbers that follow from it: 3.3 st
 class SourceMap(Strict):
     """How the source file is written."""
 
-    sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = None  # where no column holds the time
+    sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = Field(
+        default=None, description="Where no column holds the time."
+    )
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] = ","
     decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
     skip_rows: Annotated[int, Field(ge=0)] = 0
@@ -63,7 +65,7 @@ class ImportMap(Strict):
 
     source: SourceMap = SourceMap()
     channels: dict[str, ChannelMap]
-    rig: dict[str, Any] = {}  # as in manifest.toml; only an evidence folder needs it
+    rig: dict[str, Any] = Field(default={}, description="As in manifest.toml; only an evidence folder needs it.")
     run: RunMap = RunMap()
 
     @model_validator(mode="after")

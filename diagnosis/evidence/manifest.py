@@ -44,15 +44,17 @@ class RigTable(Strict):
 
     drive: Literal["spring", "force"]
     mass_kg: Positive
-    drive_stiffness_N_per_m: Positive | None = None  # with drive = "spring" only
-    drive_damping_Ns_per_m: NotNegative | None = None  # with drive = "spring" only
+    drive_stiffness_N_per_m: Positive | None = Field(default=None, description='With drive = "spring" only.')
+    drive_damping_Ns_per_m: NotNegative | None = Field(default=None, description='With drive = "spring" only.')
     contact_stiffness_N_per_m: Positive
     contact_damping_Ns_per_m: NotNegative
     viscous_damping_Ns_per_m: NotNegative
     coulomb_force_N: Positive
     static_force_N: Positive
     stribeck_velocity_mps: Positive
-    tolerance: dict[str, float] = {}  # one standard deviation, relative; a number without a tolerance is known exactly
+    tolerance: dict[str, float] = Field(
+        default={}, description="One standard deviation, relative; a number without a tolerance is known exactly."
+    )
 
     @model_validator(mode="after")
     def _fits_together(self) -> "RigTable":

@@ -1,0 +1,249 @@
+"""Every TOML and JSON format of the project by name, each with its JSON Schema."""
+
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple, NotRequired
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+class Format(NamedTuple):
+    """One kind of file or result."""
+
+    name: str
+    about: str
+    make: Callable[[], dict[str, Any]]
+
+    def schema(self) -> dict[str, Any]:
+        """Its JSON Schema."""
+        return {"$schema": DIALECT, "title": self.name} | _untitled(self.make()) | {"description": self.about}
+
+
+def _untitled(schema: Any) -> Any:
+    """Without the titles that pydantic makes of the names."""
+    if isinstance(schema, list):
+        return [_untitled(one) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {key: _untitled(one) for key, one in schema.items() if key != "title" or not isinstance(one, str)}
+
+
+# TOML: the models check more than a schema can say, and a schema takes whatever they take
+
+
+def _rig() -> dict[str, Any]:
+    from plant.config import RigConfig
+
+    schema = RigConfig.model_json_schema()
+    contact = schema["$defs"]["ContactConfig"]
+    contact["anyOf"] = [{"required": ["pair"]}, {"required": contact.pop("required")}]
+    return _with_pairs_and_effects(schema)
+
+
+def _scenario() -> dict[str, Any]:
+    from cockpit.run.scenario import Scenario
+
+    schema = Scenario.model_json_schema()
+    known = schema["$defs"]
+    # `file` names a rig, and any key beside it overrides one of that rig
+    del known["ContactConfig"]["required"], known["RigConfig"]["required"]
+    file = {"type": "string", "description": "Name of a rig in deploy/rigs, or a .toml file; keys beside it override."}
+    known["RigConfig"]["properties"] = {"file": file} | known["RigConfig"]["properties"]
+    return _with_pairs_and_effects(schema)
+
+
+def _with_pairs_and_effects(schema: dict[str, Any]) -> dict[str, Any]:
+    from plant.effects.library import EFFECTS, Form
+    from plant.pairs import PAIRS
+
+    def form(name: str, formula: Form, first: bool) -> dict[str, Any]:
+        numbers = {
+            row.name: {"type": "number", "minimum": row.low, "maximum": row.high, "default": row.default}
+            for row in formula.parameters
+        }
+        needed = {} if first else {"required": ["form"]}
+        word = {"const": name, "description": formula.formula}
+        return {"type": "object", "properties": {"form": word} | numbers, "additionalProperties": False} | needed
+
+    schema["$defs"]["ContactConfig"]["properties"]["pair"]["enum"] = ["", *PAIRS]
+    rig = schema["$defs"].get("RigConfig", schema)
+    rig["properties"]["effects"] |= {
+        "properties": {
+            name: {"anyOf": [form(*item, first=number == 0) for number, item in enumerate(effect.forms.items())]}
+            for name, effect in EFFECTS.items()
+        },
+        "additionalProperties": False,
+    }
+    return schema
+
+
+def _controller() -> dict[str, Any]:
+    from controller.config import ControllerConfig
+
+    return ControllerConfig.model_json_schema()
+
+
+def _evidence() -> dict[str, Any]:
+    from diagnosis.evidence.manifest import Manifest
+
+    schema = Manifest.model_json_schema()
+    return _with_channels(schema)
+
+
+def _import_map() -> dict[str, Any]:
+    from diagnosis.evidence.import_table import ImportMap
+    from diagnosis.evidence.manifest import RigTable
+
+    schema = ImportMap.model_json_schema()
+    rig = RigTable.model_json_schema()
+    del rig["required"]  # an import into a log needs none, and what an owner can hardly know is assumed
+    schema["$defs"]["RigTable"] = rig
+    schema["properties"]["rig"] = {"$ref": "#/$defs/RigTable"}
+    return _with_channels(schema)
+
+
+def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
+    from diagnosis.evidence.manifest import STANDARD, RigTable
+
+    column = {"type": "string", "minLength": 1, "description": "The column alone."}
+    channel = {"anyOf": [column, {"$ref": "#/$defs/ChannelMap"}]}
+    channels = schema["properties"]["channels"]
+    channels |= {"properties": dict.fromkeys(STANDARD, channel), "additionalProperties": False}
+    numbers = [name for name in RigTable.model_fields if name not in {"drive", "tolerance"}]
+    tolerance = schema["$defs"]["RigTable"]["properties"]["tolerance"]
+    share = {"type": "number", "minimum": 0.0, "maximum": 1.0}
+    tolerance |= {"properties": dict.fromkeys(numbers, share), "additionalProperties": False}
+    return schema
+
+
+# JSON: from the types of the results
+
+
+def _diagnosis_type() -> Any:
+    from cockpit.commands.json_types import table
+    from diagnosis.result import FORMAT, Candidate, Diagnosis, Estimate
+
+    candidate = table(Candidate, {"form": NotRequired[str], "parameters": NotRequired[dict[str, Estimate]]})
+    return table(Diagnosis, {"format": Literal[FORMAT], "candidates": list[candidate]}, left_out=("pictures",))
+
+
+def _diagnosis() -> dict[str, Any]:
+    from cockpit.commands.json_types import schema_of
+
+    return schema_of(_diagnosis_type())
+
+
+def _diagnoses() -> dict[str, Any]:
+    from cockpit.commands.diagnose_output import MANY_FORMAT
+    from cockpit.commands.json_types import objects, schema_of
+
+    fault = objects("FolderFault", {"fault": str, "line": str})
+    one = {"evidence": str, "diagnosis": NotRequired[_diagnosis_type()], "fault": NotRequired[fault]}
+    return schema_of(objects("Diagnoses", {"format": Literal[MANY_FORMAT], "results": list[objects("Folder", one)]}))
+
+
+def _blind_scores() -> dict[str, Any]:
+    from cockpit.commands.json_types import objects, schema_of
+    from diagnosis.blind.pooling import FORMAT
+    from diagnosis.blind.scoring import Scores
+
+    fields = {"format": Literal[FORMAT], "sealed": bool, "tool": str, "methods": dict[str, Scores]}
+    return schema_of(objects("BlindScores", fields | {"cases": list[dict[str, Any]]}))
+
+
+def _fault() -> dict[str, Any]:
+    from cockpit.commands.json_types import objects, schema_of
+
+    return schema_of(objects("Fault", {"fault": str, "line": str, "exit_status": int}))
+
+
+def _run() -> dict[str, Any]:
+    from cockpit.commands.json_types import schema_of, table
+    from cockpit.judge.margins import Margins
+    from cockpit.judge.verdict import RunVerdict
+
+    more = {"good": bool, "rig": str, "effects": NotRequired[list[str]], "loop": NotRequired[Margins]}
+    return schema_of(table(RunVerdict, more))
+
+
+def _log_info() -> dict[str, Any]:
+    from cockpit.commands.json_types import schema_of, table
+    from cockpit.judge.verdict import RunVerdict
+
+    return schema_of(table(RunVerdict, {"good": bool}))
+
+
+def _plot() -> dict[str, Any]:
+    from cockpit.commands.json_types import schema_of, table
+    from cockpit.judge.verdict import RunVerdict
+
+    return schema_of(table(RunVerdict, {"good": bool, "picture": str}))
+
+
+def _log_recover() -> dict[str, Any]:
+    from bridge.log.log_reader import Damage
+    from cockpit.commands.json_types import schema_of, table
+
+    return schema_of(table(Damage, {"messages": int, "out": str}))
+
+
+def _reproduce() -> dict[str, Any]:
+    from cockpit.commands.json_types import schema_of, table
+    from cockpit.paper.page import ReproduceResult
+
+    return schema_of(table(ReproduceResult, {"passed": bool, "verdict": str}))
+
+
+def _result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[str, Any]]:
+    """The schema of a command whose result is one named tuple, or a list of such."""
+
+    def make() -> dict[str, Any]:
+        from importlib import import_module
+
+        from cockpit.commands.json_types import schema_of
+
+        made = getattr(import_module(module), kind)
+        return schema_of(list[made] if many else made)
+
+    return make
+
+
+TOML = (
+    Format("rig", "A rig file, as in deploy/rigs: `--rig FILE.toml`.", _rig),
+    Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", _scenario),
+    Format("controller", "The table [controller] of a scenario, and the configuration in a log.", _controller),
+    Format("evidence-1", "manifest.toml of an evidence folder, evidence/1.", _evidence),
+    Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
+)
+JSON = (
+    Format("diagnosis-1", "`stickslip diagnose FOLDER --json`, diagnosis/1.", _diagnosis),
+    Format("diagnoses-1", "`stickslip diagnose --json` of several folders, diagnoses/1.", _diagnoses),
+    Format("blind-scores-2", "`stickslip blind score --json` and `blind pool --json`, blind-scores/2.", _blind_scores),
+    Format("fault", "Any command that fails with JSON on stdout.", _fault),
+    Format("run-result", "`stickslip run --json`.", _run),
+    Format("plant-result", "`stickslip plant --json`.", _result_of("cockpit.commands.processes", "Served")),
+    Format("controller-result", "`stickslip controller --json`.", _result_of("cockpit.commands.processes", "Served")),
+    Format("record-result", "`stickslip record --json`.", _result_of("cockpit.commands.processes", "Recorded")),
+    Format("stop-result", "`stickslip stop --json`.", _result_of("cockpit.commands.processes", "Taken")),
+    Format("replay-result", "`stickslip replay --json`.", _result_of("cockpit.run.replay", "Replayed", many=True)),
+    Format(
+        "closed-loop-result", "`stickslip replay --closed-loop --json`.", _result_of("cockpit.run.replay", "Compared")
+    ),
+    Format("plot-result", "`stickslip plot --json`.", _plot),
+    Format("map-result", "`stickslip map --json`.", _result_of("cockpit.judge.stability_map", "MapResult")),
+    Format("reproduce-result", "`stickslip reproduce --json`.", _reproduce),
+    Format("example-result", "`stickslip example --json`.", _result_of("cockpit.commands.example", "Example")),
+    Format("log-info-result", "`stickslip log info --json`.", _log_info),
+    Format("log-check-result", "`stickslip log check --json`.", _result_of("bridge.log.log_check", "LogCheck")),
+    Format("log-recover-result", "`stickslip log recover --json`.", _log_recover),
+    Format("log-export-result", "`stickslip log export --json`.", _result_of("bridge.tables.export", "Exported")),
+    Format(
+        "log-import-result", "`stickslip log import --json`.", _result_of("diagnosis.evidence.import_table", "Imported")
+    ),
+    Format("blind-run-result", "`stickslip blind run --json`.", _result_of("cockpit.commands.blind", "SetDone")),
+    Format("scenarios-result", "`stickslip scenarios --json`.", _result_of("cockpit.commands.scenarios", "Known")),
+    Format(
+        "explain-result", "`stickslip explain --json`.", _result_of("cockpit.commands.explain", "Meaning", many=True)
+    ),
+    Format("schema-result", "`stickslip schema --json`.", _result_of("cockpit.commands.schema", "Named", many=True)),
+)
+FORMATS = {one.name: one for one in (*TOML, *JSON)}

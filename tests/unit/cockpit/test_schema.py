@@ -1,0 +1,167 @@
+"""`stickslip schema`: what the files and results are, what the schemas say they are, and what the project ships agree."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from typer.testing import CliRunner
+
+from bridge.files import strict_json
+from cockpit.cli import app
+from cockpit.commands import diagnose_output
+from cockpit.commands.schemas import FORMATS, JSON, TOML
+from cockpit.run.scenario import deploy_folder
+from diagnosis import diagnose_many as many
+from diagnosis.result import to_json
+from plant.effects.library import EFFECTS
+from tests import made_up
+from tests.logs import short_log
+
+SHIPPED = sorted(path for path in deploy_folder().rglob("*.toml"))
+CONTACT = {
+    "stiffness_N_per_m": 1e8,
+    "damping_Ns_per_m": 1e4,
+    "coulomb_force_N": 10.0,
+    "static_force_N": 12.0,
+}
+
+
+def call(*arguments: str):
+    return CliRunner().invoke(app, list(arguments))
+
+
+def fits(name: str, value: Any) -> bool:
+    """Whether a value is what a schema says."""
+    validator = jsonschema.Draft202012Validator(FORMATS[name].schema())
+    return validator.is_valid(value)
+
+
+def check(name: str, value: Any) -> None:
+    """Raise where a value is not what a schema says."""
+    jsonschema.validate(strict_json(value), FORMATS[name].schema(), jsonschema.Draft202012Validator)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_schema_is_one_and_is_printed(name: str) -> None:
+    result = call("schema", name)
+    assert result.exit_code == 0, result.output
+    made = json.loads(result.stdout)
+    jsonschema.Draft202012Validator.check_schema(made)
+    assert json.loads(call("schema", name, "--json").stdout) == made
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_shipped_schemas_are_those_that_are_printed(name: str) -> None:
+    """After a change of a format: `make schemas`."""
+    assert json.loads((deploy_folder() / "schemas" / f"{name}.json").read_text()) == FORMATS[name].schema()
+
+
+def test_no_other_schema_is_shipped() -> None:
+    assert {path.stem for path in (deploy_folder() / "schemas").iterdir()} == FORMATS.keys()
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_a_shipped_file_names_its_schema_and_fits_it(path: Path) -> None:
+    word, _, place = path.read_text().partition("\n")[0].partition(" ")
+    assert word == "#:schema"
+    schema = json.loads((path.parent / place).read_text())
+    assert schema["title"] == path.parent.name.removesuffix("s")
+    jsonschema.validate(tomllib.loads(path.read_text()), schema, jsonschema.Draft202012Validator)
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "expected"),
+    [
+        ("rig", {"contact": {"pair": "C45-C45 @ 0.063", "static_force_N": 18}}, True),
+        ("rig", {"contact": CONTACT}, True),
+        ("rig", {"contact": CONTACT | {"stiffness": 1.0}}, False),
+        ("rig", {"contact": {"static_force_N": 18.0}}, False),
+        ("rig", {"contact": {"pair": "ice"}}, False),
+        ("rig", {"contact": CONTACT, "effects": {"drive-backlash": {"gap_m": 1e-4}}}, True),
+        ("rig", {"contact": CONTACT, "effects": {"drive-backlash": {"gap": 1e-4}}}, False),
+        ("rig", {"contact": CONTACT, "effects": {"static-friction-ageing": {"form": "power", "ratio": 0.1}}}, True),
+        ("rig", {"contact": CONTACT, "effects": {"static-friction-ageing": {"form": "linear"}}}, False),
+        ("rig", {"contact": CONTACT, "effects": {"ghost": {}}}, False),
+        ("scenario", {"rig": {"file": "paper-c45-c45", "slide": {"mass_kg": 2.0}}}, True),
+        ("scenario", {"rig": {"file": "paper-c45-c45", "slide": {"mass": 2.0}}}, False),
+        ("scenario", {"rig": {"file": "paper-c45-c45"}, "controller": {"limits": {"v_ratio": 0.9}}}, False),
+        ("scenario", {"duration_s": 3.0}, False),
+        ("controller", {"policy": {"enabled_from_s": 8}}, True),
+        ("controller", {"policy": {"enabled_from": 8}}, False),
+        ("import-map", {"channels": {"t_s": "Zeit [s]", "drive_force_N": {"column": "F", "scale": -1.0}}}, True),
+        ("import-map", {"channels": {"force": "F"}}, False),
+        ("import-map", {"channels": {"drive_force_N": {"scale": 2.0}}}, False),
+        ("evidence-1", tomllib.loads(made_up.MANIFEST), True),
+        ("evidence-1", tomllib.loads(made_up.MANIFEST) | {"format": "evidence/2"}, False),
+    ],
+)
+def test_a_schema_takes_what_the_program_takes(name: str, table: dict[str, Any], expected: bool) -> None:
+    assert fits(name, table) is expected
+
+
+def test_every_effect_with_its_defaults_fits_the_schema_of_a_rig() -> None:
+    for name, effect in EFFECTS.items():
+        for form, rows in effect.forms.items():
+            numbers = {row.name: row.default for row in rows.parameters}
+            check("rig", {"contact": CONTACT, "effects": {name: {"form": form} | numbers}})
+
+
+def test_a_diagnosis_fits_and_one_more_key_does_not(tmp_path: Path) -> None:
+    folder = tmp_path / "rig"
+    made_up.evidence_folder(folder)
+    source = many.find_sources([folder])[0]
+    diagnosis = made_up.diagnosis()
+    table = strict_json(to_json(diagnosis))
+    check("diagnosis-1", table)
+    assert not fits("diagnosis-1", table | {"more": 1})
+    outcomes = [many.FolderResult(source, diagnosis, None), many.FolderResult(source, None, ("BAD_EVIDENCE", "why"))]
+    check("diagnoses-1", diagnose_output.many_as_json(outcomes))
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("run-result", ["run", "--in-process", "--set", "duration_s=0.05"]),
+        (
+            "run-result",
+            ["run", "--in-process", "--set", "duration_s=0.05", "--set", "rig.effects.drive-backlash.gap_m=1e-4"],
+        ),
+        ("replay-result", ["replay", "run.mcap"]),
+        ("replay-result", ["replay", "run.mcap", "--set", "limits.v_ratio=1.5"]),
+        ("closed-loop-result", ["replay", "run.mcap", "--closed-loop"]),
+        ("plot-result", ["plot", "run.mcap"]),
+        ("map-result", ["map"]),
+        ("log-info-result", ["log", "info", "run.mcap"]),
+        ("log-check-result", ["log", "check", "run.mcap"]),
+        ("log-recover-result", ["log", "recover", "run.mcap"]),
+        ("log-export-result", ["log", "export", "run.mcap", "--to", "x.csv"]),
+        ("scenarios-result", ["scenarios"]),
+        ("explain-result", ["explain"]),
+        ("schema-result", ["schema"]),
+        ("fault", ["log", "info", "no.mcap"]),
+        ("fault", ["log", "infos"]),
+    ],
+)
+def test_results_fit(name: str, arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.mcap").write_bytes(short_log())
+    check(name, json.loads(call(*arguments, "--json").stdout))
+
+
+def test_without_a_name_they_are_listed_and_with_a_folder_written(tmp_path: Path) -> None:
+    lines = call("schema").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == [one.name for one in (*TOML, *JSON)]
+    assert call("schema", "--out", str(tmp_path / "all")).exit_code == 0
+    assert {path.stem for path in (tmp_path / "all").iterdir()} == FORMATS.keys()
+    assert call("schema", "rig", "--out", str(tmp_path / "one")).exit_code == 0
+    assert [path.name for path in (tmp_path / "one").iterdir()] == ["rig.json"]
+
+
+def test_a_format_goes_by_the_name_in_its_files_too() -> None:
+    assert call("schema", "diagnosis/1").stdout == call("schema", "diagnosis-1").stdout
+    result = call("schema", "rigs")
+    assert result.exit_code == 2
+    assert "rigs: no such schema; known: rig, scenario" in result.stderr
