@@ -1,6 +1,6 @@
 """Runs made from the plant and made ready for comparison: what the tests of the diagnosis' parts have in common."""
 
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -11,13 +11,15 @@ from diagnosis.gap.prepare import Prepared, prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Roughness
-from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.folder import Case, Numbers
+from tests.made_evidence import made_evidence
 
 
-def prepared(folder: Path, protocol: str, effects=None, seed: int = 1) -> tuple[Evidence, list[Prepared]]:
+def prepared(
+    protocol: str, effects: Mapping[str, Numbers] | None = None, seed: int = 1
+) -> tuple[Evidence, list[Prepared]]:
     """A rig that is as described but for `effects` and what every rig differs by."""
-    make_evidence(folder, Case(protocol, effects=effects or {}, drawn=False), seed)
-    evidence = load_evidence(folder)
+    evidence = load_evidence(made_evidence(Case(protocol, effects=effects or {}, drawn=False), seed))
     return evidence, prepare(evidence)
 
 

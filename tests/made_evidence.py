@@ -1,0 +1,56 @@
+"""Evidence folders of the plant, made once and shared: by all tests, by all worker processes, and by later runs.
+
+Whoever writes into one copies it first. A folder is found again by its case, its seed and everything that makes it: the
+sources of the plant, of the evidence and of what both stand on, and the versions of the packages. Old ones go by themselves.
+"""
+
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from functools import cache
+from pathlib import Path
+
+from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.protocols import AXIS_PLANS, PROTOCOLS
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / ".pytest_cache" / "d" / "made-evidence"  # where `pytest --cache-clear` deletes it
+MAKERS = ("bridge", "plant", "diagnosis/evidence", "diagnosis/synthetic")
+_KEPT_S = 3600.0  # folders of other sources: another run, of before an edit, may still read them
+
+
+def made_evidence(case: Case, seed: int) -> Path:
+    """The folder of a case; the same case and seed have the same bytes."""
+    folder = _of_these_sources() / _name(case, seed)
+    if not folder.exists():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix="part-", dir=folder.parent))
+        make_evidence(part, case, seed)
+        try:
+            part.rename(folder)
+        except OSError:  # somebody else made the same meanwhile
+            shutil.rmtree(part)
+    return folder
+
+
+def forget_old() -> None:
+    """Delete what other sources made, an hour or more ago."""
+    for folder in KEPT.glob("*"):
+        if folder != _of_these_sources() and time.time() - folder.stat().st_mtime > _KEPT_S:
+            shutil.rmtree(folder)
+
+
+def _name(case: Case, seed: int) -> str:
+    plans = PROTOCOLS.get(case.protocol, AXIS_PLANS)  # a test may have a protocol of its own
+    return hashlib.sha256(repr((case, plans, seed)).encode()).hexdigest()[:16]
+
+
+@cache
+def _of_these_sources() -> Path:
+    digest = hashlib.sha256((ROOT / "requirements.lock").read_bytes())
+    for place in MAKERS:
+        for path in sorted((ROOT / place).rglob("*.py")):
+            digest.update(f"{os.path.relpath(path, ROOT)}\n".encode() + path.read_bytes())
+    return KEPT / digest.hexdigest()[:16]
