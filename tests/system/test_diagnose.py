@@ -12,10 +12,11 @@ from cockpit.cli import app
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.trials import trials
-from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.folder import Case
 from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
 from plant.config import load_rig
 from plant.effects.library import EFFECTS
+from tests.made_evidence import made_evidence
 
 # a tenth of the work of the whole protocol
 SHORT = (
@@ -37,16 +38,14 @@ def short():
 
 
 @pytest.fixture(scope="module")
-def damped(short, tmp_path_factory):
+def damped(short):
     """A drive that damps by 12 N s/m, everything else within its tolerances."""
-    folder = tmp_path_factory.mktemp("made") / "bench"
-    make_evidence(folder, Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
-    return folder
+    return made_evidence(Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}), seed=21)
 
 
 @pytest.fixture(scope="module")
-def command(damped):
-    out = damped.parent
+def command(damped, tmp_path_factory):
+    out = tmp_path_factory.mktemp("said")
     result = CliRunner().invoke(
         app,
         ["diagnose", str(damped), "--json", str(out / "d.json"), "--report", str(out / "d.html"),
@@ -111,10 +110,9 @@ def one(damped):
 
 def test_nothing_leaks_from_the_held_out_run(damped, one, short, tmp_path):
     """A held-out run of another rig refutes the name, and changes not a digit of what was fitted."""
-    other, alien = (tmp_path / name for name in ("other", "alien"))
-    make_evidence(alien, Case(short), seed=99)
+    other = tmp_path / "other"
     shutil.copytree(damped, other)
-    shutil.copy(alien / "run-03.parquet", other / "run-03.parquet")
+    shutil.copy(made_evidence(Case(short), seed=99) / "run-03.parquet", other / "run-03.parquet")
     two = diagnosed(other, 2)
     assert one.effects == ("drive-damping",)
     own_fits, other_fits = (
@@ -132,11 +130,10 @@ def test_the_number_of_processes_changes_not_a_digit(damped, one):
     assert one._replace(elapsed_s=0.0, pictures=()) == two._replace(elapsed_s=0.0, pictures=())
 
 
-def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(short, tmp_path):
+def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(short):
     missing = ("mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
     case = Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}, leave_out=missing)
-    make_evidence(tmp_path / "force", case, seed=22)
-    found = diagnosis.diagnose.diagnose(load_evidence(tmp_path / "force"), quiet, jobs=2)
+    found = diagnosis.diagnose.diagnose(load_evidence(made_evidence(case, seed=22)), quiet, jobs=2)
     best = found.candidates[0]
     group = {*found.effects, *(name for names in found.not_distinguishable for name in names)}
     assert "drive-damping" in group or best.effect in {"none", "unexplained"} or best.probability < 0.9

@@ -105,7 +105,7 @@ def test_the_foreign_plant_imports_nothing_of_the_project_but_the_schema() -> No
         elif isinstance(node, ast.ImportFrom):
             imported |= {f"{node.module}.{alias.name}" for alias in node.names}
     outside = {name for name in imported if name.split(".")[0] not in sys.stdlib_module_names}
-    assert outside == {"numpy", "zenoh", "bridge.stickslip_pb2"}
+    assert outside == {"numpy", "zenoh", "bridge.wire.stickslip_pb2"}
 
 
 def test_the_page_has_the_table_of_topics() -> None:

@@ -110,7 +110,9 @@ def test_a_cluster_that_is_not_there(tmp_path):
 def test_ctrl_c_leaves_no_worker_and_no_file(tmp_path):
     for name in ("a", "b"):
         made_up.evidence_folder(tmp_path / "all" / name)
-    program = "from diagnosis import diagnose_many as many; from tests import made_up; from cockpit import cli;"
+    # who is started with & by a script ignores Ctrl-C, and so do its children: here it is as a terminal starts a command
+    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+    program += "from diagnosis import diagnose_many as many; from tests import made_up; from cockpit import cli;"
     program += "many.real_diagnose = made_up.endless; cli.main()"
     options = ["diagnose", str(tmp_path / "all"), "--jobs", "2", "--json", str(tmp_path / "out.json")]
     command = subprocess.Popen(

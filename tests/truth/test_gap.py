@@ -1,7 +1,6 @@
 """The gap: 1 for two runs of one plant on two rough surfaces, and larger for every effect the larger the effect is."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +13,10 @@ from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Effects, Roughness
-from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.folder import Case
 from plant.effects.library import EFFECTS
 from tests.blind.plant_sizes import EFFECT_SIZES, Sizes
+from tests.made_evidence import made_evidence
 
 SURFACE = Roughness(0.003, 1.5e-4, 0)
 
@@ -24,9 +24,8 @@ SURFACE = Roughness(0.003, 1.5e-4, 0)
 class Bench:
     """The paper's rig in the protocol "ladder", every number as described."""
 
-    def __init__(self, folder: Path) -> None:
-        make_evidence(folder, Case(drawn=False), seed=11)
-        evidence = load_evidence(folder)
+    def __init__(self) -> None:
+        evidence = load_evidence(made_evidence(Case(drawn=False), seed=11))
         self.problem = Problem(evidence.rig, prepare(evidence))
         self.nuisances = Nuisances(evidence.rig)
         self.described = np.zeros(len(self.nuisances))
@@ -43,8 +42,8 @@ class Bench:
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory) -> Bench:
-    return Bench(tmp_path_factory.mktemp("evidence"))
+def bench() -> Bench:
+    return Bench()
 
 
 def test_two_rough_surfaces_are_one_floor_apart(bench):
@@ -122,10 +121,10 @@ def test_coarse_steps_move_no_feature_by_a_third_of_a_floor(bench, monkeypatch):
 
 
 def numbers_of(name: str, sizes: Sizes, size: float) -> dict[str, float | str]:
-    table: dict[str, float | str] = {"form": sizes.hypothesis, sizes.parameter: sizes.signs[-1] * size}
+    table: dict[str, float | str] = {"form": sizes.form, sizes.parameter: sizes.signs[-1] * size}
     for key, (low, high) in {**sizes.log, **sizes.even}.items():
         table[key] = (low * high) ** 0.5 if low > 0.0 else 0.5 * (low + high)
-    for parameter in EFFECTS[name].forms[sizes.hypothesis].parameters:
+    for parameter in EFFECTS[name].forms[sizes.form].parameters:
         table.setdefault(parameter.name, parameter.default)
     return table
 

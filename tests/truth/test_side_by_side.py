@@ -28,8 +28,8 @@ ROUNDING = 1e-8  # of the largest value of a signal: slips make it grow, to 5e-1
 
 
 @pytest.fixture(scope="module")
-def ladder(tmp_path_factory):
-    evidence, runs = prepared(tmp_path_factory.mktemp("ladder") / "ladder", "ladder")
+def ladder():
+    evidence, runs = prepared("ladder")
     return evidence.rig, runs
 
 

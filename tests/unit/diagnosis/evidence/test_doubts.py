@@ -13,9 +13,10 @@ import pytest
 
 from bridge.faults import Fault
 from diagnosis.evidence.folder import load_evidence, read_columns
-from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.folder import Case
 from tests.evidence_folder import MANIFEST, Columns, columns, folder, kinds
 from tests.logs import short_log
+from tests.made_evidence import made_evidence
 
 
 def spike_of_nan(data: Columns) -> None:
@@ -290,10 +291,8 @@ def test_a_mapped_column_that_one_run_lacks_is_told_and_one_that_all_lack_is_ref
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("bending") / "rig"
-    make_evidence(made, Case("short", {}), 1)
-    return made
+def measured() -> Path:
+    return made_evidence(Case("short", {}), 1)
 
 
 @pytest.mark.parametrize(

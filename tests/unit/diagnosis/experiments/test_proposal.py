@@ -18,10 +18,10 @@ from tests.prepared import prepared
 
 
 @pytest.fixture(scope="module")
-def one_speed(tmp_path_factory):
+def one_speed():
     """A run at one speed, whose ageing looks like another static friction."""
     ageing = {"static-friction-ageing": {"form": "log", "ratio": 0.04}}
-    evidence, runs = prepared(tmp_path_factory.mktemp("next") / "one", "constant", ageing)
+    evidence, runs = prepared("constant", ageing)
     problem, nuisances = Problem(evidence.rig, runs[:1]), Nuisances(evidence.rig)
     start = np.zeros(len(nuisances))
     point = nuisances.point(start, {})

@@ -15,8 +15,8 @@ from tests.prepared import prepared
 
 
 @pytest.fixture(scope="module")
-def ladder(tmp_path_factory):
-    return prepared(tmp_path_factory.mktemp("features") / "ladder", "ladder")
+def ladder():
+    return prepared("ladder")
 
 
 LATE = {"frictional-lag": {"form": "dead-time", "delay_s": 1e-3, "share": 1.0}}

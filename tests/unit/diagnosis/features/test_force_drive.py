@@ -1,6 +1,7 @@
 """A force-driven axis: the model led along the measured motion, and what is compared."""
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -19,17 +20,17 @@ from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.model.rig import Effects, Roughness
 from diagnosis.model.sensor_chain import Chain, sensed
 from diagnosis.model.true_force import relative, true_commands
-from diagnosis.synthetic.folder import Case, make_evidence
+from diagnosis.synthetic.folder import Case
+from tests.made_evidence import made_evidence
 
 ROUGH = Roughness(0.003, 2e-4, 0)
 WAVE: Effects = {"position-dependent-friction": {"form": "wave", "ratio": 0.05, "wavelength_m": 0.02, "phase_rad": 1.0}}
 GAIN: Effects = {"force-sensor-gain": {"form": "", "ratio": 0.05}}
 
 
-def made(folder: Path, effects: Effects) -> tuple[Problem, list[Prepared], Point]:
+def made(effects: Effects) -> tuple[Problem, list[Prepared], Point]:
     """The fitted runs of an axis whose true parameters are the described ones, but for the effects."""
-    make_evidence(folder, Case("force", effects=effects, drawn=False), seed=5)
-    evidence = load_evidence(folder)
+    evidence = load_evidence(made_evidence(Case("force", effects=effects, drawn=False), seed=5))
     runs = [run for run in prepare(evidence) if not run.holdout]
     nuisances = Nuisances(evidence.rig)
     return Problem(evidence.rig, runs), runs, nuisances.point(np.zeros(len(nuisances)), {})
@@ -41,8 +42,8 @@ def gap_of(problem: Problem, point: Point, effects: Effects) -> float:
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, list[Prepared], Point]:
-    return made(tmp_path_factory.mktemp("plain") / "axis", {})
+def plain() -> tuple[Problem, list[Prepared], Point]:
+    return made({})
 
 
 def test_a_described_axis_has_no_gap_and_is_followed(plain: tuple[Problem, list[Prepared], Point]) -> None:
@@ -56,8 +57,8 @@ def test_a_described_axis_has_no_gap_and_is_followed(plain: tuple[Problem, list[
 
 
 @pytest.mark.parametrize("effects", [WAVE, GAIN], ids=lambda effects: next(iter(effects)))
-def test_an_effect_opens_a_gap_that_only_it_closes(tmp_path: Path, effects: Effects) -> None:
-    problem, runs, point = made(tmp_path / "off", effects)
+def test_an_effect_opens_a_gap_that_only_it_closes(effects: Effects) -> None:
+    problem, runs, point = made(effects)
     assert gap_of(problem, point, {}) > 2.0
     assert 0.4 < gap_of(problem, point, effects) < 1.6
     if effects is WAVE:
@@ -94,7 +95,7 @@ def test_the_true_force_is_what_the_sensor_made_the_measured_one_of(
 
 def test_an_axis_that_hardly_moves_is_refused(plain: tuple[Problem, list[Prepared], Point], tmp_path: Path) -> None:
     """It rests for all but the last 0.3 s."""
-    make_evidence(tmp_path / "rests", Case("force", drawn=False), seed=5)
+    shutil.copytree(made_evidence(Case("force", drawn=False), seed=5), tmp_path / "rests")
     file = tmp_path / "rests" / "run-01.parquet"
     table = pq.read_table(file)
     position_m = table["mass_position_m"].to_numpy().copy()

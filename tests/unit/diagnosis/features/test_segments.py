@@ -15,8 +15,8 @@ BLOCKS = 6000
 
 
 @pytest.fixture(scope="module")
-def rig(tmp_path_factory):
-    evidence, _ = prepared(tmp_path_factory.mktemp("commands") / "ladder", "ladder")
+def rig():
+    evidence, _ = prepared("ladder")
     return evidence.rig
 
 

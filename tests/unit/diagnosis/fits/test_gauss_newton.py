@@ -15,8 +15,8 @@ from diagnosis.model.rig import Roughness
 from tests.prepared import fitter_of, prepared
 
 
-def fitter_of_one_run(folder, effects):
-    evidence, runs = prepared(folder, "ladder", effects)
+def fitter_of_one_run(effects):
+    evidence, runs = prepared("ladder", effects)
     problem, nuisances = Problem(evidence.rig, runs[:1]), Nuisances(evidence.rig)
     point = nuisances.point(np.zeros(len(nuisances)), {})
     floor = floor_of(problem, point, replicates(problem, point, Roughness(0.003, 1.5e-4, 0), 12, 1))
@@ -24,8 +24,8 @@ def fitter_of_one_run(folder, effects):
 
 
 @pytest.fixture
-def fitter(tmp_path):
-    return fitter_of_one_run(tmp_path / "one", {"static-level": {"ratio": -0.1}})
+def fitter():
+    return fitter_of_one_run({"static-level": {"ratio": -0.1}})
 
 
 def start_of(fitter, name):
@@ -57,8 +57,8 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
     assert fitter.far_chi2(yielding.hypothesis, (described, weightless), impossible) > even > 1e3
 
 
-def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
-    fitter = fitter_of(*prepared(tmp_path / "damped", "ladder", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
+def test_a_form_that_leads_nowhere_is_left_early():
+    fitter = fitter_of(*prepared("ladder", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
     described = np.zeros(len(fitter.nuisances))
     base = fitter.refit(NOTHING, described, described[:0]).chi2
 
@@ -74,10 +74,10 @@ def test_a_form_that_leads_nowhere_is_left_early(tmp_path):
     assert tried.chi2 < 1.05 * refitted.chi2
 
 
-def test_single_numbers_lead_on_where_derivatives_lead_astray(tmp_path):
+def test_single_numbers_lead_on_where_derivatives_lead_astray():
     """Where friction is late by more than a third of a slip, chi2 is jagged in every number of the rig at once."""
     late = {"frictional-lag": {"form": "dead-time", "delay_s": 5.5e-3, "share": 1.0}}
-    fitter = fitter_of(*prepared(tmp_path / "late", "ladder", late))
+    fitter = fitter_of(*prepared("ladder", late))
     form = next(
         one.hypothesis for one in trials(fitter.problem) if one.hypothesis.forms == {"frictional-lag": "dead-time"}
     )

@@ -11,10 +11,10 @@ DELAY_S, HALF_PERIOD_S = 5.5e-3, 1.0 / (2.0 * 4500.0)
 
 
 @pytest.fixture(scope="module")
-def late(tmp_path_factory):
+def late():
     """Late by 50 half periods of the fastest vibration."""
     effects = {"frictional-lag": {"form": "dead-time", "delay_s": DELAY_S, "share": 1.0}}
-    return fitter_of(*prepared(tmp_path_factory.mktemp("late") / "rig", "ladder", effects))
+    return fitter_of(*prepared("ladder", effects))
 
 
 def test_a_refit_begins_at_the_right_tooth(late):

@@ -22,9 +22,9 @@ LOAD = {"normal-load-fluctuation": {"form": "random", "ratio": RATIO, "frequency
 
 
 @pytest.fixture(scope="module")
-def rig(tmp_path_factory):
+def rig():
     """A rig under a random load: its runs, and the refitted model without a load."""
-    evidence, runs = prepared(tmp_path_factory.mktemp("loaded") / "evidence", "ladder", LOAD)
+    evidence, runs = prepared("ladder", LOAD)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
     unseen = Problem(evidence.rig, [run for run in runs if run.holdout])
     return retuned_rig(evidence, problem, lambda _said, _share: None), unseen

@@ -15,8 +15,8 @@ def untold(_what, _share):
 
 
 @pytest.fixture(scope="module")
-def evidence_and_runs(tmp_path_factory):
-    evidence, runs = prepared(tmp_path_factory.mktemp("retuned") / "one", "ladder", {})
+def evidence_and_runs():
+    evidence, runs = prepared("ladder", {})
     return evidence, [run for run in runs if not run.holdout]
 
 

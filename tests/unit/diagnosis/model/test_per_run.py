@@ -25,11 +25,10 @@ LATER = 2.4  # rad, in the second run
 
 
 @pytest.fixture(scope="module")
-def problem(tmp_path_factory):
+def problem():
     """Two runs of one rig under a load that turned on between them."""
-    folder = tmp_path_factory.mktemp("phases")
-    evidence, first = prepared(folder / "a", "ladder", {"normal-load-fluctuation": LOAD | {"phase_rad": 0.4}})
-    _, second = prepared(folder / "b", "ladder", {"normal-load-fluctuation": LOAD | {"phase_rad": 0.4 + LATER}})
+    evidence, first = prepared("ladder", {"normal-load-fluctuation": LOAD | {"phase_rad": 0.4}})
+    _, second = prepared("ladder", {"normal-load-fluctuation": LOAD | {"phase_rad": 0.4 + LATER}})
     return Problem(evidence.rig, [first[0], second[1]])
 
 

@@ -15,8 +15,8 @@ from tests.prepared import prepared
 
 
 @pytest.fixture(scope="module")
-def ladder(tmp_path_factory):
-    return prepared(tmp_path_factory.mktemp("entries") / "ladder", "ladder")
+def ladder():
+    return prepared("ladder")
 
 
 def shaken_run(runs):

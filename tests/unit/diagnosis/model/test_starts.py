@@ -17,7 +17,7 @@ PITCH_M = 1e-3
 
 
 @pytest.fixture(scope="module")
-def screw(tmp_path_factory):
+def screw():
     ripple = {
         "form": "screw",
         "ratio": 0.08,
@@ -26,7 +26,7 @@ def screw(tmp_path_factory):
         "second_sin": 0.3,
         "second_cos": -0.4,
     }
-    return prepared(tmp_path_factory.mktemp("starts") / "screw", "ladder", {"drive-speed-ripple": ripple})
+    return prepared("ladder", {"drive-speed-ripple": ripple})
 
 
 def test_a_wave_of_the_drive_is_found_with_its_second_harmonic(screw):
@@ -53,10 +53,10 @@ def test_a_screw_stands_where_the_drives_own_sensor_says(screw):
     assert np.ptp(drive_m(0.5, 0.0) - drive_m(0.5, 0.25 * PITCH_M)) > 1e-6
 
 
-def test_two_waves_along_the_track_are_found_together(tmp_path):
+def test_two_waves_along_the_track_are_found_together():
     other = {"other_share": 0.6, "other_wavelength_m": 9e-4, "other_phase_rad": -1.1}
     track = {"form": "two-waves", "ratio": 0.06, "wavelength_m": 4e-3, "phase_rad": 0.7, **other}
-    evidence, runs = prepared(tmp_path / "track", "ladder", {"position-dependent-friction": track})
+    evidence, runs = prepared("ladder", {"position-dependent-friction": track})
     problem = Problem(evidence.rig, runs)
     pairs = two_friction_waves(runs, problem.scales, 4)
     assert any(
@@ -66,10 +66,10 @@ def test_two_waves_along_the_track_are_found_together(tmp_path):
     assert all(first.ratio >= other.ratio > 0.0 for first, other in pairs)
 
 
-def test_waves_beside_a_wave_have_their_own_phase(tmp_path):
+def test_waves_beside_a_wave_have_their_own_phase():
     """At other periods the phase at the zero of the position differs by turns; where the slide is it must stay."""
     bumps = {"form": "bumps", "ratio": 0.15, "wavelength_m": 3e-3, "phase_rad": 0.7, "width": 0.12}
-    evidence, runs = prepared(tmp_path / "bumps", "ladder", {"position-dependent-friction": bumps})
+    evidence, runs = prepared("ladder", {"position-dependent-friction": bumps})
     scales = Problem(evidence.rig, runs).scales
     own = Wave(3e-3, 0.05, 0.0, spread=0.04)
     shorter, same, longer = friction_waves_beside(runs, scales, [own], (-0.25, 0.0, 0.25))
@@ -88,10 +88,10 @@ def test_a_wave_over_time_turns_once_in_a_run():
     assert frequency.value(-2.0) == pytest.approx(0.1)
 
 
-def test_a_base_that_rings_shows_its_frequency(tmp_path):
+def test_a_base_that_rings_shows_its_frequency():
     """Stuck to the base, the slide lowers it: 1 / (compliance omega^2) is 5 kg, and 1.5 kg more."""
     ring = {"compliance_m_per_N": 2e-7, "frequency_Hz": 160.0, "damping_ratio": 0.03}
-    evidence, runs = prepared(tmp_path / "ring", "ladder", {"base-compliance": ring})
+    evidence, runs = prepared("ladder", {"base-compliance": ring})
     base_kg = 1.0 / (2e-7 * (2.0 * math.pi * 160.0) ** 2)
     stuck_Hz = 160.0 / math.sqrt(1.0 + evidence.rig.mass_kg / base_kg)
     found = ringing_Hz(Problem(evidence.rig, runs).runs, "base_accel_mps2", 2)

@@ -27,8 +27,8 @@ def levels(evidence, runs):
 
 
 @pytest.fixture(scope="module")
-def clean(tmp_path_factory):
-    return prepared(tmp_path_factory.mktemp("parity") / "clean", "ladder")
+def clean():
+    return prepared("ladder")
 
 
 def test_a_clean_rig_leaves_its_noise(clean):
@@ -38,9 +38,9 @@ def test_a_clean_rig_leaves_its_noise(clean):
 
 
 @pytest.mark.parametrize("effect", LIT)
-def test_an_effect_lights_its_relation(effect, clean, tmp_path):
+def test_an_effect_lights_its_relation(effect, clean):
     numbers, name, variable = LIT[effect]
-    evidence, runs = prepared(tmp_path / "lit", "ladder", {effect: numbers})
+    evidence, runs = prepared("ladder", {effect: numbers})
     found = levels(evidence, runs)
     assert found[name] > 2.0
     assert found[name] > 1.8 * levels(*clean)[name]
@@ -55,16 +55,16 @@ def test_a_missing_channel_takes_its_residuals_along(clean):
     assert names == ["curvature", "drive", "friction"]
 
 
-def test_a_force_drive_has_its_friction(tmp_path):
-    evidence, runs = prepared(tmp_path / "clean", "force")
+def test_a_force_drive_has_its_friction():
+    evidence, runs = prepared("force")
     assert levels(evidence, runs).keys() == {"friction"}
     assert levels(evidence, runs)["friction"] < 3.0
-    evidence, runs = prepared(tmp_path / "oily", "force", {"viscous-friction": {"damping_Ns_per_m": 60.0}})
+    evidence, runs = prepared("force", {"viscous-friction": {"damping_Ns_per_m": 60.0}})
     assert levels(evidence, runs)["friction"] > 6.0
 
 
-def test_an_axis_with_an_accelerometer_alone_has_no_relation(tmp_path):
-    evidence, runs = prepared(tmp_path, "force")
+def test_an_axis_with_an_accelerometer_alone_has_no_relation():
+    evidence, runs = prepared("force")
     signals = {"drive_force_N": runs[0].signals["drive_force_N"]}
     signals["mass_accel_mps2"] = runs[0].commands.motion.accel_mps2
     assert parity_residuals(evidence.rig, runs[0]._replace(signals=signals)) == ()

@@ -13,8 +13,8 @@ AGEING = {"static-friction-ageing": {"form": "log", "ratio": 0.04}}
 
 
 @pytest.fixture(scope="module")
-def aged(tmp_path_factory):
-    evidence, runs = prepared(tmp_path_factory.mktemp("pictures") / "aged", "ladder", AGEING)
+def aged():
+    evidence, runs = prepared("ladder", AGEING)
     return Problem(evidence.rig, runs), Nuisances(evidence.rig)
 
 
@@ -59,8 +59,8 @@ def test_any_verdict_can_be_drawn(aged, effect):
 @pytest.mark.parametrize(
     ("protocol", "has"), [("force", ("drive_force_N", "mass_position_m")), ("slow", ("drive_force_N",))]
 )
-def test_other_drives_and_fewer_channels(tmp_path, protocol, has):
-    evidence, runs = prepared(tmp_path / "few", protocol)
+def test_other_drives_and_fewer_channels(protocol, has):
+    evidence, runs = prepared(protocol)
     runs = [run._replace(signals={name: run.signals[name] for name in has}) for run in runs]
     problem, nuisances = Problem(evidence.rig, runs), Nuisances(evidence.rig)
     assert of((problem, nuisances), None)

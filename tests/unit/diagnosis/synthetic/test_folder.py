@@ -13,6 +13,7 @@ from diagnosis.synthetic import folder as making
 from diagnosis.synthetic.folder import Case, make_evidence
 from diagnosis.synthetic.protocols import FORCE_PROTOCOL, PROTOCOLS, RunPlan
 from plant.effects.library import EFFECTS
+from tests.made_evidence import made_evidence
 
 SHORT = (RunPlan(((0.0, 5e-4),), duration_s=1.0), RunPlan(((0.0, 5e-4),), duration_s=1.0, holdout=True))
 BACKLASH = {"drive-backlash": {"gap_m": 1e-4}}
@@ -30,9 +31,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("protocol", [*PROTOCOLS, FORCE_PROTOCOL])
-def test_every_protocol_loads_without_a_doubt(tmp_path, protocol):
-    make_evidence(tmp_path, Case(protocol), 1)
-    evidence = load_evidence(tmp_path)
+def test_every_protocol_loads_without_a_doubt(protocol):
+    evidence = load_evidence(made_evidence(Case(protocol), 1))
     wrong = [finding for finding in evidence.findings if finding.kind != "missing"]
     assert not wrong
     *fitted, last = (run.holdout for run in evidence.runs)
@@ -49,30 +49,28 @@ def test_a_seed_gives_the_same_bytes(tmp_path, short):
     assert all(first[name] != other[name] for name in first if name.endswith(".parquet"))
 
 
-def test_the_folder_says_nothing_about_the_effect(tmp_path):
-    make_evidence(tmp_path / "plain", Case(), 1)
-    make_evidence(tmp_path / "with", Case(effects=BACKLASH), 1)
-    plain, disturbed = contents(tmp_path / "plain"), contents(tmp_path / "with")
+def test_the_folder_says_nothing_about_the_effect():
+    folders = made_evidence(Case(), 1), made_evidence(Case(effects=BACKLASH), 1)
+    plain, disturbed = map(contents, folders)
     assert plain.keys() == disturbed.keys()
     assert plain["manifest.toml"] == disturbed["manifest.toml"]
     for name, data in disturbed.items():
         assert not [effect for effect in EFFECTS if effect.encode() in data.lower()]
         if name.endswith(".parquet"):
-            schemas = [pq.read_schema(tmp_path / folder / name) for folder in ("plain", "with")]
+            schemas = [pq.read_schema(folder / name) for folder in folders]
             assert schemas[0].equals(schemas[1], check_metadata=True)
             assert plain[name] != data
 
 
-def test_a_rig_as_described_has_its_period_and_its_forces(tmp_path):
-    make_evidence(tmp_path, Case("constant", drawn=False), 3)
-    run = load_evidence(tmp_path).runs[0]
+def test_a_rig_as_described_has_its_period_and_its_forces():
+    run = load_evidence(made_evidence(Case("constant", drawn=False), 3)).runs[0]
     cycles = find_cycles(run.t_s, run.columns["drive_force_N"])
     # the paper's pair: 17.38 N, 1.03 s; a rough surface of 0.6 % moves the period by 6 x that at most
     assert cycles.force_max_N == pytest.approx(17.38, rel=0.01)
     assert cycles.period_s == pytest.approx(1.03, rel=0.04)
 
 
-def test_the_true_parameters_are_drawn_within_the_tolerances(tmp_path):
+def test_the_true_parameters_are_drawn_within_the_tolerances():
     case = Case("constant", tolerances={"static_force_N": 0.1})
     described = making.paper_rig()
     table = making._rig_table(described, "spring", case.tolerances)
@@ -83,17 +81,15 @@ def test_the_true_parameters_are_drawn_within_the_tolerances(tmp_path):
         assert contact.static_force_N >= 1.02 * contact.coulomb_force_N
         ratios.append(contact.static_force_N / described.contact.static_force_N)
     assert np.std(ratios) == pytest.approx(0.1, rel=0.2)
-    make_evidence(tmp_path, case, 5)
     random = np.random.default_rng(np.random.SeedSequence(5).spawn(2)[0])
     true_N = making._draw_rig(random, described, table, case).config.contact.static_force_N
     assert abs(true_N / 17.38 - 1.0) > 0.02
-    run = load_evidence(tmp_path).runs[0]
+    run = load_evidence(made_evidence(case, 5)).runs[0]
     assert find_cycles(run.t_s, run.columns["drive_force_N"]).force_max_N == pytest.approx(true_N, rel=0.01)
 
 
-def test_the_ladder_holds_both_directions_and_the_vibration(tmp_path):
-    make_evidence(tmp_path, Case(), 1)
-    runs = load_evidence(tmp_path).runs
+def test_the_ladder_holds_both_directions_and_the_vibration():
+    runs = load_evidence(made_evidence(Case(), 1)).runs
     assert [run.drive_velocity_mps for run in runs] == [0.0005, None, 0.0005, None]
     assert ["vibration_amplitude_m" in run.columns for run in runs] == [False, False, True, True]
     turned = runs[1].columns["drive_force_N"]
@@ -117,9 +113,8 @@ def test_the_ladder_holds_both_directions_and_the_vibration(tmp_path):
         {"force-sensor-delay": {"delay_s": 0.01}},
     ],
 )
-def test_a_run_starts_at_rest_whatever_the_rig(tmp_path, short, effects):
-    make_evidence(tmp_path, Case(short, effects), 1)
-    run = load_evidence(tmp_path).runs[0]
+def test_a_run_starts_at_rest_whatever_the_rig(short, effects):
+    run = load_evidence(made_evidence(Case(short, effects), 1)).runs[0]
     force_N = run.columns["drive_force_N"][run.t_s < 0.05]
     assert 4.0 < force_N.mean() < 16.0
     # 0.05 s at 0.5 mm/s are 0.3 N; noise 0.04 N rms at most
@@ -127,9 +122,8 @@ def test_a_run_starts_at_rest_whatever_the_rig(tmp_path, short, effects):
 
 
 @pytest.mark.parametrize("rate_Hz", [1000.0, 50_000.0])
-def test_other_rates_and_fewer_channels(tmp_path, short, rate_Hz):
-    make_evidence(tmp_path, Case(short, rate_Hz=rate_Hz, leave_out=("mass_position_m",)), 1)
-    run = load_evidence(tmp_path).runs[1]
+def test_other_rates_and_fewer_channels(short, rate_Hz):
+    run = load_evidence(made_evidence(Case(short, rate_Hz=rate_Hz, leave_out=("mass_position_m",)), 1)).runs[1]
     assert len(run.t_s) == round(rate_Hz)
     assert np.diff(run.t_s) == pytest.approx(1.0 / rate_Hz)
     assert "mass_position_m" not in run.columns
@@ -142,9 +136,8 @@ def test_what_cannot_be_made_leaves_nothing(tmp_path, case):
     assert not (tmp_path / "new").exists()
 
 
-def test_the_axis_obeys_its_equation_of_motion(tmp_path):
-    make_evidence(tmp_path, Case(FORCE_PROTOCOL, drawn=False), 1)
-    evidence = load_evidence(tmp_path)
+def test_the_axis_obeys_its_equation_of_motion():
+    evidence = load_evidence(made_evidence(Case(FORCE_PROTOCOL, drawn=False), 1))
     assert evidence.rig.drive == "force"
     run = evidence.runs[1]
     assert set(run.columns) == {"drive_force_N", "mass_position_m"}

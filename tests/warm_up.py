@@ -1,0 +1,50 @@
+"""Compile every kernel once, before worker processes would each do it for themselves; `python -m tests.warm_up`.
+
+Nothing is done where it was done for the same sources, which is what the folder of the compiled kernels stands for.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numba
+
+import bridge.kernel  # noqa: F401 (sets where kernels are kept)
+from tests.made_evidence import forget_old
+
+DONE = Path(numba.config.CACHE_DIR) / "all-compiled"  # pyright: ignore[reportPrivateImportUsage]
+
+
+def control(folder: Path) -> None:
+    """Plant, controller, log and replay."""
+    from bridge.log.logfile import read_run
+    from cockpit.run.in_process import run_onboard
+    from cockpit.run.replay import changes_of
+    from cockpit.run.scenario import load_scenario
+    from controller.replay import replay
+
+    run_onboard(load_scenario("paper-c45-c45", ["duration_s=0.4"]), folder / "run.mcap", {})
+    run = read_run(folder / "run.mcap")
+    replay(run, changes_of(run, []))
+
+
+def diagnosis() -> None:
+    """The model alone and four rigs at once, of a rig that a spring moves and of one that a motor force moves."""
+    import numpy as np
+
+    from diagnosis.hypotheses.hypothesis import NOTHING
+    from tests.prepared import fitter_of, prepared
+
+    for protocol in ("short", "force"):
+        fitter = fitter_of(*prepared(protocol))
+        fitter.refit(NOTHING, np.zeros(len(fitter.nuisances)), np.zeros(0))
+
+
+if __name__ == "__main__":
+    forget_old()
+    if not DONE.exists():
+        print("compiling kernels (once for these sources)", file=sys.stderr, flush=True)
+        with tempfile.TemporaryDirectory() as folder:
+            control(Path(folder))
+        diagnosis()
+        DONE.touch()
