@@ -13,9 +13,24 @@ BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
 
-test: check
+# linear algebra with one thread a process: there are as many processes as cores
+PARALLEL := OMP_NUM_THREADS=1 $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+EACH_CPU_S := 5 # of a test that is not marked slow
+QUICK_CPU_S := 100 # of all tests of `make quick`: may only fall
+
+quick: warm ## under a minute once kernels are compiled; what every edit is tried with
+	@$(PARALLEL) -x -m "not slow and not realtime and not nightly" --cpu-each $(EACH_CPU_S) --cpu-all $(QUICK_CPU_S)
+
+test: check warm
+	@$(BIN)/pytest -m "realtime and not nightly"
+	@$(PARALLEL) -m "not realtime and not nightly" --cpu-each $(EACH_CPU_S)
+
+nightly: check warm bench ## everything: an hour or so
 	@$(BIN)/pytest -m realtime
-	@OMP_NUM_THREADS=1 $(BIN)/pytest -m "not realtime" -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	@$(PARALLEL) -m "not realtime"
+
+warm: $(READY)
+	@$(BIN)/python -m tests.warm_up
 
 check: $(READY)
 	@$(BIN)/ruff check

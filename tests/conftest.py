@@ -1,5 +1,6 @@
 """Shared by all tests."""
 
+import pytest
 from hypothesis import settings
 
 pytest_plugins = ["tests.cpu_limit"]
@@ -7,3 +8,10 @@ pytest_plugins = ["tests.cpu_limit"]
 # the first example compiles kernels, and these machines are shared: time is no criterion in a test
 settings.register_profile("stickslip", deadline=None, derandomize=True)
 settings.load_profile("stickslip")
+_REALTIME_S = 120.0  # nobody waits longer for a process: one that hangs is known soon
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.get_closest_marker("realtime"):
+            item.add_marker(pytest.mark.timeout(_REALTIME_S))

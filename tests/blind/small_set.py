@@ -6,7 +6,7 @@
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import joblib
@@ -26,7 +26,21 @@ RUNS = (
     RunPlan(drive=((0.0, 0.6e-3),), vibration=((1.5, 3000.0), (2.7, 1200.0), (3.9, 4500.0)), duration_s=5.0),
     RunPlan(drive=((0.0, 1.5e-3),), vibration=((2.5, 2500.0),), holdout=True, duration_s=4.0),
 )
+
+
+class Part(NamedTuple):
+    """Some of the cases."""
+
+    seeds: frozenset[int]
+    visible: int  # single effects of two detection limits or more
+    without_gap: int
+
+
 SIZES = Path(__file__).with_suffix(".toml")
+# A rig without a gap under another friction law, two effects, a visible one of the exciter and one of the load, one too small to
+# be seen, and one that is seen by the force alone. What lies outside the library: test_vibrations.
+FEW = Part(frozenset({1704659489, 947045393, 539545419, 11924560, 569052986, 932947912}), visible=2, without_gap=1)
+ALL = Part(frozenset(read_sizes(SIZES)) | {1704659489, 332728213, 496335432}, visible=7, without_gap=3)
 
 
 def known(

@@ -5,6 +5,9 @@ import pytest
 
 from tests.blind.generator import Case, draw_effect, make
 from tests.blind.sizing import Bench
+from tests.blind.small_set import RUNS
+
+pytestmark = pytest.mark.slow
 
 SEED = 7101
 
@@ -13,7 +16,7 @@ SEED = 7101
 def detectability(tmp_path_factory):
     def evidence(*effects, roughness=0.0):
         folder = tmp_path_factory.mktemp("sized") / "rig"
-        make(folder, Case(effects, roughness=roughness), SEED)
+        make(folder, Case(effects, roughness=roughness), SEED, RUNS)
         return folder
 
     bench = Bench(evidence(roughness=1.0), evidence())

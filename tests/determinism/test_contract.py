@@ -14,8 +14,6 @@ from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
 from tests.system.ports import free_endpoint
 
-pytestmark = pytest.mark.realtime
-
 TABLES = ("sensors", "applied", "command", "trace", "state")
 
 
@@ -32,6 +30,7 @@ def onboard(path: Path, *settings: str) -> RunData:
     return read_run(path)
 
 
+@pytest.mark.slow
 def test_record_equals_record(tmp_path: Path) -> None:
     settings = ("duration_s=10.0",)
     first = onboard(tmp_path / "a.mcap", *settings)
@@ -55,6 +54,7 @@ def topics(path: Path) -> dict[str, list[tuple[int, int, int, bytes]]]:
     return found
 
 
+@pytest.mark.slow
 def test_twice_over_the_bus_and_in_one_process_are_the_same_bytes(tmp_path: Path) -> None:
     logs = [tmp_path / f"{name}.mcap" for name in ("first", "second", "alone")]
     for log, more in zip(
@@ -73,6 +73,7 @@ def test_twice_over_the_bus_and_in_one_process_are_the_same_bytes(tmp_path: Path
         assert first[topic] == second[topic] == alone[topic], topic
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [("duration_s=0.35", "controller.policy.enabled_from_s=0.0")])
 def test_compiled_equals_interpreted(tmp_path: Path, settings: tuple[str, ...]) -> None:
     compiled = onboard(tmp_path / "compiled.mcap", *settings)

@@ -26,8 +26,6 @@ from plant.node import PlantNode
 from tests.logs import empty_log, tables_of, write
 from tests.system.ports import free_endpoint
 
-pytestmark = pytest.mark.realtime
-
 COMMAND = [sys.executable, "-m", "cockpit"]
 
 
@@ -270,6 +268,7 @@ def told_whole(run: RunData) -> bool:
     return not lost and len(ends) == 1 and ends[0].endswith("dropped=0")
 
 
+@pytest.mark.realtime
 def test_a_log_on_the_bus_gets_the_same_answers_from_a_live_controller(log: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.mcap"
     # whoever gets no processor for 0.1 to 0.3 s loses messages: that is what a live loop does, and it says so. What it then

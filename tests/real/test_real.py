@@ -21,6 +21,7 @@ def diagnosed(folder: Path) -> Diagnosis:
     return found
 
 
+@pytest.mark.slow
 def test_what_is_known_is_in_the_logs() -> None:
     said = known()
     wavelengths_mm = [float(line.split(" mm")[0].split()[-1]) for line in said[:5]]
@@ -40,6 +41,7 @@ def test_every_evidence_is_read_without_a_doubt(name: str, tmp_path: Path) -> No
     assert all(np.isfinite(run.columns["drive_force_N"]).all() for run in evidence.runs)
 
 
+@pytest.mark.nightly
 def test_the_wave_of_the_track_leads_on_the_stiff_spring(tmp_path: Path) -> None:
     EVIDENCES["slider-stiff"](tmp_path)
     effects = [one for one in diagnosed(tmp_path).candidates if one.effect not in {"none", "unexplained"}]
@@ -50,6 +52,7 @@ def test_the_wave_of_the_track_leads_on_the_stiff_spring(tmp_path: Path) -> None
     assert 0.0034 < wavelength_m < 0.0044
 
 
+@pytest.mark.nightly
 def test_no_effect_is_sure_where_noise_hides_the_slips(tmp_path: Path) -> None:
     cuts = (Cut("k2254Nm_v42", 4.2e-5, 0.0, 8.0), Cut("k2254Nm_v42", 4.2e-5, 8.0, 16.0, holdout=True))
     slider(tmp_path, 2254.0, Levels(0.40, 0.367), cuts)

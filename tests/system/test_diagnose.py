@@ -18,6 +18,8 @@ from plant.config import load_rig
 from plant.effects.library import EFFECTS
 from tests.made_evidence import made_evidence
 
+pytestmark = pytest.mark.slow
+
 # a tenth of the work of the whole protocol
 SHORT = (
     RunPlan(((0.0, 0.002),), duration_s=5.0),
@@ -125,11 +127,13 @@ def test_nothing_leaks_from_the_held_out_run(damped, one, short, tmp_path):
     assert "drive-damping explains the runs that were fitted, but not run-03.parquet" in two.summary[1]
 
 
+@pytest.mark.nightly
 def test_the_number_of_processes_changes_not_a_digit(damped, one):
     two = diagnosed(damped, 1)
     assert one._replace(elapsed_s=0.0, pictures=()) == two._replace(elapsed_s=0.0, pictures=())
 
 
+@pytest.mark.nightly
 def test_force_alone_gives_an_answer_that_is_not_confidently_wrong(short):
     missing = ("mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
     case = Case(short, {"drive-damping": {"damping_Ns_per_m": 12.0}}, leave_out=missing)

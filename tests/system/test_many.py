@@ -16,6 +16,8 @@ from bridge.faults import Fault
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult, diagnose_many, find_sources
 from tests import made_up
 
+pytestmark = pytest.mark.slow
+
 NAMES = ["a", "b", "deadly", "refused", "broken"]
 
 

@@ -1,4 +1,4 @@
-"""A controller that nobody answers: half a minute of waiting, beside which other tests may run."""
+"""A controller that nobody answers, beside which other tests may run."""
 
 import subprocess
 import sys
@@ -12,7 +12,8 @@ from bridge.wire.zenoh_link import Bus, BusConfig
 from tests.system.ports import free_endpoint
 
 
-def test_missing_plant() -> None:
+@pytest.mark.nightly
+def test_a_command_without_a_plant_says_so_in_one_line() -> None:
     command = [sys.executable, "-m", "cockpit", "controller", "--endpoint", free_endpoint()]
     result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert result.returncode == FAULTS["NO_PEER"].exit_status
@@ -28,6 +29,13 @@ def test_a_stop_without_a_rig_says_at_once_what_to_do() -> None:
     assert "no rig answers there within 2 s" in result.stderr
     assert "stop the exciter's amplifier by hand" in result.stderr
     assert time.monotonic() - began_s < 25.0  # others wait half a minute for a rig
+
+
+def test_a_controller_without_a_plant_is_told_what_to_start() -> None:
+    config = BusConfig(endpoint=free_endpoint())
+    with pytest.raises(Fault, match="no plant answers there after 1 s; start `stickslip plant`") as raised:
+        Bus(config, "controller", lockstep=True, patience_s=1.0)
+    assert raised.value.kind is FAULTS["NO_PEER"]
 
 
 def test_a_stop_is_heard_while_nobody_answers() -> None:

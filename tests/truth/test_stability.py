@@ -217,6 +217,7 @@ def test_the_tail_of_the_stribeck_curve_is_a_slope_too():
     assert 2.0 * drop_N * q / (1.0 + q * q) ** 2 / c.stribeck_velocity_mps == pytest.approx(0.5, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_the_map_of_a_rig_with_effects(tmp_path):
     """What an effect changes for good is in the map, what it has no place for is told."""
     plain = draw_map(rig(0.002, 50.0), tmp_path / "plain.png")
@@ -231,6 +232,7 @@ def test_the_map_of_a_rig_with_effects(tmp_path):
     assert "left out: frame-compliance" in found.answer
 
 
+@pytest.mark.slow
 def test_the_picture_and_its_numbers(tmp_path):
     result = draw_map(rig(), tmp_path / "map.png")
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
@@ -245,6 +247,7 @@ def test_the_picture_and_its_numbers(tmp_path):
     assert "a start at rest ends in stick-slip" in between.answer
 
 
+@pytest.mark.slow
 def test_of_several_drive_velocities_the_one_that_needs_most_is_told(tmp_path):
     """A damped drive at 1 mm/s sticks and slips; at 10 mm/s, to which it goes later, it does not."""
     profile = {"profile": [[0.0, 1e-3], [6.0, 1e-3], [6.1, 1e-2]], "damping_Ns_per_m": 50.0}

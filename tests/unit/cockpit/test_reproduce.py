@@ -8,6 +8,8 @@ import pytest
 from cockpit.paper.claims import PaperRow
 from cockpit.paper.page import reproduce
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):

@@ -9,6 +9,8 @@ from diagnosis.evidence.folder import load_evidence
 from tests.blind.real_logs import RIGS, bias, dead_time, drift, gain, lag, real_cases
 from tests.real.evidences import AXIS, MISSING, SLIDER
 
+pytestmark = pytest.mark.slow
+
 T_S = np.arange(2000) / 1000.0
 RAMP_N = 3.0 + 2.0 * T_S
 

@@ -19,6 +19,8 @@ from diagnosis.hypotheses.trials import trials
 from diagnosis.model.rig import Roughness
 from tests.real.evidences import AXIS, MISSING, axis
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.skipif(not AXIS.is_dir(), reason=MISSING)
 def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> None:

@@ -57,8 +57,9 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
     assert fitter.far_chi2(yielding.hypothesis, (described, weightless), impossible) > even > 1e3
 
 
+@pytest.mark.slow
 def test_a_form_that_leads_nowhere_is_left_early():
-    fitter = fitter_of(*prepared("ladder", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
+    fitter = fitter_of(*prepared("short", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
     described = np.zeros(len(fitter.nuisances))
     base = fitter.refit(NOTHING, described, described[:0]).chi2
 
@@ -77,7 +78,7 @@ def test_a_form_that_leads_nowhere_is_left_early():
 def test_single_numbers_lead_on_where_derivatives_lead_astray():
     """Where friction is late by more than a third of a slip, chi2 is jagged in every number of the rig at once."""
     late = {"frictional-lag": {"form": "dead-time", "delay_s": 5.5e-3, "share": 1.0}}
-    fitter = fitter_of(*prepared("ladder", late))
+    fitter = fitter_of(*prepared("short", late))
     form = next(
         one.hypothesis for one in trials(fitter.problem) if one.hypothesis.forms == {"frictional-lag": "dead-time"}
     )

@@ -10,12 +10,14 @@ from diagnosis.hypotheses.trials import trials
 from diagnosis.model.per_run import is_phase
 from tests.prepared import fitter_of, prepared
 
+pytestmark = pytest.mark.slow
+
 FREQUENCY_HZ, PHASE_RAD = 2.6, 1.2
 
 
 def test_every_run_begins_in_the_phase_that_suits_it():
     load = {"form": "sine", "ratio": 0.06, "frequency_Hz": FREQUENCY_HZ, "phase_rad": PHASE_RAD}
-    fitter = fitter_of(*prepared("ladder", {"normal-load-fluctuation": load}))
+    fitter = fitter_of(*prepared("short", {"normal-load-fluctuation": load}))
     described = np.zeros(len(fitter.nuisances))
     origin = fitter.described(described)
     starts = starts_by_run(fitter, origin, trials(fitter.problem))

@@ -17,6 +17,8 @@ from diagnosis.verdict.judge import JITTER
 from tests.blind.generator import Case, draw_effect, make
 from tests.prepared import prepared
 
+pytestmark = pytest.mark.slow
+
 RATIO = 0.03
 LOAD = {"normal-load-fluctuation": {"form": "random", "ratio": RATIO, "frequency_Hz": 2.0, "seed": 5}}
 
@@ -24,7 +26,7 @@ LOAD = {"normal-load-fluctuation": {"form": "random", "ratio": RATIO, "frequency
 @pytest.fixture(scope="module")
 def rig():
     """A rig under a random load: its runs, and the refitted model without a load."""
-    evidence, runs = prepared("ladder", LOAD)
+    evidence, runs = prepared("short", LOAD)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
     unseen = Problem(evidence.rig, [run for run in runs if run.holdout])
     return retuned_rig(evidence, problem, lambda _said, _share: None), unseen
@@ -77,6 +79,12 @@ def rigs_in_bursts(folder, effect, formula, count):
     return sum(found)
 
 
+def test_bursts_of_one_rig_are_told_from_a_load_that_goes_on(tmp_path):
+    assert rigs_in_bursts(tmp_path / "debris", "debris-bursts", "gaussian", 1) == 1
+    assert rigs_in_bursts(tmp_path / "load", "normal-load-fluctuation", "narrow-band", 1) == 0
+
+
+@pytest.mark.nightly
 def test_bursts_are_not_taken_for_a_load_that_goes_on(tmp_path):
     """Of 12 each 11 and 3, which takes a minute."""
     assert rigs_in_bursts(tmp_path / "debris", "debris-bursts", "gaussian", 4) == 4

@@ -16,7 +16,7 @@ def untold(_what, _share):
 
 @pytest.fixture(scope="module")
 def evidence_and_runs():
-    evidence, runs = prepared("ladder", {})
+    evidence, runs = prepared("short", {})
     return evidence, [run for run in runs if not run.holdout]
 
 
@@ -26,6 +26,7 @@ def straight(evidence_and_runs):
     return retuned_rig(evidence, Problem(evidence.rig, runs), untold)
 
 
+@pytest.mark.slow
 def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs, straight):
     evidence, runs = evidence_and_runs
 
@@ -41,6 +42,7 @@ def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs, straight):
     assert found.fit.chi2 < straight.fit.chi2 + 30.0
 
 
+@pytest.mark.slow
 def test_evidence_without_a_gap_leaves_about_what_is_expected(straight):
     _, fit, _, expected_chi2 = straight
     assert 0.5 * expected_chi2 < fit.chi2 < 2.0 * expected_chi2

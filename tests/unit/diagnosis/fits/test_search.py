@@ -15,6 +15,7 @@ from tests.prepared import fitter_of, prepared
 EFFECTS = {"coulomb-level": {"ratio": -0.14}, "stribeck-velocity": {"ratio": -0.57}}
 
 
+@pytest.mark.slow
 def test_a_second_effect_is_found_beside_one_that_is_there():
     fitter = fitter_of(*prepared("ladder", EFFECTS))
     described = np.zeros(len(fitter.nuisances))
@@ -29,9 +30,10 @@ def test_a_second_effect_is_found_beside_one_that_is_there():
     assert found == {name: pytest.approx(table["ratio"], rel=0.2) for name, table in EFFECTS.items()}
 
 
+@pytest.mark.slow
 def test_a_large_effect_that_screening_puts_last_is_tried_in_several_sizes():
     """Screening is linear: here it is made to see nothing in the static level, which it has behind eight others."""
-    fitter = fitter_of(*prepared("ladder", {"static-level": {"ratio": 0.2}}))
+    fitter = fitter_of(*prepared("short", {"static-level": {"ratio": 0.2}}))
     described = np.zeros(len(fitter.nuisances))
     tried = trials(fitter.problem)
     origins = [
