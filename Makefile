@@ -21,7 +21,8 @@ QUICK_CPU_S := 100 # of all tests of `make quick`: may only fall
 quick: warm ## under a minute once kernels are compiled; what every edit is tried with
 	@$(PARALLEL) -x -m "not slow and not realtime and not nightly" --cpu-each $(EACH_CPU_S) --cpu-all $(QUICK_CPU_S)
 
-test: check warm
+test: $(READY)
+	@$(MAKE) --no-print-directory -j2 check warm
 	@$(BIN)/pytest -m "realtime and not nightly"
 	@$(PARALLEL) -m "not realtime and not nightly" --cpu-each $(EACH_CPU_S)
 

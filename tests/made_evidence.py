@@ -5,7 +5,6 @@ sources of the plant, of the evidence and of what both stand on, and the version
 """
 
 import hashlib
-import os
 import shutil
 import tempfile
 import time
@@ -23,7 +22,7 @@ _KEPT_S = 3600.0  # folders of other sources: another run, of before an edit, ma
 
 def made_evidence(case: Case, seed: int) -> Path:
     """The folder of a case; the same case and seed have the same bytes."""
-    folder = _of_these_sources() / _name(case, seed)
+    folder = KEPT / digest_of(ROOT) / _name(case, seed)
     if not folder.exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(prefix="part-", dir=folder.parent))
@@ -38,7 +37,7 @@ def made_evidence(case: Case, seed: int) -> Path:
 def forget_old() -> None:
     """Delete what other sources made, an hour or more ago."""
     for folder in KEPT.glob("*"):
-        if folder != _of_these_sources() and time.time() - folder.stat().st_mtime > _KEPT_S:
+        if folder.name != digest_of(ROOT) and time.time() - folder.stat().st_mtime > _KEPT_S:
             shutil.rmtree(folder)
 
 
@@ -48,9 +47,10 @@ def _name(case: Case, seed: int) -> str:
 
 
 @cache
-def _of_these_sources() -> Path:
-    digest = hashlib.sha256((ROOT / "requirements.lock").read_bytes())
+def digest_of(root: Path) -> str:
+    """A hash over all that makes evidence, and over the versions of the packages, of the checkout at `root`."""
+    digest = hashlib.sha256((root / "requirements.lock").read_bytes())
     for place in MAKERS:
-        for path in sorted((ROOT / place).rglob("*.py")):
-            digest.update(f"{os.path.relpath(path, ROOT)}\n".encode() + path.read_bytes())
-    return KEPT / digest.hexdigest()[:16]
+        for path in sorted((root / place).rglob("*.py")):
+            digest.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -40,11 +40,21 @@ def diagnosis() -> None:
         fitter.refit(NOTHING, np.zeros(len(fitter.nuisances)), np.zeros(0))
 
 
+def generator(folder: Path) -> None:
+    """The rigs of the blind check, whose formulas are their own."""
+    from tests.blind.generators import Plan
+    from tests.blind.independent_cases import Independent
+    from tests.blind.small_set import RUNS
+
+    Independent(RUNS[1:2]).make(folder, Plan(), 1)
+
+
 if __name__ == "__main__":
     forget_old()
     if not DONE.exists():
         print("compiling kernels (once for these sources)", file=sys.stderr, flush=True)
         with tempfile.TemporaryDirectory() as folder:
             control(Path(folder))
+            generator(Path(folder) / "rig")
         diagnosis()
         DONE.touch()

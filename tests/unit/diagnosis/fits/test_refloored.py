@@ -12,12 +12,12 @@ from tests.prepared import fitter_of, prepared
 
 pytestmark = pytest.mark.slow
 
-SOFTER = -0.4
+SOFTER = -0.3
 
 
 def test_a_right_effect_leaves_little_on_its_own_floors():
     effects = {"drive-stiffness": {"form": "", "ratio": SOFTER}}
-    fitter = fitter_of(*prepared("short", effects))
+    fitter = fitter_of(*prepared("ladder", effects))
     described = np.zeros(len(fitter.nuisances))
     (trial,) = [one for one in trials(fitter.problem) if one.hypothesis.effects == ("drive-stiffness",)]
     (softer,) = refits(
