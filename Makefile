@@ -8,7 +8,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo test check docs reference bench blind real bless lock proto schemas clean
+.PHONY: demo quick test nightly warm check docs reference bench blind real bless lock proto schemas clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
