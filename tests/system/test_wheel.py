@@ -66,6 +66,7 @@ def installed(at: Path, requirement: str) -> Path:
 
 
 @pytest.mark.nightly
+@pytest.mark.timeout(1800)  # downloads
 def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> None:
     at = installed(tmp_path / "base", str(wheel))
     files = [path for path in (tmp_path / "base" / "lib").rglob("*") if path.is_file()]
@@ -78,6 +79,7 @@ def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.nightly
+@pytest.mark.timeout(1800)  # downloads
 def test_a_fresh_installation_with_all_diagnoses(wheel: Path, tmp_path: Path) -> None:
     made_up.evidence_folder(tmp_path / "evidence")
     at = installed(tmp_path / "all", f"{wheel}[all]")

@@ -1,6 +1,6 @@
 """Kept sizes: with these a set is made again without sizing, and is the same set for every version of the sizing.
 
-`sizes/<generator>-<seed>.toml` has a table for the seed of each case; an entry gives the strength of an effect and the detection
+`<generator>-<seed>.toml` beside this file has a table for the seed of each case; an entry gives the strength of an effect and the detection
 limits that the effect is worth. These files hold all of the answers but the names of the cases, so a set made with them is
 development data.
 """
@@ -19,7 +19,7 @@ OPENED = {
 
 def known_sizes(generator: str, seed: int) -> dict[int, Sizes]:
     """The kept sizes, by the seed of a case; empty where a set was never sized."""
-    path = Path(__file__).parent / "sizes" / f"{generator}-{seed}.toml"
+    path = Path(__file__).parent / f"{generator}-{seed}.toml"
     return read_sizes(path) if path.is_file() else {}
 
 
