@@ -118,7 +118,7 @@ def test_nothing_leaks_from_the_held_out_run(damped, one, short, tmp_path):
     two = diagnosed(other, 2)
     assert one.effects == ("drive-damping",)
     own_fits, other_fits = (
-        {fit.effect: (fit.chi2, fit.hypothesis, fit.parameters) for fit in found.candidates} for found in (one, two)
+        {fit.effect: (fit.chi2, fit.form, fit.parameters) for fit in found.candidates} for found in (one, two)
     )
     assert own_fits == other_fits
     assert one.gap.retuned != two.gap.retuned
