@@ -16,6 +16,8 @@ from tests.blind.generator.library import formulas_of
 from tests.blind.generator.rig import BACKBONES, DESCRIBED, draw_rig, draw_starts
 from tests.blind.generator.runs import PROTOCOL, Plan, tracks_of
 
+pytestmark = pytest.mark.slow
+
 EXACT = {"tolerances": 0.0, "roughness": 0.0, "sensors": 0.0, "backbone": "lugre"}
 STIFFNESS_N_per_m = DESCRIBED["drive_stiffness_N_per_m"]
 # slips, slides the other way through zero force, and vibrates, in 2 s: every mechanism has a part in it

@@ -28,6 +28,7 @@ def test_cross_talk_is_unexplained_and_told_with_where_and_what_next(tmp_path):
     assert sum(cell.share for cell in found.where) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_harmonics_are_found_where_the_base_vibrates(tmp_path):
     source = Independent(RUNS)
     harmonics = source.draw(np.random.default_rng(1), "piezo-harmonics")

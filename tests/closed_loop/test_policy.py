@@ -26,6 +26,7 @@ def test_paper_case() -> None:
     assert np.ptp(loop.drive_force_N[loop.t_s > 12.0]) < 0.05 * 17.38
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pair", PAIRS)
 def test_from_the_start_no_pair_slips_more_than_once(pair: str) -> None:
     loop = close_the_loop(16.0, controller={"contact_resonance_Hz": PAIRS[pair]}, pair=pair)
@@ -163,12 +164,14 @@ def test_stick_is_seen_long_before_the_slip() -> None:
         assert predicted_s == pytest.approx(0.3, abs=0.1)
 
 
+@pytest.mark.slow
 def test_no_false_stick_in_a_minute_of_smooth_sliding() -> None:
     controller = {"policy": {"probe_every_s": 600.0}}
     loop = close_the_loop(60.0, controller=controller, rig={"solver": {"step_s": 1e-5}})
     assert not (loop.trace["state"][loop.t_s > 4.0] == wire.STICK).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", ["drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("bad_block", [20, 300, 1500])  # before, at and after the switch-on
@@ -209,6 +212,7 @@ def test_lost_blocks_do_not_disturb_the_measured_velocity(pause_blocks: int) -> 
     assert loop.slips(0.0) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every_blocks", [4, 15])
 @pytest.mark.parametrize("unreadable", [False, True], ids=["lost", "no numbers"])
 @pytest.mark.parametrize("from_block", [0, 3000])

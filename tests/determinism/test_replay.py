@@ -203,6 +203,7 @@ def test_the_log_of_a_closed_loop_with_a_change_replays(log: Path, tmp_path: Pat
     assert read_run(third).trace.tobytes() == read_run(out).trace.tobytes()
 
 
+@pytest.mark.slow
 def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_the_controllers(tmp_path: Path) -> None:
     stopped, again = tmp_path / "stopped.mcap", tmp_path / "again.mcap"
     run = load_scenario("from-the-start", ["duration_s=14.0"])

@@ -41,6 +41,7 @@ def test_a_new_run_keeps_its_figures(name: str, tmp_path: Path) -> None:
         assert low <= now[field] <= high or now[field] == pytest.approx(low), field
 
 
+@pytest.mark.slow
 def test_blessing_demands_a_reason() -> None:
     for reason in ([], ["--reason", " "], ["--reason", "because"]):
         result = subprocess.run([sys.executable, "-m", "tests.golden.bless", *reason], capture_output=True, check=False)

@@ -15,6 +15,8 @@ from cockpit.run.child_process import EXTRA_MODULES
 from tests import made_up
 from tests.system.ports import free_endpoint
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 STICKSLIP = Path(sys.executable).with_name("stickslip")
 # packages of the project, and modules that its packages, joblib and Python import before anything else

@@ -12,6 +12,8 @@ import pytest
 from tests import made_up
 from tests.system.ports import free_endpoint
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("bridge", "cockpit", "controller", "diagnosis", "plant")
 BASE_MB = 650.0

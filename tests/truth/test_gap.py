@@ -129,6 +129,7 @@ def numbers_of(name: str, sizes: Sizes, size: float) -> dict[str, float | str]:
     return table
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(EFFECTS))
 def test_the_gap_rises_with_the_size_of_every_effect(bench, name):
     measured = bench.problem.measured

@@ -22,6 +22,7 @@ TABLE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pair", "frequency_Hz"), TABLE)
 def test_the_cycle_means_are_those_of_the_independent_solution(pair, frequency_Hz):
     expected = TABLE[pair, frequency_Hz]

@@ -97,6 +97,7 @@ def rigs(rig, effects, roughness=None, count=LANES):
     return [rig_config(rig, value, effects, roughness) for value in values]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "form"), [("", ""), *FORMS])
 def test_as_the_plants_kernel(ladder, tables, name, form):
     rig, _ = ladder

@@ -30,6 +30,7 @@ def response(gain, frequency_Hz, tau_s=TAU_S, delay=DELAY):
     return gain / (z - 1.0) * (1.0 - a) * z / (z - a) * z**-delay
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tau_s", "delay", "wanted_deg"), [(5e-3, 2, 60), (5e-3, 6, 45), (2e-2, 1, 70)])
 def test_the_phase_margin_is_what_was_asked_for(tau_s, delay, wanted_deg):
     found = design(BLOCK_S, tau_s, delay, wanted_deg)
@@ -39,6 +40,7 @@ def test_the_phase_margin_is_what_was_asked_for(tau_s, delay, wanted_deg):
     assert found.phase_margin_deg == pytest.approx(wanted_deg, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tau_s", "delay"), [(5e-3, 2), (5e-3, 10), (1e-3, 5), (2e-2, 1)])
 def test_the_gain_margin_is_where_the_loop_starts_to_oscillate(tau_s, delay):
     found = design(BLOCK_S, tau_s, delay)

@@ -50,6 +50,7 @@ def pool(*files):
     return CliRunner().invoke(app, ["blind", "pool", *map(str, files)])
 
 
+@pytest.mark.slow
 def test_scores_are_the_same_again(tmp_path):
     found = opened_set(1)
     assert scored(pooled([kept(tmp_path, 1)])) == scored(found)
@@ -57,6 +58,7 @@ def test_scores_are_the_same_again(tmp_path):
     assert scored(pooled([kept(tmp_path, 2, oracle=None, trees=None)])).keys() == scored(without).keys()
 
 
+@pytest.mark.slow
 def test_several_sets_count_as_one(tmp_path):
     files = [kept(tmp_path, number) for number in (1, 2)]
     together, alone = scored(pooled(files)), scored(opened_set(1))
@@ -73,6 +75,7 @@ def test_several_sets_count_as_one(tmp_path):
     assert pool(tmp_path / "both.json").stdout == result.stdout.split("\n\nreport")[0] + "\n"
 
 
+@pytest.mark.slow
 def test_one_opened_set_makes_all_development_data(tmp_path):
     files = [kept(tmp_path, 1), kept(tmp_path, 2, sealed=False)]
     assert "DEVELOPMENT DATA" in pool(*files).stdout

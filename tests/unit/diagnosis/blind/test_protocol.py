@@ -100,6 +100,7 @@ def test_the_key_holds_every_kind_of_case(made):
     assert (outside["verdict"], outside["effects"][0]["name"]) == ("unexplained", "loose-screw")
 
 
+@pytest.mark.slow
 def test_the_same_seed_makes_the_same_evidence_under_other_names(made, tmp_path):
     assert make(tmp_path, out=tmp_path / "again", key=tmp_path / "again.json").exit_code == 0
     first, again = sealing.read_set(made / "set"), sealing.read_set(tmp_path / "again")
@@ -110,6 +111,7 @@ def test_the_same_seed_makes_the_same_evidence_under_other_names(made, tmp_path)
     assert {one.answer_sha256 for one in first.values()}.isdisjoint(one.answer_sha256 for one in again.values())
 
 
+@pytest.mark.slow
 def test_bad_arguments_make_nothing(made, tmp_path):
     for other, word in (
         ({"out": tmp_path / "other", "key": tmp_path / "other" / "key.json"}, "must be outside"),
@@ -140,6 +142,7 @@ def test_a_generator_that_breaks_leaves_nothing(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
     options = {"out": tmp_path / "again", "key": tmp_path / "again.json"}
     part = tmp_path / ".again-in-the-making"
@@ -182,6 +185,7 @@ def test_a_making_is_taken_up_again(made, tmp_path, monkeypatch):
     assert sealing.opened_answers(tmp_path / "again", tmp_path / "again.json")
 
 
+@pytest.mark.slow
 def test_known_sizes_make_the_same_set_without_sizing(made, tmp_path, monkeypatch):
     def sized_again(*_arguments):
         raise AssertionError("was sized again")
@@ -216,6 +220,7 @@ def test_one_line_says_what_makes_a_set(options):
     assert len(result.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_run_is_taken_up_again(made):
     names = sorted(answers(made))
     results = made / "set" / "results"
@@ -235,6 +240,7 @@ def test_a_run_is_taken_up_again(made):
     assert not (results / f"{names[1]}.json").exists()
 
 
+@pytest.mark.slow
 def test_a_killed_run_keeps_what_is_done(made):
     """Killed politely after its first results: whole files only, and the rest is done later."""
     code = "from tests.unit.diagnosis.blind.test_protocol import slow_run; slow_run()"
@@ -266,6 +272,7 @@ def slow(evidence, progress, jobs):
     return made_up.quick(evidence, progress, jobs)
 
 
+@pytest.mark.slow
 def test_a_case_that_fails_counts_as_wrong(made, monkeypatch):
     monkeypatch.setattr(many, "real_diagnose", refusing)
     assert blind("run", made / "set", "--jobs", 1).exit_code == 0
@@ -281,6 +288,7 @@ def refusing(evidence, progress, jobs):
     raise ZeroDivisionError("nothing to divide by")
 
 
+@pytest.mark.slow
 def test_a_set_is_scored_once(done):
     result = score(done, "--json", done / "scores.json", "--report", done / "report.html")
     assert result.exit_code == 0, result.output
@@ -320,6 +328,7 @@ def test_a_damaged_result_is_told_before_opening(done):
     assert not (done / "set" / "opened.json").exists()
 
 
+@pytest.mark.slow
 def test_missing_results_stay_sealed(done):
     name = sorted(answers(done))[3]
     (done / "set" / "results" / f"{name}.json").unlink()
@@ -361,6 +370,7 @@ def test_what_was_changed_is_caught(done):
     refused("the evidence is not the one that was sealed")
 
 
+@pytest.mark.slow
 def test_what_cannot_be_written_is_known_before_opening(done):
     for option in (f"--json={done}", f"--report={done}"):
         result = score(done, option)

@@ -232,6 +232,7 @@ def test_every_size_of_every_effect_of_the_plant_is_a_rig(tmp_path):
     assert "drive-backlash" not in possible("force", vibrated=False)
 
 
+@pytest.mark.slow
 def test_the_plants_cases_differ_by_their_effect_alone(tmp_path):
     source = Plant()
     effect = source.draw(np.random.default_rng(1), "force-sensor-bias").scaled(0.5)

@@ -44,6 +44,7 @@ stribeck_velocity_mps = 0.002
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not ENS.is_dir(), reason=f"needs the ENS Lyon data set in {ENS}")
 @pytest.mark.parametrize(
     ("name", "stiffness_N_per_m", "speed_mps", "rows"),

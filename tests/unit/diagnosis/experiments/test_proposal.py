@@ -36,6 +36,7 @@ def one_speed():
     return problem, nuisances, fits
 
 
+@pytest.mark.slow
 def test_ageing_and_static_level_are_told_apart_by_speed_or_dwell(one_speed):
     problem, nuisances, fits = one_speed
     leaders = [fits["static-friction-ageing"], fits["static-level"]]
@@ -47,6 +48,7 @@ def test_ageing_and_static_level_are_told_apart_by_speed_or_dwell(one_speed):
     assert next_experiment(problem, nuisances, leaders) == found
 
 
+@pytest.mark.slow
 def test_what_predicts_the_same_everywhere_gets_a_check_by_hand(one_speed):
     problem, nuisances, fits = one_speed
     fit = fits["static-level"]

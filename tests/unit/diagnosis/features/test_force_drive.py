@@ -56,6 +56,7 @@ def test_a_described_axis_has_no_gap_and_is_followed(plain: tuple[Problem, list[
         assert np.std(predicted["drive_force_N"] - run.signals["drive_force_N"]) < 1.0  # the encoder's noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", [WAVE, GAIN], ids=lambda effects: next(iter(effects)))
 def test_an_effect_opens_a_gap_that_only_it_closes(effects: Effects) -> None:
     problem, runs, point = made(effects)

@@ -75,6 +75,7 @@ def test_a_form_that_leads_nowhere_is_left_early():
     assert tried.chi2 < 1.05 * refitted.chi2
 
 
+@pytest.mark.slow
 def test_single_numbers_lead_on_where_derivatives_lead_astray():
     """Where friction is late by more than a third of a slip, chi2 is jagged in every number of the rig at once."""
     late = {"frictional-lag": {"form": "dead-time", "delay_s": 5.5e-3, "share": 1.0}}

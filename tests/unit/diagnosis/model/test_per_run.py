@@ -51,6 +51,7 @@ def test_runs_apart_show_the_wave_with_a_phase_for_each(problem):
     assert math.remainder(later - LATER, 2.0 * math.pi) == pytest.approx(0.0, abs=0.8)
 
 
+@pytest.mark.slow
 def test_a_refit_finds_both_phases(problem):
     nuisances = Nuisances(problem.rig)
     described = np.zeros(len(nuisances))

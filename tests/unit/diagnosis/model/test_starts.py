@@ -53,6 +53,7 @@ def test_a_screw_stands_where_the_drives_own_sensor_says(screw):
     assert np.ptp(drive_m(0.5, 0.0) - drive_m(0.5, 0.25 * PITCH_M)) > 1e-6
 
 
+@pytest.mark.slow
 def test_two_waves_along_the_track_are_found_together():
     other = {"other_share": 0.6, "other_wavelength_m": 9e-4, "other_phase_rad": -1.1}
     track = {"form": "two-waves", "ratio": 0.06, "wavelength_m": 4e-3, "phase_rad": 0.7, **other}
@@ -66,6 +67,7 @@ def test_two_waves_along_the_track_are_found_together():
     assert all(first.ratio >= other.ratio > 0.0 for first, other in pairs)
 
 
+@pytest.mark.slow
 def test_waves_beside_a_wave_have_their_own_phase():
     """At other periods the phase at the zero of the position differs by turns; where the slide is it must stay."""
     bumps = {"form": "bumps", "ratio": 0.15, "wavelength_m": 3e-3, "phase_rad": 0.7, "width": 0.12}
@@ -88,6 +90,7 @@ def test_a_wave_over_time_turns_once_in_a_run():
     assert frequency.value(-2.0) == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_a_base_that_rings_shows_its_frequency():
     """Stuck to the base, the slide lowers it: 1 / (compliance omega^2) is 5 kg, and 1.5 kg more."""
     ring = {"compliance_m_per_N": 2e-7, "frequency_Hz": 160.0, "damping_ratio": 0.03}

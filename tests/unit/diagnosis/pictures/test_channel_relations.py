@@ -37,6 +37,7 @@ def test_a_clean_rig_leaves_its_noise(clean):
     assert all(0.02 < level < 2.0 for level in found.values()), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", LIT)
 def test_an_effect_lights_its_relation(effect, clean):
     numbers, name, variable = LIT[effect]

@@ -41,6 +41,7 @@ def test_every_run_has_its_cycle_and_the_effect_its_residual(aged):
     assert residuals[0].x_label == "time at rest before the breakaway [s]"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [None, *EFFECTS])
 def test_any_verdict_can_be_drawn(aged, effect):
     problem, nuisances = aged

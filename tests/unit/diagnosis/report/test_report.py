@@ -64,6 +64,7 @@ def test_the_answer_comes_first_and_everything_is_there_in_order(tmp_path):
         place = text.index(part, place)
 
 
+@pytest.mark.slow
 def test_twenty_pictures_stay_small_and_nothing_comes_from_outside(tmp_path):
     pictures = tuple(made_up.picture("residual" if seed % 2 else "cycle", 2000, seed) for seed in range(20))
     page = page_of(made_up.diagnosis()._replace(pictures=pictures), tmp_path)
@@ -73,6 +74,7 @@ def test_twenty_pictures_stay_small_and_nothing_comes_from_outside(tmp_path):
     assert all(source.startswith("data:image/png;base64,") for source in re.findall(r'src="([^"]{0,30})', page))
 
 
+@pytest.mark.slow
 def test_too_many_pictures_are_drawn_coarser(tmp_path, monkeypatch):
     monkeypatch.setattr("diagnosis.report.page_plots._ALL_BYTES", 60_000)
     pictures = tuple(made_up.picture("residual", 2000, seed) for seed in range(4))

@@ -30,6 +30,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("protocol", [*PROTOCOLS, FORCE_PROTOCOL])
 def test_every_protocol_loads_without_a_doubt(protocol):
     evidence = load_evidence(made_evidence(Case(protocol), 1))
