@@ -52,7 +52,8 @@ def _scenario() -> dict[str, Any]:
 
 
 def _with_pairs_and_effects(schema: dict[str, Any]) -> dict[str, Any]:
-    from plant.effects.library import EFFECTS, Form
+    from plant.effects.library import EFFECTS
+    from plant.effects.row import Form
     from plant.pairs import PAIRS
 
     def form(name: str, formula: Form, first: bool) -> dict[str, Any]:
