@@ -140,8 +140,8 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     cos_phi = cos_mid * cos_half - sin_mid * sin_half
                     sin_phi = sin_mid * cos_half + cos_mid * sin_half
                 if disturbed:
-                    if p.ripple_ratio != 0.0:
-                        drive_velocity_mps = drive * unevenness(p, t_s + 0.5 * dt, even_m + 0.5 * dt * drive)
+                    if p.ripple_ratio != 0.0 or p.ripple_per_N != 0.0:
+                        drive_velocity_mps = drive * unevenness(p, t_s + 0.5 * dt, even_m + 0.5 * dt * drive, force_N)
                         even_m += dt * drive
                     anchor_mps = drive_velocity_mps - frame_mps
                     extension_m = s_d - frame_m - x

@@ -93,7 +93,7 @@ def advance_lanes(
         w[at.FORCE + i], w[at.FRAME + i], w[at.FRAME_V + i] = s.drive_N, s.frame_m, s.frame_mps
         w[at.BASE + i], w[at.BASE_V + i], w[at.ARM + i] = s.base_m, s.base_mps, s.arm_N
         w[at.AGE + i], w[at.V_LAG + i] = s.age_s, s.v_lag
-        ripples = ripples or p.ripple_ratio != 0.0
+        ripples = ripples or p.ripple_ratio != 0.0 or p.ripple_per_N != 0.0
         sags = sags or w[at.SAG_PER_N + i] != 0.0
         settles = settles or p.drift_settling_s > 0.0
         lags = lags or p.lag_s > 0.0 or p.lag_dead_s > 0.0 or p.lag_distance_m > 0.0
@@ -151,7 +151,7 @@ def advance_lanes(
             if ripples:
                 for i in range(LANES):
                     even_m = state[i].even_m + travelled_m + 0.5 * dt * drive[block]
-                    w[at.DRIVE + i] = drive[block] * unevenness(params[i], t_s + 0.5 * dt, even_m)
+                    w[at.DRIVE + i] = drive[block] * unevenness(params[i], t_s + 0.5 * dt, even_m, w[at.FORCE + i])
             if settles:
                 for i in range(LANES):
                     w[at.SETTLED + i] = -w[at.SETTLING + i] * at.gone(

@@ -192,6 +192,7 @@ CATALOGUE: Final[dict[str, Row]] = {
         forms={
             "screw": Tried(lambda _: _ALONG_WAY, waves_of_screw),
             "time": Tried(lambda _: _OVER_TIME, waves_of_motor),
+            "load": Tried(lambda _: _ALONG_WAY, waves_of_screw),
         },
         check=DRIVE,
     ),

@@ -1,6 +1,9 @@
 """The drive: its spring and what damps it, and how evenly it moves.
 
-Sources: hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994.
+Sources: hardening and ripple as in Armstrong-Helouvry, Dupont & Canudas de Wit 1994; once a turn of a screw: the travel variation
+v_2pi of ISO 3408-3. Under load: a compliance c (1 + s w(angle)) between screw and drive, as its nut or thrust bearing has where
+it sits askew, gives way by F_d c s w more, so where F_d changes little within a turn the drive's velocity swings by a share
+F_d c s 2 pi / wavelength: it grows with the load, and an unloaded drive runs evenly.
 """
 
 import math
@@ -12,6 +15,7 @@ from plant.effects.waves import TWO_PI, wave
 
 _EVENED = 200  # rounds, of half a step each: whole ones swing ever wider where the speed more than doubles
 _HALVINGS = 44
+MOST_UNEVEN: Final = 0.95  # of the velocity's ripple: a drive does not stop
 
 
 @kernel
@@ -60,20 +64,22 @@ def extension_m(p: Record, force_N: float) -> float:
 
 
 @kernel
-def unevenness(p: Record, t_s: float, even_m: float) -> float:
-    """Velocity of an uneven drive over that of an even one, which would be at `even_m` now."""
+def unevenness(p: Record, t_s: float, even_m: float, force_N: float) -> float:
+    """Velocity of an uneven drive under a drive force over that of an even one, which would be at `even_m` now."""
     turns = p.ripple_frequency_Hz * t_s
     if p.ripple_wavelength_m > 0.0:
         turns = even_m / p.ripple_wavelength_m
     angle_rad = TWO_PI * turns + p.ripple_phase_rad
-    return 1.0 + p.ripple_ratio * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
+    size = min(p.ripple_ratio + p.ripple_per_N * math.fabs(force_N), MOST_UNEVEN)
+    return 1.0 + size * wave(angle_rad, p.ripple_sin_2, p.ripple_cos_2)
 
 
 @kernel
 def even_m(p: Record, drive_m: float) -> float:
     """Where an even drive would be when one with a screw's lead errors is at `drive_m`.
 
-    The errors are the integral of the velocity's ripple over the even position, without a mean.
+    The errors are the integral of the velocity's ripple over the even position, without a mean. Those under load hang on the
+    forces on the way there and are left out: `drive_m` is at most ratio wavelength / 2 pi off by them.
     """
     found_m = drive_m
     if p.ripple_wavelength_m > 0.0:
@@ -106,15 +112,18 @@ def _set_backlash(p: Any, _form: str, value: dict[str, float]) -> None:
     p.gap_m = value["gap_m"]
 
 
-def _set_ripple(p: Any, _form: str, value: dict[str, float]) -> None:
-    p.ripple_ratio = value["ratio"]
+def _set_ripple(p: Any, form: str, value: dict[str, float]) -> None:
+    p.ripple_ratio, p.ripple_per_N = value["ratio"], 0.0
+    if form == "load":
+        p.ripple_ratio, p.ripple_per_N = 0.0, value["ratio"] / p.F_s
     p.ripple_phase_rad, p.ripple_sin_2, p.ripple_cos_2 = wave_shape(value)
     p.ripple_wavelength_m, p.ripple_frequency_Hz = value.get("wavelength_m", 0.0), value.get("frequency_Hz", 0.0)
 
 
 _SPRING = ("spring",)
 _DAMPING = Parameter("damping_Ns_per_m", 0.0, 1e6, 10.0)
-_UNEVEN = ratio(0.05, 0.0, 0.95)
+_UNEVEN = ratio(0.05, 0.0, MOST_UNEVEN)
+_PITCH = Parameter("wavelength_m", 1e-5, 1.0, 1e-3)
 DRIVE: Final = {
     "drive-damping": Effect(
         "drive",
@@ -164,19 +173,23 @@ DRIVE: Final = {
         {
             "screw": Form(
                 "drive velocity times 1 + ratio w(2 pi s_e / wavelength_m + phase): the motor turns evenly",
-                (_UNEVEN, Parameter("wavelength_m", 1e-5, 1.0, 1e-3), *WAVE_SHAPE),
+                (_UNEVEN, _PITCH, *WAVE_SHAPE),
             ),
             "time": Form(
                 "drive velocity times 1 + ratio w(2 pi frequency_Hz t + phase)",
                 (_UNEVEN, Parameter("frequency_Hz", 1e-3, 1e3, 1.0), *WAVE_SHAPE),
             ),
+            "load": Form(
+                "as screw, with ratio |F_d| / F_s for ratio, 0.95 at most: the screw gives way, and unloaded it is even",
+                (_UNEVEN, _PITCH, *WAVE_SHAPE),
+            ),
         },
         _set_ripple,
         numbers=(
-            *("ripple_ratio", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
+            *("ripple_ratio", "ripple_per_N", "ripple_wavelength_m", "ripple_frequency_Hz", "ripple_phase_rad"),
             *("ripple_sin_2", "ripple_cos_2"),
         ),
-        switches=("ripple_ratio",),
+        switches=("ripple_ratio", "ripple_per_N"),
         memory=(("even_m", "f8"),),
         drives=_SPRING,
     ),

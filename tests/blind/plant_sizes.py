@@ -94,6 +94,7 @@ EFFECT_SIZES: Final[dict[str, tuple[Sizes, ...]]] = {
     "drive-speed-ripple": (
         Sizes("screw", "ratio", 0.01, 0.3, log={"wavelength_m": (5e-4, 5e-3)}, even={"phase_rad": TURN}),
         Sizes("time", "ratio", 0.01, 0.3, log={"frequency_Hz": (0.2, 5.0)}, even={"phase_rad": TURN}),
+        Sizes("load", "ratio", 0.01, 0.3, log={"wavelength_m": (5e-4, 5e-3)}, even={"phase_rad": TURN}),
     ),
     "frame-compliance": (Sizes("", "ratio", 0.02, 0.3, log={"frequency_Hz": (30.0, 300.0), **DAMPING}),),
     # a drop of 4 N shakes a base of 150 Hz with 0.03 m/s^2 at 1e-8 m/N

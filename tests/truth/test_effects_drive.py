@@ -154,6 +154,46 @@ def test_ripple_of_a_screw_follows_its_own_angle():
     assert turn_s == pytest.approx(wavelength_m / 5e-4, rel=1e-6)
 
 
+def test_a_screw_that_gives_way_is_the_more_uneven_the_more_it_carries():
+    """Independently: SciPy integrates drive and slide, a mass on the drive's spring that starts 2 mm behind the drive."""
+    ratio, wavelength_m, phase, at_mps = 0.4, 2e-4, 1.0, 5e-4
+    values = {"form": "load", "ratio": ratio, "wavelength_m": wavelength_m, "phase_rad": phase, "second_cos": 0.3}
+    # the static friction is only what the load is relative to: at any speed none is left of it
+    contact = NO_FRICTION | {"static_force_N": 40.0, "stribeck_velocity_mps": 1e-9}
+    config = rig({"drive-speed-ripple": values}, contact=contact)
+    start_N = STIFFNESS * 2e-3
+    result = run(config, np.full(1000, at_mps), {"s_d": 2e-3, "drive_N": start_N, "v": 1e-4, "v_r": 1e-4})
+
+    def slope(t_s, state):
+        drive_m, x, v = state
+        force_N = STIFFNESS * (drive_m - x)
+        angle_rad = TAU * at_mps * t_s / wavelength_m + phase
+        shape = math.sin(angle_rad) + 0.3 * math.cos(2.0 * angle_rad)
+        return at_mps * (1.0 + ratio * abs(force_N) / 40.0 * shape), v, force_N / MASS_KG
+
+    t_s = result.t_s
+    drive_m, x, _ = solve_ivp(
+        slope, (0, t_s[-1]), (2e-3, 0.0, 1e-4), t_eval=t_s, rtol=1e-10, atol=1e-14, max_step=1e-3
+    ).y
+    assert result.true_drive_position_m == pytest.approx(drive_m, abs=1e-8)
+    assert result.true_position_m == pytest.approx(x, abs=1e-6)
+    assert np.ptp(drive_m - at_mps * t_s) > 1e-6
+
+
+def test_a_screw_under_a_constant_load_is_uneven_in_proportion_to_it():
+    """Closed form: the lead error of form "screw", times the load over F_s."""
+    ratio, wavelength_m, phase, load = 0.4, 2e-4, 1.0, 0.6
+    values = {"form": "load", "ratio": ratio, "wavelength_m": wavelength_m, "phase_rad": phase}
+    config = rig({"drive-speed-ripple": values}, slide={"mass_kg": HEAVY_KG}, drive={"stiffness_N_per_m": 1.0})
+    extended_m = (
+        load * config.contact.static_force_N
+    )  # of a spring of 1 N/m: the drive's way changes nothing of its force
+    result = run(config, np.full(1000, 5e-4), {"s_d": extended_m, "drive_N": extended_m})
+    even_m = 5e-4 * result.t_s
+    lead_error_m = ratio * wavelength_m / TAU * (math.cos(phase) - np.cos(TAU * even_m / wavelength_m + phase))
+    assert result.true_drive_position_m - extended_m == pytest.approx(even_m + load * lead_error_m, abs=1e-8)
+
+
 @pytest.mark.parametrize("ratio", [0.4, 0.6])  # up to 1.6 and 2.1 times the speed
 def test_where_a_screw_s_even_drive_would_be(ratio):
     wavelength_m = 2e-4

@@ -45,7 +45,7 @@ def test_every_name_is_there():
         ("normal-load-fluctuation", ["sine", "random"]),
         ("friction-drift", ["linear", "settling", "session"]),
         ("drive-hardening", ["cubic", "bilinear"]),
-        ("drive-speed-ripple", ["screw", "time"]),
+        ("drive-speed-ripple", ["screw", "time", "load"]),
         ("piezo-roll-off", ["first-order", "second-order"]),
         ("piezo-resonance", ["mount", "mode"]),
         ("piezo-sag", ["load", "heat"]),
