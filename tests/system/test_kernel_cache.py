@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 COMPILES = """
 import math, subprocess, sys
 import numba
 from plant.four_rigs_step import gone
-
-pytestmark = pytest.mark.slow
 assert math.isclose(gone(0.5), math.expm1(-0.5))
 started = "import numba, bridge.kernel; print(numba.config.CACHE_DIR)"
 print(numba.config.CACHE_DIR, subprocess.run([sys.executable, "-c", started], capture_output=True, text=True).stdout)

@@ -16,6 +16,8 @@ from cockpit.cli import app
 from cockpit.commands.json_option import with_places
 from tests.logs import short_log
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
