@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.wire.messages import CHANNELS
 from diagnosis.evidence.folder import SHAKE_RATE_HZ, Run
 
 Floats = npt.NDArray[np.floating[Any]]
 BLOCK_S = 1e-3
-MEANS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+MEANS = CHANNELS
 SHAKES = ("mass_shake_mps2", "base_shake_mps2")  # rms within a block, about the block's mean
 SIGNALS = (*MEANS, *SHAKES)
 SHAKEN = {"mass_shake_mps2": "mass_accel_mps2", "base_shake_mps2": "base_accel_mps2"}

@@ -133,7 +133,7 @@ def _predict(
         p.dt_s = BLOCK_S / samples
         advance_disturbed(params, state, drive[block], frequency_Hz[block], amplitude_m[block],
                           analogue[:, :samples], truth[:, :samples])  # fmt: skip
-        for row in range(5):
+        for row in range(analogue.shape[0]):
             total = 0.0
             for i in range(samples):
                 total += analogue[row, i]

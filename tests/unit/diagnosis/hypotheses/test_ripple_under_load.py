@@ -1,0 +1,47 @@
+"""A screw that gives way is told from one whose lead is wrong: the one is even while it carries nothing."""
+
+import math
+
+import numpy as np
+import pytest
+
+from diagnosis.hypotheses.trials import trials
+from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
+from tests.prepared import fitter_of, prepared
+
+EFFECT, RATIO, WAVELENGTH_M = "drive-speed-ripple", 0.2, 1.1e-3
+# to and fro: the force goes through 0, and there the two differ most
+TO_AND_FRO = (RunPlan(((0.0, 0.002), (1.5, 0.002), (1.55, -0.002)), duration_s=4.0),)
+
+
+@pytest.fixture(scope="module", params=["load", "screw"])
+def fitted(request):
+    """The form that is there, and a refit of each form from the found wave that is nearest."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(PROTOCOLS, "to-and-fro", TO_AND_FRO)
+        ripple = {"form": request.param, "ratio": RATIO, "wavelength_m": WAVELENGTH_M}
+        fitter = fitter_of(*prepared("to-and-fro", {EFFECT: ripple}))
+    described = np.zeros(len(fitter.nuisances))
+
+    def off(trial):
+        pitch = next(one for one in trial.hypothesis.coordinates if one.name == "wavelength_m")
+        return abs(math.log(pitch.scale / WAVELENGTH_M))
+
+    fits = {}
+    for form in ("load", "screw"):
+        nearest = min((trial for trial in trials(fitter.problem) if trial.hypothesis.forms == {EFFECT: form}), key=off)
+        fits[form] = fitter.refit(nearest.hypothesis, described, nearest.w)
+    return request.param, fits
+
+
+def test_the_form_that_is_there_fits_best(fitted):
+    there, fits = fitted
+    other = "screw" if there == "load" else "load"
+    assert fits[there].chi2 < 0.8 * fits[other].chi2
+
+
+def test_its_numbers_come_back(fitted):
+    there, fits = fitted
+    found = fits[there].hypothesis.tables(fits[there].w)[EFFECT]
+    assert found["ratio"] == pytest.approx(RATIO, rel=0.05)
+    assert found["wavelength_m"] == pytest.approx(WAVELENGTH_M, rel=0.01)
