@@ -1,7 +1,8 @@
 """Strict configuration from TOML: a misspelt or out-of-range key is one clear line, never a default."""
 
+import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
@@ -60,6 +61,17 @@ def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, 
     return result
 
 
+def blamed(fault: Fault, source: str, settings: Sequence[str]) -> Fault:
+    """The fault of a table that is sound without `settings`: each line names those it is about in place of `source`."""
+    lines: list[str] = []
+    for line in fault.line.splitlines():
+        names = {setting: setting.partition("=")[0].strip().rpartition(".")[2] for setting in settings}
+        about = [setting for setting, name in names.items() if re.search(rf"\b{re.escape(name)}\b", line)]
+        place = ", ".join(f"--set {setting}" for setting in about or settings)
+        lines.append(line.replace(f"{source}: ", f"{place}: ", 1) if line.startswith(f"{source}: ") else line)
+    return Fault(fault.kind.code, "\n".join(lines))
+
+
 def _copied(table: dict[str, Any]) -> dict[str, Any]:
     return {key: _copied(value) if isinstance(value, dict) else value for key, value in table.items()}
 
@@ -87,7 +99,9 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
     if kind in {"float_type", "int_type"} and isinstance(problem["input"], str):
         return f"{source}: {key} = {problem['input']!r}: must be a number; write it without quotes"
     if kind in {"model_type", "dict_type"}:
-        return f"{source}: {key} = {problem['input']!r}: must be a table; write {path[-1] if path else 'it'} = {{ KEY = VALUE }}"
+        needed = [name for name, field in _fields(_model_at(model, path)).items() if field.is_required()]
+        inside = ", ".join(f"{name} = VALUE" for name in needed or ["KEY"])
+        return f"{source}: {key} = {problem['input']!r}: must be a table; write {path[-1] if path else 'it'} = {{ {inside} }}"
     if kind == "list_type" and isinstance(problem["input"], dict):
         return f"{source}: {key}: is one table: must be a list of them; write [[{key}]] above each"
     rule = message[:1].lower() + message[1:]
@@ -96,11 +110,20 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
 
 
 def _keys_beside(model: type[Strict], path: list[str]) -> list[str]:
+    return sorted(_fields(_model_at(model, path[:-1])))
+
+
+def _fields(model: Any) -> dict[str, Any]:
+    return getattr(model, "model_fields", {})
+
+
+def _model_at(model: type[Strict], path: list[str]) -> Any:
+    """The type of the value at `path`."""
     at: Any = model
-    for part in path[:-1]:
+    for part in path:
         if hasattr(at, "model_fields"):
             field = at.model_fields.get(part)
             at = field.annotation if field else None
-        else:  # an index of a list, or a key of a dict: the type of their items is the last type argument
+        else:  # `part` is an index of a list or a name in a dict: the last argument is the type of the values
             at = (get_args(at) or (None,))[-1]
-    return sorted(at.model_fields) if hasattr(at, "model_fields") else []
+    return at

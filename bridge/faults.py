@@ -17,9 +17,9 @@ FAULTS = {
         FaultKind(
             "CONFIG",
             2,
-            "A configuration or scenario file has a key that is unknown, missing or out of range. The line names the "
-            "file, the key, its value, the rule and the remedy. Nothing was started; but where a rig's numbers ran away, the "
-            "run ended there.",
+            "A configuration or scenario file has a key, or the command line a word, that is unknown, missing or out of range. "
+            "The line names the file or option, the key, its value, the rule and the remedy. Nothing was started; but where a "
+            "rig's numbers ran away, the run ended there.",
         ),
         FaultKind(
             "ENDPOINT_BUSY",

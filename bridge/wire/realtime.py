@@ -4,12 +4,16 @@ import contextlib
 import ctypes
 import gc
 import os
+import threading
 import time
 from pathlib import Path
 
 _PR_SET_TIMERSLACK = 29
 LOOP_PRIORITY = 50
 RECORDER_PRIORITY = 10  # below the loop, above every process without SCHED_FIFO: a starved recorder loses blocks
+
+NORMAL = "normal scheduling"  # how the text of a START event begins where SCHED_FIFO was refused
+NOT_GUARANTEED = "real time is not guaranteed; grant CAP_SYS_NICE or an rtprio limit"
 
 
 def claim(core: int | None, priority: int = LOOP_PRIORITY) -> str:
@@ -43,7 +47,22 @@ def claim(core: int | None, priority: int = LOOP_PRIORITY) -> str:
     where = f"core {core}" if pinned else "any core"
     if fifo:
         return f"SCHED_FIFO {priority}, {where}"
-    return f"normal scheduling, {where}: real time is not guaranteed; grant CAP_SYS_NICE or an rtprio limit"
+    return f"{NORMAL}, {where}: {NOT_GUARANTEED}"
+
+
+def may_claim(priority: int = LOOP_PRIORITY) -> bool:
+    """Whether this process could get SCHED_FIFO. Tried in a thread that ends at once, so that nothing keeps the priority."""
+    granted: list[bool] = []
+
+    def attempt() -> None:
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(threading.get_native_id(), os.SCHED_FIFO, os.sched_param(priority))
+            granted.append(True)
+
+    thread = threading.Thread(target=attempt)
+    thread.start()
+    thread.join()
+    return bool(granted)
 
 
 class Pacer:

@@ -28,7 +28,7 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
         numbers = [f"{units.times(gap.nominal)} as described", f"{units.times(gap.retuned)} retuned"]
         if diagnosis.effects:
             numbers.append(f"{units.times(gap.with_effect)} with {' and '.join(diagnosis.effects)}")
-        shrinkage = "" if gap.shrinkage is None else f"; {units.percent(gap.shrinkage)} of the gap closed"
+        shrinkage = "" if gap.shrinkage is None else f"; {words.closed_in_words(gap.shrinkage)} of the gap closed"
         lines.append(f"gap        {', '.join(numbers)}; perfect is {units.times(gap.floor)}{shrinkage}")
     lines.append(f"next       {after.what} {after.why}")
     files: dict[tuple[str, str], list[str]] = {}

@@ -12,6 +12,14 @@ from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO
 from cockpit.run.writable import check_writable, writing
 
+_PICTURES = (".png", ".svg", ".pdf")
+
+
+def _check_picture(out: Path) -> None:
+    """Raise Fault CONFIG for a suffix that no picture has."""
+    if out.suffix.lower() not in _PICTURES:
+        raise Fault("CONFIG", f"--out {out}: must end in {', '.join(_PICTURES)}; choose one of these formats")
+
 
 @contextlib.contextmanager
 def _written(out: Path) -> Generator[None]:
@@ -28,7 +36,9 @@ def plot(
     log: Annotated[Path, typer.Argument(help="A run log, .mcap.")],
     out: Annotated[
         Path | None,
-        typer.Option(help="The picture, a PNG file; without it, beside LOG under its name.", show_default=False),
+        typer.Option(
+            help="The picture: .png, .svg or .pdf; if not given, a PNG beside LOG under its name.", show_default=False
+        ),
     ] = None,
     as_json: Json = None,
 ) -> None:
@@ -40,6 +50,8 @@ def plot(
         picture = out or log.parent / f"{log.stem}.png"
         if picture.resolve() == log.resolve():
             raise Fault("CONFIG", f"--out {picture}: is the log, which the picture would replace; choose another file")
+        if out is not None:
+            _check_picture(out)
         with _written(picture):
             verdict = plot_run(log, picture)
         tell(as_json, {"picture": picture} | verdict.as_dict(), [f"picture  {picture}"])
@@ -55,7 +67,7 @@ def stability(
             "--set", help="Change one value of the rig: key=value, e.g. contact.static_force_N=18. Repeatable."
         ),
     ] = [],  # noqa: B006
-    out: Annotated[Path, typer.Option(help="The picture, a PNG file.")] = Path("runs/map.png"),
+    out: Annotated[Path, typer.Option(help="The picture: .png, .svg or .pdf.")] = Path("runs/map.png"),
     as_json: Json = None,
 ) -> None:
     """Draw where a rig sticks and slips, over drive velocity, stiffness and vibration."""
@@ -65,6 +77,7 @@ def stability(
         from cockpit.run.scenario import load_rig
 
         made = load_rig(rig, settings)
+        _check_picture(out)
         with _written(out):
             result = stability_map(made, out)
         tell(as_json, result, [result.answer, f"picture  {out}"])

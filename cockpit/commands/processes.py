@@ -18,7 +18,7 @@ from cockpit.commands.options import (
     Settings,
     as_settings,
 )
-from cockpit.run.child_process import stop_event
+from cockpit.run.child_process import stop_event, warn_without_priority
 
 
 class Served(NamedTuple):
@@ -70,6 +70,8 @@ def plant(
             raise Fault(
                 "CONFIG", f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder or both, by comma"
             )
+        if not (lockstep or child):
+            warn_without_priority()
         described = header(made, "plant", lockstep)
         blocks = serve(made.rig, made.seed, made.duration_s, made.bus, described, roles, lockstep, stop_event(child))
         served = Served("plant", made.bus.endpoint, lockstep, blocks)
@@ -95,6 +97,8 @@ def controller(
         from controller.app import run as control
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
+        if not (lockstep or child):
+            warn_without_priority()
         steps = control(made.controller, made.bus, header(made, "controller", lockstep), lockstep, stop_event(child))
         served = Served("controller", made.bus.endpoint, lockstep, steps)
         tell(as_json, served, [served.in_words()])

@@ -16,6 +16,7 @@ from cockpit.commands.options import (
     Settings,
     as_settings,
 )
+from cockpit.run.child_process import stopped_once
 
 
 def run(
@@ -43,8 +44,9 @@ def run(
 
         other = [rig_setting(rig)] if rig is not None else []
         changed = [*other, *as_settings(settings, seed, endpoint, prefix)]
-        came = run_scenario(scenario, changed, lockstep, in_process, log)
-        tell(as_json, came.as_dict(), came.in_words())
+        with stopped_once():
+            came = run_scenario(scenario, changed, lockstep, in_process, log)
+            tell(as_json, came.as_dict(), came.in_words())
         return 0 if came.verdict.good else 1
 
     carry_out(work, as_json)

@@ -21,7 +21,10 @@ _INK, _RED, _BLUE = "#1f2d3a", "#b5402a", "#2a6fb5"
 
 
 def plot_run(path: Path, out: Path) -> RunVerdict:
-    """Draw the run in a log to the PNG file `out`; its figures. Raises Fault BAD_LOG, OSError when `out` cannot be written."""
+    """Draw the run in a log to `out`, a .png, .svg or .pdf file; its figures.
+
+    Raises Fault BAD_LOG, and OSError when `out` cannot be written.
+    """
     from matplotlib.figure import Figure
 
     run = read_run(path)
@@ -51,7 +54,7 @@ def plot_run(path: Path, out: Path) -> RunVerdict:
     lower.set_ylim(bottom=0.0)
     lower.set_xlabel("time [s]")
     lower.legend(handles=lower.lines, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
-    figure.savefig(out, dpi=110, format="png")
+    figure.savefig(out, dpi=110)
     return verdict
 
 

@@ -36,7 +36,7 @@ class MapResult(NamedTuple):
 
 
 def stability_map(rig: RigConfig, out: Path) -> MapResult:
-    """Draw the map of `rig` to the PNG file `out` and return its numbers.
+    """Draw the map of `rig` to `out`, a .png, .svg or .pdf file, and return its numbers.
 
     The operating point is the velocity of the drive's profile that needs the most vibration: the highest one, but for a
     damped drive, where the lower ones are the unstable ones. Raises Fault CONFIG if the drive never moves, and OSError
@@ -125,7 +125,7 @@ def _draw(rig: RigConfig, result: MapResult, out: Path) -> None:
     _draw_without_vibration(left, rig, result)
     _draw_with_vibration(right, rig, result)
     figure.suptitle(result.answer, fontsize=13, color=_INK)
-    figure.savefig(out, dpi=120, format="png")
+    figure.savefig(out, dpi=120)
 
 
 def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.log.log_check import damage_findings
 from bridge.log.logfile import RunData, read_run
+from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from diagnosis.features.cycles import Cycles, find_cycles
 
@@ -56,6 +57,7 @@ class RunVerdict(NamedTuple):
     velocity_ratio_max: float
     latency: Latency | None
     faults: list[str]
+    normal_scheduling: list[str]  # processes without a real-time priority; in lockstep none needs it
 
     @property
     def good(self) -> bool:
@@ -137,6 +139,9 @@ def judge_run(run: RunData) -> RunVerdict:
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
         latency=_latency(run),
         faults=faults + [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, run.path)],
+        normal_scheduling=[
+            event.source for event in run.events if event.code == "START" and event.text.startswith(realtime.NORMAL)
+        ],
     )
 
 
@@ -230,6 +235,9 @@ def in_words(verdict: RunVerdict) -> list[str]:
         )
     lost = "none lost" if v.lost_blocks == 0 else f"{v.lost_blocks} LOST"
     lines.append(f"blocks   {v.blocks}, {lost}" + (f"; {v.lost_messages} log messages lost" if v.lost_messages else ""))
+    if v.normal_scheduling:
+        who = " and ".join(v.normal_scheduling)
+        lines.append(f"priority {who} under {realtime.NORMAL}: {realtime.NOT_GUARANTEED}")
     lines.extend(f"warning  {fault}" for fault in v.faults)
     lines.append(f"log      {v.log}")
     return lines

@@ -1,14 +1,16 @@
 """Running as one process among several: signals, a dying parent, one clear line for every fault."""
 
+import contextlib
 import json
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import Any
 
 from bridge.faults import Fault
+from bridge.wire import realtime
 
 _PARENT_CHECK_S = 0.25
 # what `stickslip[all]` brings and a plain installation lacks
@@ -46,6 +48,31 @@ def stop_event(parent: int = 0) -> threading.Event:
 def end_like_ctrl_c() -> None:
     """Let SIGTERM end the command as Ctrl-C does: it stops its workers, keeps whole files only, and says INTERRUPTED."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+@contextlib.contextmanager
+def stopped_once() -> Generator[None]:
+    """Ctrl-C or SIGTERM raises KeyboardInterrupt in what is done here, once: what then stops and judges is not interrupted."""
+    came = threading.Event()
+
+    def on_signal(_number: int, _frame: Any) -> None:
+        if not came.is_set():
+            came.set()
+            raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            # after one the command ends, and until then another would end it without its status
+            signal.signal(number, signal.SIG_IGN if came.is_set() else handler)
+
+
+def warn_without_priority() -> None:
+    """Say on stderr where a process that keeps time would get no real-time priority."""
+    if not realtime.may_claim():
+        print(f"stickslip: warning: {realtime.NORMAL}: {realtime.NOT_GUARANTEED}", file=sys.stderr)
 
 
 def report(fault: Fault, as_json: bool) -> int:

@@ -108,19 +108,20 @@ def run_processes(
 
 @contextlib.contextmanager
 def _ctrl_c_afterwards() -> Generator[None]:
-    """Ctrl-C waits for the end of the block: a child that was just started and is not noted yet would be left behind."""
+    """Ctrl-C and SIGTERM wait for the end of the block: a child that has started and is not noted yet would be left behind."""
     came = threading.Event()
 
     def note(_number: int, _frame: Any) -> None:
         came.set()
 
-    before = signal.signal(signal.SIGINT, note)
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     if came.is_set():
-        raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)
 
 
 def _until_the_end(children: list[Child]) -> None:

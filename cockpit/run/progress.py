@@ -20,11 +20,10 @@ _LOOK_S = 0.1
 def progress_line(state: wire.State, duration_s: float) -> str:
     """What is going on, in one line."""
     t_s = state.t_ns * 1e-9
-    share = min(t_s / duration_s, 1.0) if duration_s else 0.0
-    bar = "#" * round(20 * share)
+    bar = f"[{'#' * round(20 * min(t_s / duration_s, 1.0)):<20}] " if duration_s else ""  # none where no end is known
     ratio = f"v_a/v_d {state.velocity_ratio:4.2f}" if state.velocity_ratio > 0.01 else "no vibration"
     return (
-        f"{t_s:6.1f} s [{bar:<20}] {wire.ContactState.Name(state.state):<10} {wire.Mode.Name(state.mode):<8} "
+        f"{t_s:6.1f} s {bar}{wire.ContactState.Name(state.state):<10} {wire.Mode.Name(state.mode):<8} "
         f"F_d {state.drive_force_N:5.2f} N  {ratio:<12}  slips {state.slips}"
     )
 

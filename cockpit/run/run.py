@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
 from bridge.log.logfile import refuse_a_live_log
+from cockpit.run.child_process import warn_without_priority
 from cockpit.run.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
@@ -79,23 +80,22 @@ class RunOutcome(NamedTuple):
 
 
 def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: bool, log: Path | None) -> RunOutcome:
-    """Run a scenario and judge it. Raises Fault INTERRUPTED after Ctrl-C, with the verdict on stderr before."""
+    """Run a scenario and judge it. A run without an end is over with Ctrl-C or SIGTERM, and judged like any other.
+
+    Raises Fault INTERRUPTED where one with an end was stopped before, with its verdict on stderr first.
+    """
     scenario = load_scenario(name, settings)
     path = log_path(log, scenario.name)
     before = _stamp(path)
+    endless = scenario.duration_s == 0.0
+    if not (lockstep or in_process):
+        warn_without_priority()
+    if endless:
+        print(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}", file=sys.stderr, flush=True)
     interrupted = False
     try:
         if in_process:
-            from rich.console import Console
-            from rich.progress import Progress
-
-            from cockpit.run.in_process import run_onboard
-
-            with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as bar:
-                task = bar.add_task("simulating", total=scenario.duration_s or None)
-                run_onboard(
-                    scenario, path, about_run(scenario, lockstep=True), lambda t_s: bar.update(task, completed=t_s)
-                )
+            _in_process(scenario, path)
         else:
             from cockpit.run.processes import run_processes
             from cockpit.run.progress import follower
@@ -107,16 +107,34 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
     from bridge.log.logfile import read_run
     from cockpit.judge.verdict import in_words, judge, judge_run
 
-    if interrupted:
-        if _stamp(path) == before:
-            raise Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded")
+    if interrupted and _stamp(path) == before:
+        raise Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded")
+    if interrupted and not endless:
         with contextlib.suppress(Fault):  # a log of a moment may hold nothing to judge
             print("\n".join(in_words(judge(path))), file=sys.stderr)
-        raise Fault("INTERRUPTED", "stopped by Ctrl-C; the log is closed")
+        raise Fault("INTERRUPTED", f"stopped by Ctrl-C; {path} is closed")
     run = read_run(path)
+    if interrupted and not len(run.sensors):
+        raise Fault("INTERRUPTED", f"stopped by Ctrl-C before the first block; {path} is closed")
     margins = None
     if scenario.rig.effects:
         from cockpit.judge.margins import loop_margins
 
         margins = loop_margins(run)
     return RunOutcome(judge_run(run), scenario.rig.name, list(scenario.rig.effects), margins)
+
+
+def _in_process(scenario: Scenario, path: Path) -> None:
+    """Simulate, with a bar on a terminal, or the simulated time where there is no end."""
+    from rich.console import Console
+    from rich.progress import Progress, TextColumn
+
+    from cockpit.run.in_process import run_onboard
+
+    columns = (
+        Progress.get_default_columns() if scenario.duration_s else (TextColumn("{task.completed:.1f} s simulated"),)
+    )
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task("simulating", total=scenario.duration_s or None)
+        run_onboard(scenario, path, about_run(scenario, lockstep=True), lambda t_s: bar.update(task, completed=t_s))

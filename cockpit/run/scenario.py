@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from bridge.config import Strict, read_toml, validate, with_overrides
+from bridge.config import Strict, blamed, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import SCHEMA_VERSION
@@ -17,6 +17,8 @@ from bridge.wire.zenoh_link import BusConfig
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 from plant.config_limits import refuse_what_no_rig_does
+
+_RIG_FILE = "rig={file="  # of the setting that names another rig
 
 
 class Scenario(Strict):
@@ -96,7 +98,12 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
 def load_rig(name: str, settings: list[str]) -> RigConfig:
     """A rig by name or path, with `key=value` settings applied. Raises Fault CONFIG."""
     path = _find(name, "rigs")
-    return validate(RigConfig, with_overrides(_rig_table(path), settings), path.name)
+    table = _rig_table(path)
+    try:
+        return validate(RigConfig, with_overrides(table, settings), path.name)
+    except Fault as fault:
+        validate(RigConfig, table, path.name)  # the file by itself
+        raise blamed(fault, path.name, settings) from None
 
 
 def _rig_table(path: Path) -> dict[str, Any]:
@@ -110,7 +117,7 @@ def _rig_table(path: Path) -> dict[str, Any]:
 
 def rig_setting(name: str) -> str:
     """The setting that puts another rig in the place of a scenario's. Raises Fault CONFIG when there is none of that name."""
-    return f"rig={{file={json.dumps(str(_find(name, 'rigs').resolve()), ensure_ascii=False)}}}"
+    return f"{_RIG_FILE}{json.dumps(str(_find(name, 'rigs').resolve()), ensure_ascii=False)}}}"
 
 
 def load_scenario(name: str, settings: list[str]) -> Scenario:
@@ -122,16 +129,26 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
     given = read_toml(path)
     if "contact" in given and "rig" not in given:
         raise Fault("CONFIG", f"{path}: is a rig, not a scenario; give it with --rig")
-    table = with_overrides({"name": path.stem} | given, settings)
+    of_rig = [setting for setting in settings if setting.startswith(_RIG_FILE)]
+    table, source = _with_rig(path, with_overrides({"name": path.stem} | given, settings))
+    try:
+        return validate(Scenario, table, source)
+    except Fault as fault:
+        table, source = _with_rig(path, with_overrides({"name": path.stem} | given, of_rig))
+        validate(Scenario, table, source)  # the files by themselves
+        raise blamed(fault, source, [setting for setting in settings if setting not in of_rig]) from None
+
+
+def _with_rig(path: Path, table: dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """The table of a scenario with that of the rig file that it names, and which files these are."""
     rig = table.get("rig")
-    if isinstance(rig, dict) and "file" in rig:
-        overrides = {key: value for key, value in rig.items() if key != "file"}
-        rig_name = str(rig["file"])
-        beside = path.parent / rig_name
-        rig_path = beside if beside.suffix == ".toml" and beside.is_file() else _find(rig_name, "rigs")
-        table["rig"] = _merged(_rig_table(rig_path), overrides)
-        return validate(Scenario, table, f"{path.name} with {rig_path.name}")
-    return validate(Scenario, table, path.name)
+    if not isinstance(rig, dict) or "file" not in rig:
+        return table, path.name
+    overrides = {key: value for key, value in rig.items() if key != "file"}
+    rig_name = str(rig["file"])
+    beside = path.parent / rig_name
+    rig_path = beside if beside.suffix == ".toml" and beside.is_file() else _find(rig_name, "rigs")
+    return table | {"rig": _merged(_rig_table(rig_path), overrides)}, f"{path.name} with {rig_path.name}"
 
 
 def processor() -> str:

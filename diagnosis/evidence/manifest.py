@@ -97,11 +97,16 @@ class RigTable(Strict):
 
 
 class ChannelMap(Strict):
-    """Source of a standard column: value = column * scale + offset, in the SI unit of the standard column."""
+    """Source of a standard column: value = column * scale + offset, in its SI unit. A text alone is the column."""
 
     column: Annotated[str, Field(min_length=1)]
     scale: float = 1.0
     offset: float = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _text_is_the_column(cls, table: Any) -> Any:
+        return {"column": table} if isinstance(table, str) else table
 
     @model_validator(mode="after")
     def _scale_is_not_zero(self) -> "ChannelMap":

@@ -62,7 +62,8 @@ def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
     environment.filters |= {
         "percent": units.percent,
         "times": units.times,
-        "interval": units.interval,
+        "closed": words.closed_in_words,
+        "closed_between": words.closed_between,
         "sd": lambda shift: f"{shift:+.1f}",
     }
     template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")

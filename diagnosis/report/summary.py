@@ -6,7 +6,7 @@ from bridge.units import percent, signal_name, times
 from diagnosis.evidence.exciter_harmonics import DISTORTED
 from diagnosis.evidence.force_pickup import PICK_UP
 from diagnosis.model.per_run import has_own_phases
-from diagnosis.report.words import EFFECT_WORDS, cannot_tell, estimate_in_words
+from diagnosis.report.words import EFFECT_WORDS, cannot_tell, closed_between, closed_in_words, estimate_in_words
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
@@ -91,11 +91,10 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 "nothing of it is closed there."
             )
         elif gap.shrinkage is not None:
-            low, high = gap.interval_90 or (math.nan, math.nan)
-            between = f" (90 %: {percent(low)} to {percent(high)})" if math.isfinite(low) else ""
+            between = f" (90 %: {known})" if (known := closed_between(gap.interval_90)) else ""
             sentences.append(
                 f"On {kept}, held out, the gap falls from {times(gap.retuned)} to {times(gap.with_effect)} noise floors: "
-                f"{percent(gap.shrinkage)} of what could be closed{between}."
+                f"{closed_in_words(gap.shrinkage)} of what could be closed{between}."
             )
         elif diagnosis.effects:
             sentences.append(f"On {kept}, held out, there is no gap to close: new data have not tested the name.")

@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from bridge.units import decimals_of, fixed_digits, name_and_unit, percent, prefixed, times
+from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, times
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.result import Diagnosis, Estimate
 
@@ -41,6 +41,16 @@ def answer(diagnosis: Diagnosis) -> str:
     others = [one for one in dict.fromkeys(others) if one not in diagnosis.effects]
     alike = f"; or {', '.join(others)}, which would explain these runs nearly as well" if others else ""
     return f"{names}, probability {percent(sure)}{alike}"
+
+
+def closed_in_words(share: float) -> str:
+    """Share of the gap that is closed, in percent, 100 at most: a fit below the noise floor closes the whole gap, not more."""
+    return percent(min(share, 1.0))
+
+
+def closed_between(interval_90: tuple[float, float] | None) -> str:
+    """`43 to 100 %` for the interval of such a share; empty where it is not known."""
+    return interval(interval_90 and (min(interval_90[0], 1.0), min(interval_90[1], 1.0)))
 
 
 def estimate_in_words(name: str, estimate: Estimate) -> str:

@@ -20,6 +20,7 @@ from bridge.log.logfile import RunData, read_run, recover
 from cockpit.run import processes as orchestra
 from tests.logs import short_log
 from tests.system.ports import free_endpoint
+from tests.system.told import told
 
 pytestmark = pytest.mark.realtime
 
@@ -45,7 +46,7 @@ def role(pid: int) -> str:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
     except OSError:
         return ""
-    return words[3].decode() if len(words) > 3 else ""
+    return words[words.index(b"cockpit") + 1].decode() if b"cockpit" in words else ""
 
 
 def gone(pid: int) -> bool:
@@ -131,7 +132,7 @@ def test_a_killed_process_ends_the_run_and_costs_at_most_a_quarter_second(
     status, _, err = run.end()
     assert status == FAULTS["PEER_DIED"].exit_status
     assert f"the {victim} was killed by signal 9" in err
-    assert len(err.strip().splitlines()) == 1
+    assert len(told(err)) == 1
     if victim == "recorder":
         saved = recover(run.log, run.log)
         assert saved.messages > 0
@@ -195,7 +196,7 @@ def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list
     run.process.send_signal(signal.SIGINT)
     status, _, err = run.end()
     assert status == 130
-    assert err.strip() == "stickslip: INTERRUPTED: stopped by Ctrl-C before anything was recorded"
+    assert told(err) == ["stickslip: INTERRUPTED: stopped by Ctrl-C before anything was recorded"]
     if older is not None:
         assert log.read_bytes() == older
 
@@ -223,7 +224,10 @@ def test_ctrl_c_while_a_child_starts_leaves_nobody_behind(tmp_path: Path, monkey
             process.kill()
 
 
-def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped_and_is_judged(
+    tmp_path: Path, number: signal.Signals
+) -> None:
     log = tmp_path / "run.mcap"
     run = subprocess.Popen(
         [*COMMAND, "run", "--in-process", "--set", "duration_s=0", "--log", str(log)],
@@ -235,15 +239,84 @@ def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped(tmp_pat
         until_s = time.monotonic() + 60
         while (not log.exists() or log.stat().st_size < 200_000) and run.poll() is None and time.monotonic() < until_s:
             time.sleep(0.02)
-        run.send_signal(signal.SIGINT)
-        _, err = run.communicate(timeout=30)
+        run.send_signal(number)
+        out, err = run.communicate(timeout=30)
     finally:
         run.kill()
-    assert run.returncode == 130
-    assert "INTERRUPTED" in err.strip().splitlines()[-1]
+    assert run.returncode in {0, 1}
+    assert err == f"simulating until Ctrl-C; log {log}\n"
+    assert out.splitlines()[-1] == f"log      {log}"
     data = read_run(log)
     assert data.damage.closed
     assert len(data.sensors) > 100
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_without_an_end_is_judged_when_it_is_stopped(
+    tmp_path: Path, runs: list[Run], number: signal.Signals
+) -> None:
+    run = Run(tmp_path / "run.mcap", "--json", seconds=0.0)
+    runs.append(run)
+    run.wait_until_recording()
+    run.process.send_signal(number)
+    status, out, err = run.end()
+    verdict = json.loads(out)
+    assert status == (0 if verdict["good"] else 1)
+    assert verdict["log"] == str(run.log)
+    assert told(err) == [f"running until Ctrl-C; log {run.log}"]
+    assert read_run(run.log).damage.closed
+
+
+@pytest.mark.parametrize("pause_s", [0.0, 0.1, 0.3])
+def test_a_second_ctrl_c_takes_nothing_away(tmp_path: Path, runs: list[Run], pause_s: float) -> None:
+    run = Run(tmp_path / "run.mcap")
+    runs.append(run)
+    run.wait_until_recording()
+    for _ in range(3):
+        run.process.send_signal(signal.SIGINT)
+        time.sleep(pause_s)
+    status, _, err = run.end()
+    assert status == 130
+    words = [line.split()[0] for line in told(err)]
+    assert words[0] == "before"
+    assert told(err)[-2:] == [
+        f"log      {run.log}",
+        f"stickslip: INTERRUPTED: stopped by Ctrl-C; {run.log} is closed",
+    ]
+    assert read_run(run.log).damage.closed
+
+
+def _without_priority() -> None:
+    """In a child: no right to a real-time priority, for root either."""
+    import ctypes
+
+    drop_from_bounding_set, sys_nice = 24, 23
+    ctypes.CDLL(None).prctl(drop_from_bounding_set, sys_nice)
+    resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
+
+
+@pytest.mark.parametrize("clock", ["real time", "lockstep"])
+def test_a_priority_that_is_missing_is_told_at_the_start_and_in_the_verdict(tmp_path: Path, clock: str) -> None:
+    more, log = ["--lockstep"] if clock == "lockstep" else [], tmp_path / "run.mcap"
+    result = subprocess.run(
+        [*COMMAND, "run", "--set", "duration_s=0.5", "--endpoint", free_endpoint(), "--json", *more, "--log", str(log)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        preexec_fn=_without_priority,
+    )
+    warning = (
+        "stickslip: warning: normal scheduling: real time is not guaranteed; grant CAP_SYS_NICE or an rtprio limit\n"
+    )
+    verdict = json.loads(result.stdout)
+    if clock == "lockstep":
+        assert (result.stderr, verdict["normal_scheduling"]) == ("", [])
+        return
+    assert result.stderr == warning
+    assert sorted(verdict["normal_scheduling"]) == ["controller", "plant"]
+    said = call("log", "info", str(log)).stdout
+    assert "under normal scheduling: real time is not guaranteed" in said
 
 
 def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
@@ -290,7 +363,7 @@ def test_full_disk(tmp_path: Path, runs: list[Run]) -> None:
     assert status == FAULTS["LOG_WRITE"].exit_status
     assert "LOG_WRITE" in err
     assert "recover" in err
-    assert len(err.strip().splitlines()) == 1
+    assert len(told(err)) == 1
     damage = read_run(log).damage
     assert damage.closed
     assert (damage.cut_bytes, damage.bad_chunks) == (0, 0)
@@ -312,7 +385,7 @@ def test_busy_endpoint(tmp_path: Path) -> None:
         result = call("run", "--endpoint", endpoint, "--log", str(tmp_path / "run.mcap"))
     assert result.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
     assert endpoint in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
+    assert len(told(result.stderr)) == 1
 
 
 def test_a_second_run_leaves_the_first_alone(tmp_path: Path, runs: list[Run]) -> None:
@@ -323,7 +396,7 @@ def test_a_second_run_leaves_the_first_alone(tmp_path: Path, runs: list[Run]) ->
     result = call("run", "--set", "duration_s=1.0", "--endpoint", endpoint, "--log", str(first.log))
     assert result.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
     assert f"{endpoint}: cannot listen there" in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
+    assert len(told(result.stderr)) == 1
     assert not gone(first.process.pid)
     first.process.send_signal(signal.SIGINT)
     status, _, _ = first.end()
@@ -348,16 +421,18 @@ def test_a_rig_whose_numbers_run_away_is_no_quiet_one(tmp_path: Path) -> None:
     for more in (["--in-process"], ["--endpoint", free_endpoint()]):
         result = call("run", *endless, *more, "--log", str(tmp_path / "run.mcap"))
         assert result.returncode == FAULTS["CONFIG"].exit_status
-        assert result.stderr.startswith("stickslip: CONFIG: paper-c45-c45: the slide's velocity is no number at 0.00")
+        assert told(result.stderr)[0].startswith(
+            "stickslip: CONFIG: paper-c45-c45: the slide's velocity is no number at 0.00"
+        )
         assert "solver.step_s = 1e-05" in result.stderr
-        assert len(result.stderr.strip().splitlines()) == 1
+        assert len(told(result.stderr)) == 1
 
 
 def test_unwritable_log(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     result = call("run", "--in-process", "--set", "duration_s=0.1", "--log", str(tmp_path / "file" / "run.mcap"))
     assert result.returncode == FAULTS["LOG_WRITE"].exit_status
-    assert len(result.stderr.strip().splitlines()) == 1
+    assert len(told(result.stderr)) == 1
 
 
 @pytest.mark.parametrize("code", FAULTS)

@@ -115,8 +115,10 @@ def test_the_line_names_place_value_rule_and_remedy(settings: list[str], words: 
     with pytest.raises(Fault) as caught:
         load_scenario("paper-c45-c45", settings)
     assert caught.value.kind.code == "CONFIG"
-    for word in [*words, "paper-c45-c45.toml"]:
+    for word in words:
         assert word in caught.value.line
+    assert caught.value.line.startswith(f"--set {settings[0]}")
+    assert ".toml" not in caught.value.line
     assert "\n" not in caught.value.line
 
 
@@ -142,6 +144,20 @@ def test_an_error_in_a_rig_file_names_it(tmp_path: Path) -> None:
     rig.write_text("[effects.drive-backlash]\ngap = 1e-4\n")
     with pytest.raises(Fault, match=r"paper-c45-c45.toml with mine.toml: rig: effects.drive-backlash.gap: unknown key"):
         load_scenario("paper-c45-c45", [rig_setting(str(rig))])
+
+
+def test_a_setting_is_blamed_for_what_is_its_own_and_a_file_for_the_rest(tmp_path: Path) -> None:
+    with pytest.raises(Fault) as caught:
+        load_scenario("paper-c45-c45", ["rig.slide.mass_kg=-1.0", "duration_s=soon", "seed=3"])
+    first, second = sorted(caught.value.line.splitlines())
+    assert first.startswith("--set duration_s=soon: duration_s = 'soon': must be a number")
+    assert second.startswith("--set rig.slide.mass_kg=-1.0: rig.slide.mass_kg = -1.0: must be greater than 0")
+    with pytest.raises(Fault, match=r"CONFIG: --set slide.mass_kg=0: slide.mass_kg = 0: must be greater than 0"):
+        load_rig("paper-c45-c45", ["slide.mass_kg=0"])
+    mine = tmp_path / "mine.toml"
+    mine.write_text('duration_s = -1.0\n[rig]\nfile = "paper-c45-c45"\n')
+    with pytest.raises(Fault, match=r"CONFIG: mine.toml with paper-c45-c45.toml: duration_s = -1.0: "):
+        load_scenario(str(mine), ["seed=3"])
 
 
 def test_overrides_leave_the_table_alone() -> None:

@@ -18,6 +18,7 @@ from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
 from cockpit.judge.verdict import headline, in_words, judge_run
 from cockpit.run.in_process import run_onboard
+from cockpit.run.progress import progress_line
 from cockpit.run.replay import outcome
 from cockpit.run.run import keep_aside
 from cockpit.run.scenario import load_scenario
@@ -44,11 +45,23 @@ def test_a_log_without_a_block_is_drawn(tmp_path: Path) -> None:
     assert out.read_bytes().startswith(PNG)
 
 
-def test_a_picture_of_another_name_is_a_png_and_a_run_without_vibration_has_no_legend_of_it(log: Path) -> None:
-    out = log.with_name("run.foo")
-    result = call("plot", str(log), "--out", str(out))
+@pytest.mark.parametrize("command", ["plot", "map"])
+@pytest.mark.parametrize(("suffix", "begins"), [(".png", PNG), (".PNG", PNG), (".svg", b"<?xml"), (".pdf", b"%PDF")])
+def test_a_picture_is_what_its_name_says(log: Path, command: str, suffix: str, begins: bytes) -> None:
+    out = log.with_name(f"picture{suffix}")
+    result = call(command, *([str(log)] if command == "plot" else []), "--out", str(out))
     assert result.exit_code == 0, result.output
-    assert out.read_bytes().startswith(PNG)
+    assert out.read_bytes().startswith(begins)
+
+
+@pytest.mark.parametrize("command", ["plot", "map"])
+@pytest.mark.parametrize("name", ["run.foo", "run", "run.jpg"])
+def test_a_picture_of_another_kind_is_refused(log: Path, command: str, name: str) -> None:
+    out = log.with_name(name)
+    result = call(command, *([str(log)] if command == "plot" else []), "--out", str(out))
+    assert result.exit_code == 2
+    assert f"--out {out}: must end in .png, .svg, .pdf; choose one of these formats" in result.stderr
+    assert not out.exists()
 
 
 def test_a_picture_without_a_name_is_beside_its_log(log: Path) -> None:
@@ -82,12 +95,14 @@ def test_what_is_no_time_is_refused(log: Path, time: str) -> None:
 @pytest.mark.parametrize("command", ["plot", "map", "reproduce"])
 def test_a_folder_as_the_file_to_write_is_refused_at_once(log: Path, command: str) -> None:
     more = [str(log)] if command == "plot" else []
-    result = call(command, *more, "--out", str(log.parent))
+    folder = log.with_name("folder.png")
+    folder.mkdir()
+    result = call(command, *more, "--out", str(folder))
     assert result.exit_code == 5
-    assert result.stderr.startswith(f"stickslip: LOG_WRITE: --out {log.parent}: is a folder; ")
-    under_a_file = log / "picture"
+    assert result.stderr.startswith(f"stickslip: LOG_WRITE: --out {folder}: is a folder; ")
+    under_a_file = log / "picture.png"
     assert f"{under_a_file}: cannot be written" in call(command, *more, "--out", str(under_a_file)).stderr
-    long = log.parent / ("x" * 300)
+    long = log.parent / f"{'x' * 300}.png"
     assert f"{long}: cannot be written: File name too long" in call(command, *more, "--out", str(long)).stderr
 
 
@@ -307,3 +322,10 @@ def test_a_reader_that_leaves_is_no_success(tmp_path: Path, arguments: list[str]
         result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False)
     assert result.returncode == 141
     assert result.stderr == ""
+
+
+def test_the_progress_line_has_a_bar_only_where_an_end_is_known() -> None:
+    state = wire.State(t_ns=4_000_000_000, drive_force_N=12.0)
+    assert "  4.0 s [#####               ] " in progress_line(state, 16.0)
+    assert "[" not in progress_line(state, 0.0)
+    assert progress_line(state, 0.0).startswith("   4.0 s ")

@@ -67,8 +67,8 @@ def test_a_good_folder(tmp_path: Path) -> None:
         ("[[run]]", '[[run]]\nfile = "./run-01.csv"\n[[run]]', "run.file = './run-01.csv': 2 runs are called 'run-01'"),
         (
             "[[run]]",
-            '[channels]\nt_s = "t"\n[[run]]',
-            "channels.t_s = 't': must be a table; write t_s = { KEY = VALUE }",
+            "[channels]\nt_s = 3\n[[run]]",
+            "channels.t_s = 3: must be a table; write t_s = { column = VALUE }",
         ),
         ("mass_kg = 1.5", "mass_kg = 1e300", "rig.mass_kg = 1e+300: must be less than"),
         (

@@ -16,6 +16,7 @@ import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 from typer.testing import CliRunner
 
+from bridge.config import validate
 from bridge.faults import Fault
 from bridge.log.log_check import check_log
 from bridge.log.logfile import read_run
@@ -23,7 +24,7 @@ from bridge.tables.export import export
 from bridge.tables.readers import Dialect, read_table
 from cockpit.commands.log import log_app
 from diagnosis.evidence.folder import load_evidence
-from diagnosis.evidence.import_table import import_file
+from diagnosis.evidence.import_table import ImportMap, import_file
 from tests.logs import short_log
 
 MAP = """
@@ -94,6 +95,16 @@ def test_a_file_becomes_evidence(tmp_path: Path, suffix: str) -> None:
     assumed = [finding.where for finding in done.findings if finding.kind == "assumed"]
     assert "manifest.toml: rig.contact_stiffness_N_per_m" in assumed
     assert "# assumed, not measured" in (tmp_path / "evidence" / "manifest.toml").read_text()
+
+
+def test_a_text_in_the_place_of_a_channel_is_its_column() -> None:
+    wanted = validate(ImportMap, {"channels": {"t_s": "Zeit [s]", "drive_force_N": {"column": "F"}}}, "map.toml")
+    assert wanted.channels["t_s"].column == "Zeit [s]"
+    assert (wanted.channels["t_s"].scale, wanted.channels["t_s"].offset) == (1.0, 0.0)
+    with pytest.raises(Fault, match=r"map.toml: channels.t_s = 3: must be a table; write t_s = { column = VALUE }"):
+        validate(ImportMap, {"channels": {"t_s": 3, "drive_force_N": "F"}}, "map.toml")
+    with pytest.raises(Fault, match=r"map.toml: channels.t_s.column = '': "):
+        validate(ImportMap, {"channels": {"t_s": "", "drive_force_N": "F"}}, "map.toml")
 
 
 def test_a_drive_speed_in_mm_per_s_is_refused(tmp_path: Path) -> None:

@@ -8,10 +8,11 @@ import pytest
 
 from bridge import units
 from bridge.log.finding import Finding
+from cockpit.commands import diagnose_output
 from diagnosis.evidence.exciter_harmonics import DISTORTED
 from diagnosis.evidence.force_pickup import PICK_UP
 from diagnosis.report import words as in_words
-from diagnosis.report.page import rig_row, where_map, write_report
+from diagnosis.report.page import report_page, rig_row, where_map, write_report
 from diagnosis.report.summary import summary
 from diagnosis.result import Candidate, Cell, Curve, Diagnosis, Estimate, Picture, RigNumber, Shrinkage, to_json
 from tests import made_up
@@ -292,3 +293,19 @@ def test_a_name_that_the_held_out_runs_do_not_test_says_so(tmp_path):
     page = text_of(page_of(untested, tmp_path))
     assert "There is no gap to close on these runs: they do not test what is named." in page
     assert "Nothing is named" not in page
+
+
+def test_no_more_than_the_whole_gap_is_said_to_be_closed_and_json_has_the_number():
+    made = made_up.diagnosis()
+    compared = tuple(one._replace(shrinkage=1.06, interval_90=(0.43, 1.76)) for one in made.gap.compared)
+    gap = made.gap._replace(shrinkage=1.06, interval_90=(0.43, 1.76), compared=compared)
+    made = made._replace(gap=gap)
+    told = summary(made)
+    assert any("100 % of what could be closed (90 %: 43 % to 100 %)" in sentence for sentence in told)
+    page = report_page(made, "rig")
+    for text in (page, "\n".join(told), "\n".join(diagnose_output.in_words(made._replace(summary=told)))):
+        assert "106 %" not in text
+        assert "176 %" not in text
+        assert "100 %" in text
+    assert to_json(made)["gap"]["shrinkage"] == 1.06
+    assert to_json(made)["gap"]["interval_90"] == [0.43, 1.76]
