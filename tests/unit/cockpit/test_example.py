@@ -31,6 +31,7 @@ def example(*arguments: str):
     return CliRunner().invoke(app, ["example", *arguments])
 
 
+@pytest.mark.slow
 def test_an_example_can_be_read_and_does_not_tell_its_fault() -> None:
     result = example("runs/example")
     assert result.exit_code == 0, result.output
