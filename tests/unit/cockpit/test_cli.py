@@ -45,8 +45,16 @@ def test_a_log_without_a_block_is_drawn(tmp_path: Path) -> None:
     assert out.read_bytes().startswith(PNG)
 
 
-@pytest.mark.parametrize("command", ["plot", "map"])
-@pytest.mark.parametrize(("suffix", "begins"), [(".png", PNG), (".PNG", PNG), (".svg", b"<?xml"), (".pdf", b"%PDF")])
+@pytest.mark.parametrize(
+    ("command", "suffix", "begins"),
+    [
+        ("plot", ".png", PNG),
+        ("plot", ".PNG", PNG),
+        ("plot", ".svg", b"<?xml"),
+        ("plot", ".pdf", b"%PDF"),
+        pytest.param("map", ".svg", b"<?xml", marks=pytest.mark.slow),
+    ],
+)
 def test_a_picture_is_what_its_name_says(log: Path, command: str, suffix: str, begins: bytes) -> None:
     out = log.with_name(f"picture{suffix}")
     result = call(command, *([str(log)] if command == "plot" else []), "--out", str(out))
