@@ -72,7 +72,8 @@ def example(
             Path(part, "made").rename(folder)
         runs = read_manifest(folder).run
         made = Example(str(folder), [run.file for run in runs], [run.file for run in runs if run.holdout], seed)
-        rig = f"a rig with {effect}" if effect else "a rig with a hidden fault"
+        chosen = "a rig as described" if effect is EffectName.none else f"a rig with {effect}"
+        rig = "a rig with a hidden fault" if effect is None else chosen
         tell(
             as_json,
             made,

@@ -5,10 +5,12 @@ import os
 import signal
 from pathlib import Path
 
+import jsonschema
 import pytest
 from typer.testing import CliRunner
 
 from cockpit.cli import app
+from cockpit.commands.schemas import FORMATS
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.synthetic import folder as making
 from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
@@ -52,6 +54,7 @@ def test_the_seed_and_a_chosen_fault_make_another_one() -> None:
 
 def test_json_lists_the_runs() -> None:
     told = json.loads(example("made", "--json").stdout)
+    jsonschema.validate(told, FORMATS["example-result"].schema())
     assert told == {
         "folder": "made",
         "runs": ["run-01.parquet", "run-02.parquet"],
