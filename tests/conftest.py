@@ -1,5 +1,7 @@
 """Shared by all tests."""
 
+import signal
+
 import pytest
 from hypothesis import settings
 
@@ -8,6 +10,8 @@ pytest_plugins = ["tests.cpu_limit"]
 # the first example compiles kernels, and these machines are shared: time is no criterion in a test
 settings.register_profile("stickslip", deadline=None, derandomize=True)
 settings.load_profile("stickslip")
+# a suite that a script starts with `&` inherits an ignored SIGINT, and so would all that the tests start: Ctrl-C is tested
+signal.signal(signal.SIGINT, signal.default_int_handler)
 _REALTIME_S = 120.0  # nobody waits longer for a process: one that hangs is known soon
 
 

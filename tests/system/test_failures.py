@@ -4,11 +4,7 @@ import json
 import os
 import resource
 import signal
-import subprocess
-import sys
-import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,106 +13,11 @@ from mcap.reader import make_reader
 
 from bridge.faults import FAULTS
 from bridge.log.logfile import RunData, read_run, recover
-from cockpit.run import processes as orchestra
-from tests.logs import short_log
 from tests.system.ports import free_endpoint
+from tests.system.run_under_way import Run, call, gone
 from tests.system.told import told
 
 pytestmark = pytest.mark.realtime
-
-COMMAND = [sys.executable, "-m", "cockpit"]
-
-
-def children_of(pid: int) -> list[int]:
-    """Processes whose parent is `pid`."""
-    found: list[int] = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rsplit(")", 1)[1].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid:
-            found.append(int(stat.parent.name))
-    return found
-
-
-def role(pid: int) -> str:
-    """What a child of a run is, from its command line."""
-    try:
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-    except OSError:
-        return ""
-    return words[words.index(b"cockpit") + 1].decode() if b"cockpit" in words else ""
-
-
-def gone(pid: int) -> bool:
-    """Whether a process has ended."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
-    except OSError:
-        return True
-
-
-class Run:
-    """A run under way, its children by role."""
-
-    def __init__(self, log: Path, *more: str, seconds: float = 30.0) -> None:
-        arguments = [
-            "run",
-            "--set",
-            f"duration_s={seconds}",
-            "--endpoint",
-            free_endpoint(),
-            "--log",
-            str(log),
-            *more,
-        ]
-        self.process = subprocess.Popen(
-            [*COMMAND, *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-        self.log = log
-        self.children: dict[str, int] = {}
-
-    def wait_until_recording(self) -> None:
-        """Until two chunks are in the log."""
-        until_s = time.monotonic() + 60
-        while time.monotonic() < until_s and self.process.poll() is None:
-            if self.log.exists() and self.log.stat().st_size > 200_000:
-                self.children = {role(pid): pid for pid in children_of(self.process.pid)}
-                assert {"plant", "controller", "recorder"} <= set(self.children)
-                return
-            time.sleep(0.02)
-        pytest.fail(f"the run never began: {self.process.communicate(timeout=5)}")
-
-    def wait_until_started(self) -> None:
-        """Until its children are there, which have recorded nothing yet."""
-        until_s = time.monotonic() + 30
-        roles = {"plant", "controller", "recorder"}
-        while set(self.children) != roles and time.monotonic() < until_s:
-            self.children = {role(pid): pid for pid in children_of(self.process.pid)}
-        assert set(self.children) == roles
-
-    def end(self) -> tuple[int, str, str]:
-        """Status, stdout and stderr; nobody may be left."""
-        out, err = self.process.communicate(timeout=30)
-        assert all(gone(pid) for pid in self.children.values())
-        return self.process.returncode, out, err
-
-
-@pytest.fixture
-def runs(tmp_path: Path) -> Iterator[list[Run]]:
-    made: list[Run] = []
-    yield made
-    for run in made:
-        pids = [*children_of(run.process.pid), run.process.pid]
-        if run.process.poll() is None:
-            for pid in pids:
-                os.kill(pid, signal.SIGKILL)
-            run.process.wait()
 
 
 @pytest.mark.parametrize("victim", ["plant", "controller", "recorder"])
@@ -169,156 +70,6 @@ def test_in_lockstep_a_pause_costs_nothing(tmp_path: Path, runs: list[Run], vict
     assert told_lost(data, "sensors") == 0
 
 
-def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[Run]) -> None:
-    run = Run(tmp_path / "run.mcap", "--set", "controller.policy.enabled_from_s=0.0")
-    runs.append(run)
-    run.wait_until_recording()
-    time.sleep(0.5)
-    run.process.send_signal(signal.SIGINT)
-    status, _, err = run.end()
-    assert status == 130
-    assert "INTERRUPTED" in err.strip().splitlines()[-1]
-    data = read_run(run.log)
-    assert data.damage.closed
-    assert data.applied["amplitude_m"].max() > 0
-    assert data.applied["amplitude_m"][-1] == 0.0
-
-
-@pytest.mark.parametrize("there", ["nothing", "an empty file", "an older log"])
-def test_ctrl_c_before_the_record_judges_no_other_run(tmp_path: Path, runs: list[Run], there: str) -> None:
-    log = tmp_path / "run.mcap"
-    older = {"nothing": None, "an empty file": b"", "an older log": short_log()}[there]
-    if older is not None:
-        log.write_bytes(older)
-    run = Run(log)
-    runs.append(run)
-    run.wait_until_started()
-    run.process.send_signal(signal.SIGINT)
-    status, _, err = run.end()
-    assert status == 130
-    assert told(err) == ["stickslip: INTERRUPTED: stopped by Ctrl-C before anything was recorded"]
-    if older is not None:
-        assert log.read_bytes() == older
-
-
-def test_ctrl_c_while_a_child_starts_leaves_nobody_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    started: list[subprocess.Popen[str]] = []
-
-    class Interrupted(orchestra.Child):
-        def __init__(self, role: str, arguments: list[str]) -> None:
-            super().__init__(role, arguments)
-            started.append(self.process)
-            if role == "recorder":
-                os.kill(os.getpid(), signal.SIGINT)
-
-    monkeypatch.setattr(orchestra, "Child", Interrupted)
-    endpoint = free_endpoint()
-    arguments = ["--scenario", "paper-c45-c45", "--set", f'bus.endpoint="{endpoint}"']
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            orchestra.run_processes(arguments, endpoint, tmp_path / "run.mcap", False, threading.Event.wait)
-        assert len(started) == 3
-        assert all(process.poll() is not None for process in started)
-    finally:
-        for process in started:
-            process.kill()
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped_and_is_judged(
-    tmp_path: Path, number: signal.Signals
-) -> None:
-    log = tmp_path / "run.mcap"
-    run = subprocess.Popen(
-        [*COMMAND, "run", "--in-process", "--set", "duration_s=0", "--log", str(log)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        until_s = time.monotonic() + 60
-        while (not log.exists() or log.stat().st_size < 200_000) and run.poll() is None and time.monotonic() < until_s:
-            time.sleep(0.02)
-        run.send_signal(number)
-        out, err = run.communicate(timeout=30)
-    finally:
-        run.kill()
-    assert run.returncode in {0, 1}
-    assert err == f"simulating until Ctrl-C; log {log}\n"
-    assert out.splitlines()[-1] == f"log      {log}"
-    data = read_run(log)
-    assert data.damage.closed
-    assert len(data.sensors) > 100
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_run_without_an_end_is_judged_when_it_is_stopped(
-    tmp_path: Path, runs: list[Run], number: signal.Signals
-) -> None:
-    run = Run(tmp_path / "run.mcap", "--json", seconds=0.0)
-    runs.append(run)
-    run.wait_until_recording()
-    run.process.send_signal(number)
-    status, out, err = run.end()
-    verdict = json.loads(out)
-    assert status == (0 if verdict["good"] else 1)
-    assert verdict["log"] == str(run.log)
-    assert told(err) == [f"running until Ctrl-C; log {run.log}"]
-    assert read_run(run.log).damage.closed
-
-
-@pytest.mark.parametrize("pause_s", [0.0, 0.1, 0.3])
-def test_a_second_ctrl_c_takes_nothing_away(tmp_path: Path, runs: list[Run], pause_s: float) -> None:
-    run = Run(tmp_path / "run.mcap")
-    runs.append(run)
-    run.wait_until_recording()
-    for _ in range(3):
-        run.process.send_signal(signal.SIGINT)
-        time.sleep(pause_s)
-    status, _, err = run.end()
-    assert status == 130
-    words = [line.split()[0] for line in told(err)]
-    assert words[0] == "before"
-    assert told(err)[-2:] == [
-        f"log      {run.log}",
-        f"stickslip: INTERRUPTED: stopped by Ctrl-C; {run.log} is closed",
-    ]
-    assert read_run(run.log).damage.closed
-
-
-def _without_priority() -> None:
-    """In a child: no right to a real-time priority, for root either."""
-    import ctypes
-
-    drop_from_bounding_set, sys_nice = 24, 23
-    ctypes.CDLL(None).prctl(drop_from_bounding_set, sys_nice)
-    resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
-
-
-@pytest.mark.parametrize("clock", ["real time", "lockstep"])
-def test_a_priority_that_is_missing_is_told_at_the_start_and_in_the_verdict(tmp_path: Path, clock: str) -> None:
-    more, log = ["--lockstep"] if clock == "lockstep" else [], tmp_path / "run.mcap"
-    result = subprocess.run(
-        [*COMMAND, "run", "--set", "duration_s=0.5", "--endpoint", free_endpoint(), "--json", *more, "--log", str(log)],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        preexec_fn=_without_priority,
-    )
-    warning = (
-        "stickslip: warning: normal scheduling: real time is not guaranteed; grant CAP_SYS_NICE or an rtprio limit\n"
-    )
-    verdict = json.loads(result.stdout)
-    if clock == "lockstep":
-        assert (result.stderr, verdict["normal_scheduling"]) == ("", [])
-        return
-    assert result.stderr == warning
-    assert sorted(verdict["normal_scheduling"]) == ["controller", "plant"]
-    said = call("log", "info", str(log)).stdout
-    assert "under normal scheduling: real time is not guaranteed" in said
-
-
 def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap")
     runs.append(run)
@@ -369,10 +120,6 @@ def test_full_disk(tmp_path: Path, runs: list[Run]) -> None:
     assert (damage.cut_bytes, damage.bad_chunks) == (0, 0)
     with log.open("rb") as file:
         assert sum(1 for _ in make_reader(file).iter_messages(topics=["/sensors"])) > 300
-
-
-def call(*arguments: str, timeout_s: float = 60.0) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout_s, check=False)
 
 
 def test_busy_endpoint(tmp_path: Path) -> None:
