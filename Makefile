@@ -24,7 +24,7 @@ quick: warm ## under a minute once kernels are compiled; what every edit is trie
 test: $(READY)
 	@$(MAKE) --no-print-directory -j2 check warm
 	@$(BIN)/pytest -m "realtime and not nightly"
-	@$(PARALLEL) -m "not realtime and not nightly" --cpu-each $(EACH_CPU_S)
+	@$(PARALLEL) -m "not realtime and not nightly"
 
 nightly: check warm bench ## everything: an hour or so
 	@$(BIN)/pytest -m realtime

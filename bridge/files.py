@@ -28,6 +28,26 @@ def check_file(path: Path, code: str, remedy: str) -> None:
     raise Fault(code, f"{path}: {why}; {remedy}")
 
 
+LOG, JSON = "run log", "JSON"
+_BEGINS = {LOG: (b"\x89MCAP",), JSON: (b"{", b"[")}
+
+
+def refuse_to_replace(path: Path, kind: str, place: str) -> None:
+    """Raise Fault CONFIG where `path` is a file that is not of this kind (LOG or JSON), which would be lost.
+
+    `place` is what the error names: the option that gave the path, or the path.
+    """
+    try:
+        if not path.is_file() or path.stat().st_size == 0:
+            return
+        with path.open("rb") as file:
+            begins = file.read(8).lstrip()
+    except OSError:  # who writes it says why it cannot
+        return
+    if not begins.startswith(_BEGINS[kind]):
+        raise Fault("CONFIG", f"{place}: {path.name} is there and is no {kind}, it would be lost; choose another file")
+
+
 def shown(path: Path) -> str:
     """The path as printable text; bytes that are not UTF-8 are written in hexadecimal."""
     return os.fsencode(path).decode(errors="backslashreplace")

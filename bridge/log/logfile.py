@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
-from bridge.files import check_file
+from bridge.files import LOG, check_file, refuse_to_replace
 from bridge.kernel import kernel
 from bridge.log.log_reader import CHANNEL, END, LOG_TIME, START, Bytes, Damage, LogReader, MessageRows
 from bridge.log.mcap_chunks import ChunkWriter
@@ -277,6 +277,8 @@ def recover(path: Path, out: Path) -> Recovered:
     Raises Fault BAD_LOG when nothing can be read, LOG_WRITE when `out` cannot be written or is being recorded.
     """
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    if out.resolve() != path.resolve():
+        refuse_to_replace(out, LOG, f"--out {out}")
     refuse_a_live_log(out, "--out")
     reader = LogReader(path)
     beside = out.with_name(out.name + ".part")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from bridge.faults import Fault
+from bridge.files import LOG, refuse_to_replace
 from bridge.log.mcap_chunks import ChunkWriter, ending_without_index
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import SCHEMA_VERSION, file_descriptor_set, sequence_and_time
@@ -50,6 +51,7 @@ class RunLog:
         self._events = 0
         self._whole_bytes = 0
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
+        refuse_to_replace(path, LOG, str(path))
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             # not truncated when it is opened: the file may be the log of a run under way

@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from bridge.faults import Fault
-from bridge.files import strict_json, write_json
+from bridge.files import JSON, refuse_to_replace, strict_json, write_json
 from cockpit.run.child_process import guarded, report
 from cockpit.run.writable import check_writable, writing
 
@@ -87,6 +87,7 @@ def tell(as_json: Path | None, result: Any, words: Iterable[str], indent: int | 
         print(json.dumps(strict_json(result), allow_nan=False, indent=indent))
         return
     if as_json is not None:
+        refuse_to_replace(as_json, JSON, f"{_OPTION} {as_json}")  # the command itself may have written its log there
         with writing(as_json):  # before anything is printed, which ends where nobody reads on
             write_json(as_json, result)
     for line in words:
@@ -101,5 +102,6 @@ def _check(as_json: Path | None) -> None:
         line = f"{_OPTION}={as_json}: must be - for stdout or end in {_SUFFIX}; choose another name"
         raise Fault("CONFIG", line)
     check_writable(_OPTION, as_json)
+    refuse_to_replace(as_json, JSON, f"{_OPTION} {as_json}")
     if as_json.is_dir():
         raise Fault("CONFIG", f"{_OPTION} {as_json}: must be a file, not a folder; choose another")

@@ -1,6 +1,7 @@
 """Running as one process among several: signals, a dying parent, one clear line for every fault."""
 
 import contextlib
+import errno
 import json
 import os
 import signal
@@ -88,11 +89,24 @@ def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
     """Run a command's work; its exit status, faults and Ctrl-C included."""
     try:
         status = _status(work, as_json)
-        sys.stdout.flush()  # here, where a closed pipe can still be told
+        if sys.stdout is not None:  # None where the caller closed it  # pyright: ignore[reportUnnecessaryComparison]
+            sys.stdout.flush()  # here, where a closed pipe or a full disk can still be told
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _stdout_to_nowhere()
         return 128 + signal.SIGPIPE
+    except OSError as error:
+        if error.errno != errno.ENOSPC or error.filename is not None:
+            raise
+        _stdout_to_nowhere()
+        return report(
+            Fault("LOG_WRITE", "stdout: cannot be written: the disk is full; free space or write elsewhere"), False
+        )
     return status
+
+
+def _stdout_to_nowhere() -> None:
+    """Let what is left in the buffer of stdout go nowhere: else the interpreter fails at its end as well."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _status(work: Callable[[], int | None], as_json: bool) -> int:

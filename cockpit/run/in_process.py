@@ -27,13 +27,15 @@ def run_onboard(
     progress: Callable[[float], None] | None = None,
     changes: Sequence[Change] = (),
     words: Sequence[Word] = (),
+    stopped: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Run a scenario and write its log, with a duration of 0 until Ctrl-C. Raises Fault LOG_WRITE.
+    """Run a scenario and write its log, with a duration of 0 until it is stopped. Raises Fault LOG_WRITE.
 
     Args:
         progress: called now and then with the simulated time [s].
         changes: of the controller's configuration during the run, in order of time.
         words: of an operator during the run, in order of time.
+        stopped: asked before every block; the run then ends as it does at its full duration.
 
     """
     plant = PlantNode(scenario.rig, scenario.seed)
@@ -49,7 +51,7 @@ def run_onboard(
     commands: list[bytes] = []
     ahead, to_say = list(changes), list(words)
     try:
-        while plant.block < blocks:
+        while plant.block < blocks and not stopped():
             sensors, applied = plant.advance(commands)
             log.write(*sensors)
             log.write(*applied)

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
+from bridge.files import LOG, refuse_to_replace
 from bridge.log.logfile import refuse_a_live_log
-from cockpit.run.child_process import warn_without_priority
+from cockpit.run.child_process import stop_event, warn_without_priority
 from cockpit.run.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
@@ -86,6 +87,7 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
     """
     scenario = load_scenario(name, settings)
     path = log_path(log, scenario.name)
+    refuse_to_replace(path, LOG, f"--log {path}")
     before = _stamp(path)
     endless = scenario.duration_s == 0.0
     if not (lockstep or in_process):
@@ -137,4 +139,8 @@ def _in_process(scenario: Scenario, path: Path) -> None:
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task("simulating", total=scenario.duration_s or None)
-        run_onboard(scenario, path, about_run(scenario, lockstep=True), lambda t_s: bar.update(task, completed=t_s))
+        stop = stop_event()
+        about = about_run(scenario, lockstep=True)
+        run_onboard(scenario, path, about, lambda t_s: bar.update(task, completed=t_s), stopped=stop.is_set)
+    if stop.is_set():
+        raise KeyboardInterrupt

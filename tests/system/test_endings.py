@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.log.log_check import check_log
 from bridge.log.logfile import read_run
 from cockpit.run import processes as orchestra
 from tests.logs import short_log
@@ -101,6 +102,7 @@ def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped_and_is_
     data = read_run(log)
     assert data.damage.closed
     assert len(data.sensors) > 100
+    assert check_log(log).findings == []
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

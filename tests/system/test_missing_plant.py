@@ -12,6 +12,8 @@ from bridge.wire.zenoh_link import Bus, BusConfig
 from tests.system.ports import free_endpoint
 from tests.system.told import told
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.nightly
 def test_a_command_without_a_plant_says_so_in_one_line() -> None:

@@ -18,6 +18,8 @@ from plant.effects.library import EFFECTS
 from tests.blind.plant_sizes import EFFECT_SIZES, Sizes
 from tests.made_evidence import made_evidence
 
+pytestmark = pytest.mark.slow
+
 SURFACE = Roughness(0.003, 1.5e-4, 0)
 
 
@@ -129,7 +131,6 @@ def numbers_of(name: str, sizes: Sizes, size: float) -> dict[str, float | str]:
     return table
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", list(EFFECTS))
 def test_the_gap_rises_with_the_size_of_every_effect(bench, name):
     measured = bench.problem.measured

@@ -52,7 +52,7 @@ def test_a_log_without_a_block_is_drawn(tmp_path: Path) -> None:
         ("plot", ".PNG", PNG),
         ("plot", ".svg", b"<?xml"),
         ("plot", ".pdf", b"%PDF"),
-        pytest.param("map", ".svg", b"<?xml", marks=pytest.mark.slow),
+        pytest.param("map", ".svg", b"<?xml", marks=[pytest.mark.slow, pytest.mark.nightly]),
     ],
 )
 def test_a_picture_is_what_its_name_says(log: Path, command: str, suffix: str, begins: bytes) -> None:

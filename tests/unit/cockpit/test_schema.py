@@ -102,6 +102,7 @@ def test_a_schema_takes_what_the_program_takes(name: str, table: dict[str, Any],
     assert fits(name, table) is expected
 
 
+@pytest.mark.slow
 def test_every_effect_with_its_defaults_fits_the_schema_of_a_rig() -> None:
     for name, effect in EFFECTS.items():
         for form, rows in effect.forms.items():

@@ -10,7 +10,8 @@ from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.trials import trials
 from tests.prepared import fitter_of, prepared
 
-pytestmark = pytest.mark.slow
+# nightly: 30 s; that a large effect is named at all is in the small set and in tests/system/test_diagnose.py
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 SOFTER = -0.3
 
