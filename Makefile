@@ -16,7 +16,7 @@ demo: $(READY)
 # linear algebra with one thread a process: there are as many processes as cores
 PARALLEL := OMP_NUM_THREADS=1 $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 EACH_CPU_S := 5 # of a test that is not marked slow
-QUICK_CPU_S := 120 # of all tests of `make quick`: may only fall; 106 beside other work, with evidence still to be made
+QUICK_CPU_S := 110 # of all tests of `make quick`: may only fall; 106 beside other work, with evidence still to be made
 
 quick: warm ## under a minute once kernels are compiled; what every edit is tried with
 	@$(PARALLEL) -x -m "not slow and not realtime and not nightly" --cpu-each $(EACH_CPU_S) --cpu-all $(QUICK_CPU_S)

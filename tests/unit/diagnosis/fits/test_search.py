@@ -16,6 +16,8 @@ EFFECTS = {"coulomb-level": {"ratio": -0.14}, "stribeck-velocity": {"ratio": -0.
 
 
 @pytest.mark.slow
+# nightly: the rule is carried by whole diagnoses in the small set, a pair of effects among them
+@pytest.mark.nightly
 def test_a_second_effect_is_found_beside_one_that_is_there():
     fitter = fitter_of(*prepared("ladder", EFFECTS))
     described = np.zeros(len(fitter.nuisances))
@@ -31,6 +33,8 @@ def test_a_second_effect_is_found_beside_one_that_is_there():
 
 
 @pytest.mark.slow
+# nightly: the rule is carried by whole diagnoses in the small set, a pair of effects among them
+@pytest.mark.nightly
 def test_a_large_effect_that_screening_puts_last_is_tried_in_several_sizes():
     """Screening is linear: here it is made to see nothing in the static level, which it has behind eight others."""
     fitter = fitter_of(*prepared("short", {"static-level": {"ratio": 0.2}}))
