@@ -57,7 +57,7 @@ def with_places(words: Sequence[str]) -> list[str]:
         if word == "--":
             return [*result, word, *left]
         if word == _OPTION:
-            named = bool(left) and (left[0] == str(STDOUT) or left[0].endswith(_SUFFIX))
+            named = bool(left) and (left[0] == str(STDOUT) or left[0].lower().endswith(_SUFFIX))
             word = f"{_OPTION}={left.pop(0) if named else STDOUT}"
         result.append(word)
     return result
@@ -98,7 +98,7 @@ def _check(as_json: Path | None) -> None:
     """Raise Fault CONFIG or LOG_WRITE for what is no place for JSON."""
     if as_json is None or as_json == STDOUT:
         return
-    if as_json.suffix != _SUFFIX:
+    if as_json.suffix.lower() != _SUFFIX:
         line = f"{_OPTION}={as_json}: must be - for stdout or end in {_SUFFIX}; choose another name"
         raise Fault("CONFIG", line)
     check_writable(_OPTION, as_json)

@@ -20,13 +20,14 @@ LogArgument = Annotated[Path, typer.Argument(help="A run log, .mcap.")]
 
 @log_app.command("info")
 def log_info(path: LogArgument, as_json: Json = None) -> None:
-    """Judge the run in a log: slips, swing, v_a / v_d, latency, what was lost."""
+    """Judge the run in a log: slips, swing, v_a / v_d, latency, what was lost; exit status 1 where it is not good."""
 
-    def work() -> None:
+    def work() -> int:
         from cockpit.judge.verdict import headline, in_words, judge
 
         verdict = judge(path)
         tell(as_json, verdict.as_dict(), [headline(verdict), *in_words(verdict)])
+        return 0 if verdict.good else 1
 
     carry_out(work, as_json)
 
@@ -68,9 +69,9 @@ def log_export(
     end: Annotated[str, typer.Option("--until", help="Up to this time of the run, e.g. 20s.")] = "",
     as_json: Json = None,
 ) -> None:
-    """Write a log as tables: sensors one row a sample, the other topics one row a message."""
+    """Write a log as tables: sensors one row a sample, the other topics one row a message; exit status 1 with no row."""
 
-    def work() -> None:
+    def work() -> int:
         from bridge.log.logfile import STREAMING
         from bridge.tables.export import export
         from cockpit.run.replay import time_s
@@ -81,9 +82,11 @@ def log_export(
         with watched_share(f"exporting {path.name}", quiet=as_json == STDOUT) as progress:
             written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress)
         words = [f"{name:<8} {rows} rows" for name, rows in written.rows.items()]
-        words += [str(file) for file in written.files] or ["nothing to write: no message of these topics in this time"]
+        nothing = "nothing to write: no message of these topics in this time; a table that is there stays as it is"
+        words += [str(file) for file in written.files] or [nothing]
         lost = _lost(written.damage)
         tell(as_json, written, [*words, f"warning  the log is damaged; {lost}"] if lost else words)
+        return 0 if written.files else 1
 
     carry_out(work, as_json)
 

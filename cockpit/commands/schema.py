@@ -43,7 +43,9 @@ def schema(
                 for one in wanted:
                     write_json(out / f"{one.name}.json", one.schema())
         names = [Named(one.name, one.about) for one in wanted]
-        if out is not None or not key:
+        if out is not None:
+            tell(as_json, names, [f"written  {out / one.name}.json" for one in names])
+        elif not key:
             tell(as_json, names, [f"{one.name:<20} {one.about}" for one in names])
         else:
             made = FORMATS[key].schema()

@@ -104,7 +104,7 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
-        await_size(log, 400_000)
+        await_size(log, 200_000)
         assert subprocess.run([*COMMAND, "stop", "--endpoint", endpoint], timeout=30, check=False).returncode == 0
         second = [*COMMAND, "controller", "--endpoint", endpoint]
         refused = subprocess.run(second, timeout=60, check=False, capture_output=True, text=True)
@@ -112,7 +112,7 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
         assert f"{endpoint}: another controller is on this bus: must be one" in refused.stderr
         again = [*COMMAND, "stop", "--reset", "--endpoint", endpoint]
         assert subprocess.run(again, timeout=30, check=False).returncode == 0
-        await_size(log, log.stat().st_size + 400_000)
+        await_size(log, log.stat().st_size + 150_000)
         run.send_signal(signal.SIGINT)
         run.communicate(timeout=60)
     finally:

@@ -170,6 +170,7 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
 def test_the_verdict_on_a_cut_log_says_what_was_lost(tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
     path.write_bytes(short_log()[: len(short_log()) * 2 // 3])
-    told = json.loads(CliRunner().invoke(log_app, ["info", str(path), "--json"]).stdout)
-    assert told["good"] is False
+    result = CliRunner().invoke(log_app, ["info", str(path), "--json"])
+    told = json.loads(result.stdout)
+    assert (result.exit_code, told["good"]) == (1, False)
     assert "bytes of an open chunk were lost" in " ".join(told["faults"])

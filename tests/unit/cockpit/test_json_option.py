@@ -66,6 +66,7 @@ def test_every_command_has_both_words_for_help(command: str) -> None:
         ("log info a.mcap --json -", "log info a.mcap --json=-"),
         ("log info --json x.json a.mcap", "log info --json=x.json a.mcap"),
         ("log info a.mcap --json x.json", "log info a.mcap --json=x.json"),
+        ("log info a.mcap --json X.JSON", "log info a.mcap --json=X.JSON"),
         ("log info --json=x.json a.mcap", "log info --json=x.json a.mcap"),
         ("diagnose --json folder --jobs 2", "diagnose --json=- folder --jobs 2"),
         ("diagnose folder --json --jobs 2", "diagnose folder --json=- --jobs 2"),
@@ -247,3 +248,12 @@ def test_a_shell_completes_commands_and_options() -> None:
         environment = {"_STICKSLIP_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
         result = CliRunner().invoke(app, [], env=environment, prog_name="stickslip")
         assert expected in result.stdout.split()
+
+
+def test_an_export_of_nothing_is_told_and_leaves_an_older_table(tmp_path: Path) -> None:
+    table = tmp_path / "run.csv"
+    table.write_text("of yesterday\n")
+    result = call("log", "export", "run.mcap", "--to", "run.csv", "--topic", "trace", "--from", "90s")
+    assert result.exit_code == 1
+    assert "nothing to write: no message of these topics in this time; a table that is there stays" in result.stdout
+    assert table.read_text() == "of yesterday\n"

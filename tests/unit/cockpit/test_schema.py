@@ -157,7 +157,8 @@ def test_without_a_name_they_are_listed_and_with_a_folder_written(tmp_path: Path
     assert [line.split()[0] for line in lines] == [one.name for one in (*TOML, *JSON)]
     assert call("schema", "--out", str(tmp_path / "all")).exit_code == 0
     assert {path.stem for path in (tmp_path / "all").iterdir()} == FORMATS.keys()
-    assert call("schema", "rig", "--out", str(tmp_path / "one")).exit_code == 0
+    written = call("schema", "rig", "--out", str(tmp_path / "one"))
+    assert (written.exit_code, written.stdout) == (0, f"written  {tmp_path / 'one' / 'rig.json'}\n")
     assert [path.name for path in (tmp_path / "one").iterdir()] == ["rig.json"]
 
 
