@@ -6,5 +6,5 @@ tables/   CSV, Parquet, MATLAB and TDMS, in and out
 
 config    strict TOML                              faults   codes, exit statuses and help
 files     checks before reading, atomic writing    units    units in names, numbers in words
-kernel    compiled code and its cache
+kernel, kernel_cache   compiled code; where it is kept, and what renews it
 """

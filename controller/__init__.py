@@ -7,6 +7,7 @@ onset          the estimate: stick, slip or smooth sliding, and the time to the 
 policy         the wanted vibration
 limits         the allowed vibration
 core           one step of all of these
+telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 replay         the controller on the frames of a log
 codes          modes, states, reasons and limits as numbers

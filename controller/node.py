@@ -5,19 +5,18 @@ from typing import Any
 import numpy as np
 
 from bridge.faults import Fault
+from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
-from bridge.wire.messages import STATE as STATE_LAYOUT
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.messages import sensor_block, sequence_and_time
 from bridge.wire.topics import COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
 from controller.codes import BLOCK, GAP, RESET, STALE, STOP
 from controller.config import ControllerConfig
 from controller.core import step
-from controller.records import LAYOUT_ID, build
+from controller.records import build
+from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 
-_STATE_EVERY = 10  # steps: 100 Hz
-_SNAPSHOT_EVERY = 1000  # steps: once a second
 # Blocks that a late block may be behind, as many as the inbox holds. A block further behind comes from a rig that was restarted.
 _LATEST_BLOCKS = 256
 
@@ -40,7 +39,6 @@ class ControllerNode:
         self._command = COMMAND_LAYOUT.blank()
         self._trace = TRACE_LAYOUT.blank()
         self._lateness_ns = self._trace["lateness_ns"]
-        self._plotted = STATE_LAYOUT.blank()
         self._expected = 0
         self._block_t_ns = 0  # of the last block
         self._length_checked = False
@@ -64,6 +62,9 @@ class ControllerNode:
 
     def warm_up(self) -> None:
         """Compile or load the kernel on copies, so that the first answer is not late."""
+        compile_once("the controller", self._step_copies)
+
+    def _step_copies(self) -> None:
         step(
             self._params, self._state.copy(), self._no_sensors, BLOCK, 0, 0,
             COMMAND_LAYOUT.blank(), TRACE_LAYOUT.blank(), self._scratch,
@@ -75,10 +76,7 @@ class ControllerNode:
 
     def operator(self, action: int) -> None:
         """Take an operator's action (`wire.Operator.Action`); it acts with the next frame, where the log shows it."""
-        if action == wire.Operator.STOP:
-            self._operator_events = STOP
-        elif action == wire.Operator.RESET and not self._operator_events & STOP:
-            self._operator_events = RESET
+        self._operator_events = obeyed(self._operator_events, action)
 
     def block(self, payload: bytes) -> Outgoing | None:
         """Consume a sensor block; return the command that answers it, or None for a block that is late or repeated.
@@ -132,30 +130,15 @@ class ControllerNode:
         """The messages after the command: the trace, and at their rates the plotted state and a snapshot of the memory."""
         self._lateness_ns[0] = lateness_ns
         messages = [Outgoing(TRACE, self._trace.tobytes())]
-        if self.steps % _STATE_EVERY == 0:
-            messages.append(self._state_message())
-        if self.steps % _SNAPSHOT_EVERY == 0:
-            snapshot = wire.Snapshot(
-                sequence=self.steps // _SNAPSHOT_EVERY - 1,
-                t_ns=self.t_ns,
-                step=self.steps - 1,
-                layout=LAYOUT_ID,
-                memory=self._state.tobytes(),
-            )
-            messages.append(Outgoing(SNAPSHOT, snapshot.SerializeToString()))
+        if self.steps % STATE_EVERY == 0:
+            messages.append(Outgoing(STATE, plotted(self._trace, self.steps).tobytes()))
+        if self.steps % SNAPSHOT_EVERY == 0:
+            messages.append(Outgoing(SNAPSHOT, snapshot(self._state, self.steps, self.t_ns)))
         return messages
 
-    def _state_message(self) -> Outgoing:
-        trace: Any = self._trace[0]
-        plotted: Any = self._plotted[0]
-        plotted.sequence = self.steps // _STATE_EVERY - 1
-        plotted.t_ns = self.t_ns
-        for name in (
-            *("drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate", "score"),
-            *("mode", "state", "slips"),
-        ):
-            plotted[name] = trace[name]
-        moving = trace.state > wire.STANDSTILL and trace.drive_velocity_mps > 0.0
-        measured = trace.limit not in (wire.STALE_INPUT, wire.NOT_FINITE)  # otherwise the trace repeats an old value
-        plotted.velocity_ratio = trace.vibration_velocity_mps / trace.drive_velocity_mps if moving and measured else 0.0
-        return Outgoing(STATE, self._plotted.tobytes())
+
+def obeyed(events: int, action: int) -> int:
+    """The operator's bits for the next frame, after one more action (`wire.Operator.Action`); a STOP is not taken back."""
+    if action == wire.Operator.STOP:
+        return STOP
+    return RESET if action == wire.Operator.RESET and not events & STOP else events

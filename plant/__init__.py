@@ -27,5 +27,6 @@ sensors                 the digital half of the channels
 step                    one whole block with its messages
 simulate                a run without bus and sensors
 stability               the slider linearised around steady sliding
+inputs                  the drive's velocity and the sensors' noise, block by block
 node, app               the rig as a participant of the bus; the process
 """

@@ -5,13 +5,14 @@ import math
 import numpy as np
 
 from bridge.faults import Fault
+from bridge.kernel_cache import compile_once
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
 from bridge.wire.messages import CHANNELS, sensor_block
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.topics import APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
+from plant.inputs import RigInputs
 from plant.records import NO_COMMAND, TRUTH, build
-from plant.simulate import drive_velocity_mps
 from plant.step import step
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
@@ -32,20 +33,23 @@ class PlantNode:
         self.block = 0  # number of the next block
         self._config = config
         self._params, self._state = build(config)
-        self._random = np.random.Generator(np.random.PCG64(seed))
+        self._inputs = RigInputs(config, seed)
         samples = config.solver.samples_per_block
         self._analogue = np.empty((len(CHANNELS), samples))
         self.truth = np.empty((len(TRUTH), samples))  # of the last block, rows as plant.records.TRUTH
-        self._noise = np.empty((_BATCH_BLOCKS, len(CHANNELS), samples))
-        self._velocity_mps = np.empty(_BATCH_BLOCKS)
+        self._noise = np.zeros((_BATCH_BLOCKS, len(CHANNELS), samples))
+        self._velocity_mps = np.zeros(_BATCH_BLOCKS)
         self._command = COMMAND_LAYOUT.blank()
         self._sensors = sensor_block(samples).blank()
         self._applied = APPLIED_LAYOUT.blank()
 
     def warm_up(self) -> None:
         """Compile or load the kernel on copies, so that the first block is not late."""
+        compile_once("the plant", self._step_copies)
+
+    def _step_copies(self) -> None:
         step(
-            self._params, self._state.copy(), 0.0, self._command, 0, np.zeros_like(self._noise[0]), 0, 0, 0,
+            self._params, self._state.copy(), 0.0, self._command, 0, self._noise[0], 0, 0, 0,
             self._analogue, self.truth, sensor_block(self._noise.shape[2]).blank(), APPLIED_LAYOUT.blank(),
         )  # fmt: skip
 
@@ -61,20 +65,13 @@ class PlantNode:
             self._command = COMMAND_LAYOUT.read(commands[-1], COMMAND.name)
         at = self.block % _BATCH_BLOCKS
         if at == 0:
-            self._random.standard_normal(out=self._noise)
-            blocks = self.block + np.arange(_BATCH_BLOCKS)
-            self._velocity_mps = drive_velocity_mps(self._config, blocks * self._config.solver.block_s)
+            self._velocity_mps, self._noise = self._inputs.draw(_BATCH_BLOCKS)
         step(
             self._params, self._state, self._velocity_mps[at], self._command, len(commands), self._noise[at],
             commands_late, round_trip_ns, late_ns, self._analogue, self.truth, self._sensors, self._applied,
         )  # fmt: skip
         if not math.isfinite(self.truth[_VELOCITY, -1]):  # NaN anywhere in the state reaches the velocity within a step
-            t_s, step_s = (self.block + 1) * self.block_ns * 1e-9, self._config.solver.step_s
-            raise Fault(
-                "CONFIG",
-                f"{self._config.name}: the slide's velocity is no number at {t_s:.3f} s: this rig cannot be stepped with "
-                f"solver.step_s = {step_s:g}; shorten it, or weaken what is extreme",
-            )
+            raise no_number(self._config, self.block)
         self.block += 1
         return Outgoing(SENSORS, self._sensors.tobytes()), Outgoing(APPLIED, self._applied.tobytes())
 
@@ -86,3 +83,13 @@ class PlantNode:
     def at_rest(self) -> bool:
         """Whether the base stands still."""
         return self._state["amplitude_m"][0] == 0.0
+
+
+def no_number(config: RigConfig, block: int) -> Fault:
+    """The fault of a rig whose state became NaN or infinite in a block."""
+    solver = config.solver
+    line = (
+        f"{config.name}: the slide's velocity is no number at {(block + 1) * solver.block_s:.3f} s: this rig cannot be stepped "
+        f"with solver.step_s = {solver.step_s:g}; shorten it, or weaken what is extreme"
+    )
+    return Fault("CONFIG", line)

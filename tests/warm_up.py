@@ -1,18 +1,16 @@
 """Compile every kernel once, before worker processes would each do it for themselves; `python -m tests.warm_up`.
 
-Nothing is done where it was done for the same sources, which is what the folder of the compiled kernels stands for.
+Nothing is done where it was done for the same sources.
 """
 
 import sys
 import tempfile
 from pathlib import Path
 
-import numba
-
-import bridge.kernel  # noqa: F401 (sets where kernels are kept)
+from bridge.kernel_cache import sources_digest, usable_folder
 from tests.made_evidence import forget_old
 
-DONE = Path(numba.config.CACHE_DIR) / "all-compiled"  # pyright: ignore[reportPrivateImportUsage]
+DONE = usable_folder() / f"tests-{sources_digest(Path(__file__))}"
 
 
 def control(folder: Path) -> None:
@@ -21,9 +19,14 @@ def control(folder: Path) -> None:
     from cockpit.run.in_process import run_onboard
     from cockpit.run.replay import changes_of
     from cockpit.run.scenario import load_scenario
+    from controller.node import ControllerNode
     from controller.replay import replay
+    from plant.node import PlantNode
 
-    run_onboard(load_scenario("paper-c45-c45", ["duration_s=0.4"]), folder / "run.mcap", {})
+    scenario = load_scenario("paper-c45-c45", ["duration_s=0.4"])
+    PlantNode(scenario.rig, scenario.seed).warm_up()
+    ControllerNode(scenario.controller).warm_up()
+    run_onboard(scenario, folder / "run.mcap", {})
     run = read_run(folder / "run.mcap")
     replay(run, changes_of(run, []))
 

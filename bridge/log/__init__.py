@@ -1,6 +1,7 @@
 """Run logs: every message of a run in one MCAP file.
 
 mcap_chunks, runlog      writing in small chunks, so that a kill costs at most one chunk
+block_rows               the messages of many blocks as the bytes of a chunk
 recorder                 the process that writes every message on the bus
 log_reader, logfile      reading without seeking, whole or cut; recovery
 log_check, topic_watch   faults of a log: all of them; those in the numbers and times of one topic

@@ -8,6 +8,7 @@ import struct
 import zlib
 from typing import IO, NamedTuple
 
+import numpy as np
 import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
@@ -26,6 +27,8 @@ from mcap.records import (
     SummaryOffset,
 )
 from mcap.writer import MCAP0_MAGIC
+
+from bridge.log.block_rows import Rows
 
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MESSAGE_FIELDS_BYTES = 22
@@ -116,6 +119,20 @@ class ChunkWriter:
             self._chunk_first_ns = log_time_ns
         self._offset += len(head) + len(payload)
 
+    def add_rows(self, rows: Rows) -> None:
+        """Put the messages of many blocks into the open chunk."""
+        chunk = self._chunk
+        for channel_id, entries in rows.entries.items():
+            entries["offset"] += np.uint64(self._offset)
+            chunk.entries.setdefault(channel_id, []).append(entries.tobytes())
+        chunk.parts.append(rows.data)
+        if self._offset == 0:
+            self._chunk_first_ns, self._chunk_last_ns = rows.first_ns, rows.last_ns
+        else:
+            self._chunk_first_ns = min(self._chunk_first_ns, rows.first_ns)
+            self._chunk_last_ns = max(self._chunk_last_ns, rows.last_ns)
+        self._offset += len(rows.data)
+
     @property
     def open_bytes(self) -> int:
         """Size of the open chunk, uncompressed."""
@@ -162,7 +179,7 @@ class ChunkWriter:
         )
         self._last_ns = max(self._last_ns, index.message_end_time)
         for channel_id, entries in self._chunk.entries.items():
-            self._counts[channel_id] += len(entries)
+            self._counts[channel_id] += sum(map(len, entries)) // _INDEX_ENTRY.size
         self._chunk_indexes.append(index)
         self._chunk = _Open([], {})
         self._offset = 0

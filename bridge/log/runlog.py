@@ -5,20 +5,21 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
 from bridge.faults import Fault
 from bridge.files import LOG, refuse_to_replace
+from bridge.log.block_rows import rows
 from bridge.log.mcap_chunks import ChunkWriter, ending_without_index
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import SCHEMA_VERSION, file_descriptor_set, sequence_and_time
+from bridge.wire.messages import SCHEMA_VERSION, Records, file_descriptor_set, sequence_and_time
 from bridge.wire.topics import RECORDER_EVENT, TOPICS, Topic
 
 # Duration of a chunk. Longer: a kill loses more (it loses the open chunk, at most 0.25 s). Shorter: larger files.
 FLUSH_PERIOD_S = 0.1
-LARGEST_CHUNK_BYTES = 1 << 20  # ends a chunk earlier; a run in one process fills more than this in 0.1 s
+LARGEST_CHUNK_BYTES = 1 << 20  # ends a chunk earlier; lockstep may fill more than this in 0.1 s
 _LATEST_MESSAGES = 256  # largest lag of a delayed message, in numbers; a larger lag means that the sender restarted
 LIBRARY = f"stickslip schema {SCHEMA_VERSION}"
 
@@ -112,11 +113,28 @@ class RunLog:
         self._add(topic, payload, sequence, t_ns)
         self.flush_when_due()
 
+    def write_blocks(self, each: Mapping[Topic, Records], after: Mapping[Topic, Records]) -> None:
+        """Write the messages of blocks of a lockstep run, which follow one another without a gap.
+
+        Args:
+            each: topics with one message a block, [blocks].
+            after: topics with one message after every so many blocks, [blocks / so many]; may be empty.
+
+        """
+        by_channel = [{self._channels[topic.name]: table for topic, table in part.items()} for part in (each, after)]
+        made = rows(*by_channel)
+        self._last_t_ns = max(self._last_t_ns, made.last_ns)
+        self._writer.add_rows(made)
+
+    def flush(self) -> None:
+        """End the open chunk. Raises Fault LOG_WRITE."""
+        self._guarded(self._writer.flush)
+
     def flush_when_due(self) -> None:
         """End the open chunk when it is old enough. Raises Fault LOG_WRITE."""
         if time.monotonic() > self._due_s or self._writer.open_bytes > LARGEST_CHUNK_BYTES:
             self._due_s = time.monotonic() + FLUSH_PERIOD_S
-            self._guarded(self._writer.flush)
+            self.flush()
 
     def add_event(self, code: str, text: str, t_ns: int | None = None) -> None:
         """Write an event of the recorder; its time is `t_ns`, or that of the latest message."""

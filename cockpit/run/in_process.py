@@ -1,16 +1,25 @@
-"""A lockstep run in one process: the same nodes and the same log, without a bus. For tests and for many runs."""
+"""A lockstep run in one process: the same steps and the same log, without a bus. For tests and for many runs."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy.typing as npt
+
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.topics import CONTROLLER_EVENT, PLANT_EVENT
+from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, SENSORS, SNAPSHOT, STATE, TRACE
+from cockpit.run.closed_loop import Blocks, ClosedLoop
 from cockpit.run.scenario import Scenario, header
-from controller.node import ControllerNode
+from controller.node import obeyed
 from controller.replay import Change
-from plant.node import PlantNode
+from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
+from plant.node import no_number
+
+# Blocks that are stepped in one call and make one chunk of the log. Fewer: slower. More: a kill and Ctrl-C lose more.
+_STRETCH_BLOCKS = 100
 
 
 class Word(NamedTuple):
@@ -35,44 +44,70 @@ def run_onboard(
         progress: called now and then with the simulated time [s].
         changes: of the controller's configuration during the run, in order of time.
         words: of an operator during the run, in order of time.
-        stopped: asked before every block; the run then ends as it does at its full duration.
+        stopped: asked before every stretch of blocks; the run then ends as it does at its full duration.
 
     """
-    plant = PlantNode(scenario.rig, scenario.seed)
-    controller = ControllerNode(scenario.controller)
-    plant.warm_up()
-    controller.warm_up()
+    loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller)
+    loop.warm_up()
     log = RunLog(path, lockstep=True)
     log.add_metadata("run", about)
     for role in ("controller", "plant"):
         log.add_header(header(scenario, role, lockstep=True))
     blocks = round(scenario.duration_s / scenario.rig.solver.block_s) if scenario.duration_s > 0 else 2**62
     log.write(PLANT_EVENT, _event("plant", 0, 0, "START", "lockstep"))
-    commands: list[bytes] = []
     ahead, to_say = list(changes), list(words)
     try:
-        while plant.block < blocks and not stopped():
-            sensors, applied = plant.advance(commands)
-            log.write(*sensors)
-            log.write(*applied)
-            while ahead and plant.block * plant.block_ns >= ahead[0].t_ns:
-                controller.reconfigure(ahead.pop(0).config)
-            while to_say and plant.block * plant.block_ns >= to_say[0].t_ns:
-                controller.operator(to_say.pop(0).action)
-            command = controller.block(sensors.payload)
-            if command is not None:
-                log.write(*command)
-                commands = [command.payload]
-            for message in controller.rest(0):
-                log.write(*message)
-            if progress is not None and plant.block % 500 == 0:
-                progress(plant.block * scenario.rig.solver.block_s)
-        t_ns = plant.block * plant.block_ns
-        log.write(PLANT_EVENT, _event("plant", 1, t_ns, "END", f"blocks={plant.block}"))
-        text = f"steps={controller.steps} duplicates={controller.duplicates} dropped=0"
+        # the log is compressed and written while the next stretch is computed
+        with ThreadPoolExecutor(max_workers=1) as writer:
+            written: Future[None] | None = None
+            while loop.block < blocks and not stopped():
+                while ahead and _first_step(loop, ahead[0].t_ns) <= loop.block:
+                    loop.reconfigure(ahead.pop(0).config)
+                events = 0
+                while to_say and _first_step(loop, to_say[0].t_ns) <= loop.block:
+                    events = obeyed(events, to_say.pop(0).action)
+                # every step with a snapshot ends a stretch, and so does what changes the controller
+                ends = [blocks, (loop.block // _STRETCH_BLOCKS + 1) * _STRETCH_BLOCKS]
+                ends += [_first_step(loop, part[0].t_ns) for part in (ahead, to_say) if part]
+                made = loop.advance(min(ends) - loop.block, events)
+                if written is not None:
+                    written.result()
+                written = writer.submit(_write, log, loop.block, loop.block_ns, made, loop.controller_state.copy())
+                if loop.block < min(ends):
+                    raise no_number(scenario.rig, loop.block)
+                if progress is not None:
+                    progress(loop.block * scenario.rig.solver.block_s)
+            if written is not None:
+                written.result()
+        t_ns = loop.block * loop.block_ns
+        log.write(PLANT_EVENT, _event("plant", 1, t_ns, "END", f"blocks={loop.block}"))
+        text = f"steps={loop.block} duplicates=0 dropped=0"
         log.write(CONTROLLER_EVENT, _event("controller", 0, t_ns, "END", text))
     finally:
         log.close()
+
+
+def _first_step(loop: ClosedLoop, t_ns: int) -> int:
+    """Number of the first block that ends at `t_ns` or after it."""
+    return max(-(-t_ns // loop.block_ns) - 1, 0)
+
+
+def _write(log: RunLog, end: int, block_ns: int, made: Blocks, memory: npt.NDArray[Any]) -> None:
+    """Write the messages of a stretch that ends before block `end`, with the state and the snapshot where they are due."""
+    begin = end - len(made.trace)
+    tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
+    # a stretch that was cut short begins and ends with blocks that have no whole period of the state message
+    whole = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)
+    for first, last in pairwise(sorted({begin, *whole, end})):
+        part = {topic: table[first - begin : last - begin] for topic, table in tables.items()}
+        steps = range(first + STATE_EVERY - first % STATE_EVERY, last + 1, STATE_EVERY)
+        states = (
+            {STATE: plotted(made.trace[steps[0] - begin - 1 :: STATE_EVERY][: len(steps)], steps[0])} if steps else {}
+        )
+        log.write_blocks(part, states)
+    if end % SNAPSHOT_EVERY == 0 and end > begin:
+        log.write(SNAPSHOT, snapshot(memory, end, end * block_ns))
+    log.flush()
 
 
 def _event(source: str, sequence: int, t_ns: int, code: str, text: str) -> bytes:

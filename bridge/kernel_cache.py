@@ -1,0 +1,125 @@
+"""Where compiled kernels are kept, when one is compiled anew, and which of several processes compiles it."""
+
+import atexit
+import errno
+import fcntl
+import functools
+import hashlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from numba.core.caching import UserProvidedCacheLocator
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("bridge", "controller", "plant", "diagnosis", "cockpit")
+_IMPORT = re.compile(r"^[ \t]*(?:from ([\w.]+) import (\([^)]*\)|.*)|import ([\w.]+))", re.MULTILINE)
+FOLDER = "NUMBA_CACHE_DIR"
+
+
+def _named(module: str, root: Path) -> Iterator[Path]:
+    """The source files below `root` that run when `module` is imported."""
+    parts = module.split(".")
+    if parts[0] in PACKAGES:
+        for length in range(1, len(parts) + 1):
+            place = root.joinpath(*parts[:length])
+            yield from (path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file())
+
+
+@functools.cache
+def _imported(path: Path, root: Path) -> set[Path]:
+    """Source files of this project that `path` imports."""
+    found: set[Path] = set()
+    for source, names, module in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        found.update(_named(source or module, root))
+        for name in re.findall(r"\w+", names):
+            found.update(_named(f"{source}.{name}", root))
+    return found
+
+
+def _closure(path: Path, root: Path) -> set[Path]:
+    """A source file and all that it imports, and they, and so on."""
+    seen, ahead = {path}, [path]
+    while ahead:
+        new = _imported(ahead.pop(), root) - seen
+        seen |= new
+        ahead += new
+    return seen
+
+
+@functools.cache
+def sources_digest(path: Path, root: Path = ROOT) -> str:
+    """A hash over a source file and over all files of the project below `root` that it imports, and they, and so on.
+
+    Numba renews a cached kernel when the kernel's own file changes, but not when a kernel that it calls changes. Without this
+    hash, plant/core.py would run the old contact after an edit of plant/contact.py.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(_closure(path, root)):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+class SourcesLocator(UserProvidedCacheLocator):
+    """Tells numba that a kernel is another one when any source changes that it can hang on."""
+
+    def get_source_stamp(self) -> bytes:
+        """The hash of the sources of the function's file."""
+        return sources_digest(Path(self._py_file).resolve()).encode()
+
+
+def compile_once(what: str, compiling: Callable[[], object]) -> None:
+    """Call `compiling`, which calls kernels for the first time. Of several processes one compiles, and the others wait.
+
+    Args:
+        what: of whose kernels, in words that make a file name.
+        compiling: compiles the kernels, or loads them where they are kept.
+
+    """
+    folder = Path(os.environ[FOLDER])
+    done = folder / f"{what}-{sources_digest(Path(sys.modules[compiling.__module__].__file__ or ''))}"
+    if done.exists():
+        compiling()
+        return
+    with (folder / f"{what}.lock").open("a") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            _say(f"another process compiles the kernels of {what}: waiting for it")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        if not done.exists():
+            _say(f"compiling the kernels of {what}, once for this version")
+        compiling()
+        for old in folder.glob(f"{what}-*"):
+            old.unlink(missing_ok=True)
+        done.touch()
+
+
+def _say(words: str) -> None:
+    print(f"stickslip: {words}", file=sys.stderr, flush=True)
+
+
+def usable_folder() -> Path:
+    """The folder for compiled kernels; where none can be written, a temporary one until this process ends."""
+    # not `Path.home`, which fails for a user without a home
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    folder = Path(os.environ.get(FOLDER) or Path(home) / "stickslip")
+    try:
+        if str(folder).startswith("~"):  # not expanded: a folder of that name would be made where the command is called
+            raise OSError(errno.ENOENT, "its home is not known")
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        own = tempfile.mkdtemp(prefix="stickslip-kernels-")
+        atexit.register(shutil.rmtree, own, ignore_errors=True)
+        line = (
+            f"stickslip: {folder}: {error.strerror}: compiled kernels cannot be kept, so every command compiles them anew, "
+            f"which takes up to a minute; set {FOLDER} to a folder that can be written to"
+        )
+        print(line, file=sys.stderr)
+        return Path(own)
+    return folder

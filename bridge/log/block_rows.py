@@ -1,0 +1,71 @@
+"""Messages of many blocks as the bytes of an MCAP chunk, without a loop over messages."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mcap.opcode import Opcode
+
+from bridge.wire.messages import Records
+
+_FIELDS_BYTES = 22  # of a message record, between its length and its payload
+_INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
+
+
+class Rows(NamedTuple):
+    """The message records of a stretch of a chunk, and where they begin."""
+
+    data: bytes
+    entries: dict[int, npt.NDArray[Any]]  # by channel: log time [ns] and offset in `data` of each message
+    first_ns: int
+    last_ns: int
+
+
+def _record(payload_bytes: int) -> np.dtype[Any]:
+    head = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_ns", "<u8")]
+    return np.dtype([*head, ("publish_ns", "<u8"), ("payload", f"V{payload_bytes}")])
+
+
+def _fill(place: npt.NDArray[Any], channel: int, messages: Records) -> None:
+    """Write message records into the places for them; `place` has the shape of their order."""
+    payloads = messages.view(f"V{messages.dtype.itemsize}").reshape(place.shape)
+    place["opcode"], place["channel"] = Opcode.MESSAGE, channel
+    place["length"] = _FIELDS_BYTES + messages.dtype.itemsize
+    place["sequence"] = (messages["sequence"] & 0xFFFFFFFF).reshape(place.shape)
+    place["log_ns"] = place["publish_ns"] = messages["t_ns"].reshape(place.shape)
+    place["payload"] = payloads
+
+
+def rows(each: Mapping[int, Records], after: Mapping[int, Records]) -> Rows:
+    """Lay messages out in order of time; the simulated time is their log time.
+
+    Args:
+        each: by channel, the messages of topics that every block has, [blocks].
+        after: by channel, those of topics that have one after every so many blocks, [blocks / so many]; may be empty.
+
+    """
+    blocks = len(next(iter(each.values())))
+    groups = len(next(iter(after.values()))) if after else 1
+    block = np.dtype([(str(channel), _record(table.dtype.itemsize)) for channel, table in each.items()])
+    last = [(str(channel), _record(table.dtype.itemsize)) for channel, table in after.items()]
+    group = np.dtype([("blocks", block, (blocks // groups,)), *last])
+    laid_out = np.zeros(groups, group)
+    starts = np.arange(groups, dtype=np.uint64) * np.uint64(group.itemsize)
+    of_block = np.arange(blocks // groups, dtype=np.uint64) * np.uint64(block.itemsize)
+    entries: dict[int, npt.NDArray[Any]] = {}
+    places = [
+        *(
+            (channel, each[channel], laid_out["blocks"][str(channel)], block, starts[:, None] + of_block)
+            for channel in each
+        ),
+        *((channel, after[channel], laid_out[str(channel)], group, starts) for channel in after),
+    ]
+    for channel, messages, place, outer, offsets in places:
+        _fill(place, channel, messages)
+        fields: Any = outer.fields
+        entries[channel] = np.empty(len(messages), _INDEX_ENTRY)
+        entries[channel]["log_time"] = messages["t_ns"]
+        entries[channel]["offset"] = (offsets + np.uint64(fields[str(channel)][1])).ravel()
+    times = next(iter(each.values()))["t_ns"]
+    return Rows(laid_out.tobytes(), entries, int(times[0]), int(times[-1]))

@@ -1,0 +1,132 @@
+"""Plant and controller in turns, many blocks in one call of compiled code: a run in one process waits for no interpreter."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.kernel import unlocked_kernel
+from bridge.kernel_cache import compile_once
+from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, TRACE, Records, sensor_block
+from controller.codes import BLOCK
+from controller.config import ControllerConfig
+from controller.core import step as controller_step
+from controller.records import build as controller_records
+from plant.config import RigConfig
+from plant.inputs import RigInputs
+from plant.records import TRUTH
+from plant.records import build as plant_records
+from plant.step import step as plant_step
+
+_VELOCITY = TRUTH.index("true_velocity_mps")
+
+
+@unlocked_kernel
+def advance_both(
+    plant_params: npt.NDArray[Any],
+    plant_state: npt.NDArray[Any],
+    velocity_mps: npt.NDArray[np.float64],
+    noise: npt.NDArray[np.float64],
+    controller_params: npt.NDArray[Any],
+    controller_state: npt.NDArray[Any],
+    operator_events: int,
+    answered: int,
+    analogue: npt.NDArray[np.float64],
+    truth: npt.NDArray[np.float64],
+    scratch: npt.NDArray[np.float64],
+    sensors: npt.NDArray[Any],
+    applied: npt.NDArray[Any],
+    commands: npt.NDArray[Any],
+    traces: npt.NDArray[Any],
+) -> int:
+    """Advance the rig and its controller by many blocks, in place; return how many were done.
+
+    Args:
+        plant_params, plant_state, controller_params, controller_state: one record each.
+        velocity_mps: of the drive, [blocks].
+        noise: standard normal numbers, [blocks, 5, samples].
+        operator_events: bits STOP and RESET of `controller.codes`, for the first block.
+        answered: 1 where `commands[0]` answers the block before the first, 0 at the start of a run.
+        analogue, truth: [5, samples] and [6, samples], overwritten by every block.
+        scratch: [samples], overwritten.
+        sensors, applied, traces: message records [blocks], filled.
+        commands: message records [blocks + 1]; the first is what the rig hears first, the others are filled.
+
+    Fewer blocks than asked are done where the slide's velocity becomes NaN or infinite.
+
+    """
+    last = truth.shape[1] - 1
+    for i in range(velocity_mps.shape[0]):
+        plant_step(
+            plant_params, plant_state, velocity_mps[i], commands[i : i + 1], answered if i == 0 else 1, noise[i],
+            0, 0, 0, analogue, truth, sensors[i : i + 1], applied[i : i + 1],
+        )  # fmt: skip
+        if not math.isfinite(truth[_VELOCITY, last]):
+            return i
+        events = BLOCK | operator_events if i == 0 else BLOCK
+        controller_step(
+            controller_params, controller_state, sensors[i : i + 1], events, 0, sensors[i].t_ns,
+            commands[i + 1 : i + 2], traces[i : i + 1], scratch,
+        )  # fmt: skip
+    return velocity_mps.shape[0]
+
+
+class Blocks(NamedTuple):
+    """Messages of one stretch of a run, [blocks] each."""
+
+    sensors: Records
+    applied: Records
+    command: Records
+    trace: Records
+
+
+class ClosedLoop:
+    """A rig and its controller in lockstep.
+
+    Args:
+        rig: the rig file.
+        seed: of the sensor noise.
+        config: the controller's configuration, with the `block_s` and `samples_per_block` of the rig.
+
+    """
+
+    def __init__(self, rig: RigConfig, seed: int, config: ControllerConfig) -> None:
+        self.block = 0  # number of the next block
+        self.block_ns = round(rig.solver.block_s * 1e9)
+        self.controller_state: npt.NDArray[Any]
+        samples = rig.solver.samples_per_block
+        self._rig = rig
+        self._inputs = RigInputs(rig, seed)
+        self._sensors = sensor_block(samples)
+        self._plant_params, self._plant_state = plant_records(rig)
+        self._controller_params, self.controller_state = controller_records(config)
+        self._analogue, self._truth = np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples))
+        self._scratch = np.empty(samples)
+        self._last_command = COMMAND.blank()
+
+    def warm_up(self) -> None:
+        """Compile or load the kernel, so that the log begins when the run does."""
+        compile_once("a run in one process", lambda: self.advance(0))
+
+    def reconfigure(self, config: ControllerConfig) -> None:
+        """Continue with another configuration of the controller and its present memory."""
+        self._controller_params, _ = controller_records(config)
+
+    def advance(self, blocks: int, operator_events: int = 0) -> Blocks:
+        """Advance by `blocks`; the controller obeys `operator_events` in the first one.
+
+        Fewer blocks come back where the rig's state became NaN or infinite in the one after them.
+        """
+        velocity_mps, noise = self._inputs.draw(blocks)
+        commands = COMMAND.blank(blocks + 1)
+        commands[:1] = self._last_command
+        sensors, applied, trace = self._sensors.blank(blocks), APPLIED.blank(blocks), TRACE.blank(blocks)
+        done = advance_both(
+            self._plant_params, self._plant_state, velocity_mps, noise,
+            self._controller_params, self.controller_state, operator_events, min(self.block, 1),
+            self._analogue, self._truth, self._scratch, sensors, applied, commands, trace,
+        )  # fmt: skip
+        self.block += done
+        self._last_command = commands[done : done + 1]
+        return Blocks(sensors[:done], applied[:done], commands[1 : done + 1], trace[:done])

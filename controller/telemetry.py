@@ -1,0 +1,47 @@
+"""What the controller tells besides commands and traces: the state for plots, and its whole memory for replay."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import STATE, Records
+from controller.records import LAYOUT_ID
+
+STATE_EVERY = 10  # steps: 100 Hz
+SNAPSHOT_EVERY = 1000  # steps: once a second
+
+_COPIED = (
+    *("t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "force_rate", "score"),
+    *("mode", "state", "slips"),
+)
+
+
+def plotted(traces: Records, steps: int) -> Records:
+    """The state messages of some steps.
+
+    Args:
+        traces: of every step that a message is of, [n], STATE_EVERY apart.
+        steps: that were made with the first of them.
+
+    """
+    states = STATE.blank(len(traces))
+    states["sequence"] = steps // STATE_EVERY - 1 + np.arange(len(traces))
+    for name in _COPIED:
+        states[name] = traces[name]
+    drive_mps = traces["drive_velocity_mps"]
+    moving = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0)
+    # otherwise the trace repeats an old value
+    measured = (traces["limit"] != wire.STALE_INPUT) & (traces["limit"] != wire.NOT_FINITE)
+    ratio = traces["vibration_velocity_mps"] / np.where(moving, drive_mps, 1.0)
+    states["velocity_ratio"] = np.where(moving & measured, ratio, 0.0)
+    return states
+
+
+def snapshot(memory: npt.NDArray[Any], steps: int, t_ns: int) -> bytes:
+    """The message that holds the controller's memory after `steps` steps, the last one of the frame at `t_ns`."""
+    message = wire.Snapshot(
+        sequence=steps // SNAPSHOT_EVERY - 1, t_ns=t_ns, step=steps - 1, layout=LAYOUT_ID, memory=memory.tobytes()
+    )
+    return message.SerializeToString()
