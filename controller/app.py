@@ -42,8 +42,13 @@ def run(
         process = _Process(config, node, bus, lockstep)
         process.prepare()
         _refuse_a_second(bus, bus_config.endpoint)
-        # in lockstep plant and controller take turns: on one core waking the other process takes a tenth of the time
-        granted = realtime.claim(0 if lockstep else 1)  # before the announcement, as the rig may begin right after
+        granted = ""
+        if lockstep:
+            # Plant and controller take turns: on one core waking the other process takes a tenth of the time. Runs at the
+            # same time have other ports and so other cores. No priority: they would hold up a rig in real time.
+            realtime.pin(realtime.core(bus_config.port))
+        else:
+            granted = realtime.claim(realtime.core(1))  # before the announcement, as the rig may begin right after
         bus.announce()
         process.loop(stop, granted)
     return node.steps
@@ -112,9 +117,11 @@ class _Process:
         started = False
         stale = False
         while not stop.is_set() and not self._ended:
-            received = self._inbox.get(max(due_s - time.monotonic(), 0.0))
-            if received is not None:
+            asked_s = time.monotonic()
+            received = self._inbox.get(max(due_s - asked_s, 0.0))
+            if received is not None or realtime.was_paused(asked_s, due_s):
                 heard_s = time.monotonic()
+            if received is not None:
                 if self._consume(received):  # only a new block is fresh: a rig that hangs may repeat its last block
                     due_s = heard_s + self._stale_after_s
                     if stale:

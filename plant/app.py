@@ -42,15 +42,16 @@ def run(
         bus.serve_header(header)
         process = _Process(node, bus)
         # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
-        granted = realtime.claim(0)
+        if lockstep:
+            realtime.pin(realtime.core(bus_config.port))
+            granted = "lockstep"  # the same text everywhere: the same run gives the same log
+        else:
+            granted = realtime.claim(realtime.core(0))
         bus.announce()
         wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
-        if lockstep:
-            process.event("START", "lockstep")  # the same text everywhere: the same run gives the same log
-            process.lockstep(blocks, stop)
-        else:
-            process.event("START", granted)
-            process.realtime(blocks, stop)
+        process.event("START", granted)
+        advance = process.lockstep if lockstep else process.realtime
+        advance(blocks, stop)
         process.event("END", f"blocks={node.block}")
         bus.wait_until_alone(_GOODBYE_S)  # this process relays the messages of the others, so it leaves last
     return node.block

@@ -18,6 +18,7 @@ _INBOX_LIMIT = 1 << 16  # messages, 15 s of a run at 4100 messages/s; smaller lo
 _HEADERS_WAIT_S = 30.0  # time for the roles to answer; a first start compiles kernels
 _QUIET_S = 0.3  # silence after the last END from which no message is under way
 _PLANT_LOST_S = 1.0  # silence from which a plant that left the bus counts as lost
+_LOOK_S = 0.05  # longest wait for a message; what a stop and the age of a chunk can be late by
 _STOP_S = 3.0  # longest recording after a stop; the plant fades out within 1 s, and a rig may never end
 
 
@@ -55,7 +56,10 @@ def run(
         log.add_metadata("run", about)
         for role in sorted(headers):
             log.add_header(headers[role])
-        realtime.claim(1 if lockstep else None, realtime.RECORDER_PRIORITY)
+        if lockstep:
+            realtime.pin(realtime.core(bus_config.port + 1))  # beside plant and controller
+        else:
+            realtime.claim(None, realtime.RECORDER_PRIORITY)
         bus.announce()
         lost_plant = _record(log, bus, inbox, stop)
         if inbox.dropped:
@@ -76,9 +80,11 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
             until_s = min(until_s, time.monotonic() + _STOP_S)
         if time.monotonic() > until_s:
             return False
-        received = inbox.get(0.05)
-        if received is not None:
+        asked_s = time.monotonic()
+        received = inbox.get(_LOOK_S)
+        if received is not None or realtime.was_paused(asked_s, asked_s + _LOOK_S):
             heard_s = time.monotonic()
+        if received is not None:
             try:
                 log.write(received.topic, received.payload)
                 if received.topic.name.startswith("event/"):

@@ -5,7 +5,9 @@ connection dials. Receiving threads copy bytes into bounded queues and do nothin
 """
 
 import contextlib
+import ctypes
 import json
+import os
 import queue
 import threading
 import time
@@ -14,6 +16,11 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Annotated, Any, NamedTuple, Self
 
+# Zenoh reads this when it is imported. One thread in place of five: a message hops from thread to thread on its way otherwise.
+os.environ.setdefault(
+    "ZENOH_RUNTIME",
+    "(rx: (worker_threads: 1), net: (handover: rx), acc: (handover: rx), tx: (handover: rx), app: (handover: rx))",
+)
 import zenoh
 from pydantic import Field, field_validator
 
@@ -33,12 +40,30 @@ class BusConfig(Strict):
     endpoint: Annotated[str, Field(pattern=r"^tcp/.+:\d{1,5}$")] = "tcp/127.0.0.1:7447"
     prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
 
+    @property
+    def port(self) -> int:
+        """The port of the endpoint."""
+        return int(self.endpoint.rpartition(":")[2])
+
     @field_validator("endpoint")
     @classmethod
     def _port_exists(cls, endpoint: str) -> str:
         if not 1 <= int(endpoint.rpartition(":")[2]) <= 65535:
             raise ValueError(f"{endpoint!r}: the port must be from 1 to 65535; choose another, for example 7447")
         return endpoint
+
+
+_of_thread = threading.local()
+
+
+def _keep_thread_state() -> None:
+    """Keep what Python knows of the present thread of Zenoh until the thread ends.
+
+    Otherwise Python makes it anew for every callback, which costs a page fault a message.
+    """
+    if not hasattr(_of_thread, "kept"):
+        ctypes.pythonapi.PyGILState_Ensure()
+        _of_thread.kept = True
 
 
 class Received(NamedTuple):
@@ -218,6 +243,7 @@ class Bus:
         """Call `receive` for every message of `topic`, on a receiving thread: `receive` must only store the message."""
 
         def on_sample(sample: Any) -> None:
+            _keep_thread_state()
             receive(Received(topic, sample.payload.to_bytes(), time.perf_counter_ns()))
 
         handler = zenoh.handlers.Callback(on_sample, indirect=False)

@@ -70,6 +70,20 @@ def test_in_lockstep_a_pause_costs_nothing(tmp_path: Path, runs: list[Run], vict
     assert told_lost(data, "sensors") == 0
 
 
+def test_a_controller_that_stood_still_goes_on(tmp_path: Path, runs: list[Run]) -> None:
+    run = Run(tmp_path / "run.mcap", seconds=5.0)
+    runs.append(run)
+    run.wait_until_recording()
+    os.kill(run.children["controller"], signal.SIGSTOP)
+    time.sleep(1.5)
+    os.kill(run.children["controller"], signal.SIGCONT)
+    _, _, err = run.end()
+    assert err == ""
+    data = read_run(run.log)
+    assert [event.code for event in data.events if event.source == "controller"][-2:] == ["FRESH", "END"]
+    assert int(data.command["block"].max()) > 4900
+
+
 def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap")
     runs.append(run)
