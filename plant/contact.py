@@ -17,6 +17,7 @@ from bridge.kernel import kernel
 def step(
     dt: float,
     z_dt: float,
+    ahead: float,
     m: float,
     h_d: float,
     k_t: float,
@@ -42,7 +43,8 @@ def step(
         sliding_share: 1 for LuGre; between 0 and 1 where the bristle of the elasto-plastic contact is still elastic.
         base_give: mean velocity that the base gains over the step for every newton of friction [m/(N s)]; 0 for a rigid base.
         guarded: whether friction may change by a large share within a step; without effects it never does.
-        dt, z_dt: the step [s]; the time over which the bristle moves [s]: dt, or half of dt in the very first step.
+        dt, z_dt: the step [s]; the time over which the bristle moves [s], from the middle of the step before to that of this one.
+        ahead: the middle of the step, in steps before, beyond the present: 0.5 where both are of one length.
         pull_N: force of the drive's spring in the middle of the step.
         base_velocity_mid: velocity of the base in the middle of the step, without the part that friction causes.
         v_r, v_r_before, g_before: relative velocity now, in the step before, and g in the step before.
@@ -61,8 +63,8 @@ def step(
     else:
         gone = math.exp(-decay) - 1.0
     z_end = g_end / k_t if v_r > 0.0 else -g_end / k_t
-    per_g_mid = sliding_share * k_t / (1.5 * g - 0.5 * g_before)
-    if 1.5 * v_r - 0.5 * v_r_before < 0.0:
+    per_g_mid = sliding_share * k_t / ((1.0 + ahead) * g - ahead * g_before)
+    if (1.0 + ahead) * v_r - ahead * v_r_before < 0.0:
         per_g_mid = -per_g_mid
     moved = (z - z_end) * gone
     z += moved

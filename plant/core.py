@@ -22,6 +22,10 @@ from plant.effects.structure import base_free_mps, base_give, frame_gain_mps
 from plant.effects.waves import TWO_PI
 from plant.piezo import accepted, delivered_share
 
+# Share of v_s below which the slide sticks. A sample of it, and the next may be one step: the error of the slip times was the
+# same from 0.01 to 0.05 (docs/method/plant.md). Larger: the beginning of a slip is cut short. Smaller: fewer long steps.
+_STICK_SHARE = 0.02
+
 
 @kernel
 def _stribeck_share(q: float, tail: float) -> float:
@@ -57,6 +61,7 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         s: Record = state[0]
         # into locals: through the record every store to an output array would force a reload
         dt, m, k_d, h_d = p.dt_s, p.m, p.k_d, p.h_d
+        fine_dt, stick_dt, stick_mps = dt, p.stick_dt_s, _STICK_SHARE * p.v_s
         k_t, h_t, h_v, F_c, F_s, per_v_s = p.k_t, p.h_t, p.h_v, p.F_c, p.F_s, 1.0 / p.v_s
         tail = p.stribeck_tail
         force_share, accel_share = 1.0 - p.force_keep, 1.0 - p.accel_keep
@@ -115,10 +120,21 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
         force_f, position_f, drive_f = s.force_f, s.mass_position_f, s.drive_position_f
         mass_f, mass_slow_f = s.mass_accel_f, s.mass_accel_slow_f
         base_f, base_slow_f = s.base_accel_f, s.base_accel_slow_f
-        z_dt = dt if s.steps > 0 else 0.5 * dt
+        dt_before, z_dt, ahead = s.dt_s, dt if s.dt_s > 0.0 else 0.5 * dt, 0.5
+        sticks = s.sticks != 0
 
         for sample in range(samples):
-            for _ in range(steps_per_sample):
+            steps = steps_per_sample
+            if not disturbed:  # with effects something else may swing while the slide sticks
+                coarse = sticks and not vibrating
+                steps = p.steps_per_stick_sample if coarse else steps_per_sample
+                dt = stick_dt if coarse else fine_dt
+                force_share = 1.0 - (p.force_keep_stick if coarse else p.force_keep)
+                accel_share = 1.0 - (p.accel_keep_stick if coarse else p.accel_keep)
+                position_share = 1.0 - (p.position_keep_stick if coarse else p.position_keep)
+                slow_share = 1.0 - (p.accel_highpass_keep_stick if coarse else p.accel_highpass_keep)
+                sticks = True
+            for _ in range(steps):
                 if vibrating:
                     u0_before = u0
                     if u0_step == 0.0:
@@ -159,6 +175,11 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                     pull_N = k_d * (s_d + 0.5 * dt * drive_velocity_mps - x - 0.5 * dt * v)
                 v_r_before, g_before, v_before = v_r, g, v
                 v_r = v - base_velocity
+                if not disturbed:
+                    sticks = sticks and math.fabs(v_r) < stick_mps
+                    z_dt = 0.5 * (dt_before + dt)
+                    ahead = 0.5 * dt / dt_before if dt_before > 0.0 else 0.5
+                    dt_before = dt
                 v_g = v_r
                 base_mid_mps = base_velocity_mid
                 if disturbed:
@@ -199,10 +220,11 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
                 if disturbed and p.elasto_plastic:
                     sliding_share = elasto_plastic_share(z, v_r, g, k_t, p.elastic_ratio)
                 v, v_mid, z = contact_step(
-                    dt, z_dt, m, h_d_step, k_t, h_t, damping, g, sliding_share, gives, disturbed,
+                    dt, z_dt, ahead, m, h_d_step, k_t, h_t, damping, g, sliding_share, gives, disturbed,
                     pull_N, anchor_mps, base_mid_mps, v, v_r, z, v_r_before, g_before,
                 )  # fmt: skip
-                z_dt = dt
+                if disturbed:
+                    z_dt = dt
                 x += dt * v_mid
                 s_d += dt * drive_velocity_mps
                 accel = (v - v_before) / dt
@@ -254,11 +276,10 @@ def _compiled(disturbed: bool) -> Callable[..., None]:
             truth[4, sample] = x
             truth[5, sample] = s_d
 
-        steps = samples * steps_per_sample
-        s.steps += steps
+        s.dt_s, s.sticks = dt, 1 if sticks else 0
         s.x, s.v, s.z, s.v_r, s.g, s.s_d, s.even_m = x, v, z, v_r, g, s_d, even_m
         s.amplitude_m = u0
-        s.phi = (s.phi + omega * dt * steps) % TWO_PI if vibrating else 0.0
+        s.phi = (s.phi + omega * fine_dt * (samples * steps_per_sample)) % TWO_PI if vibrating else 0.0
         s.force_f, s.mass_position_f, s.drive_position_f = force_f, position_f, drive_f
         s.mass_accel_f, s.mass_accel_slow_f = mass_f, mass_slow_f
         s.base_accel_f, s.base_accel_slow_f = base_f, base_slow_f

@@ -16,7 +16,7 @@ from plant.contact import step
 from plant.core import advance
 from plant.pairs import PAIRS
 from plant.records import TRUTH, build
-from plant.simulate import simulate
+from plant.simulate import drive_velocity_mps, run_blocks, simulate
 
 PAIR = "C45-C45 @ 0.063"
 DRIVE_MPS = 0.0005
@@ -112,7 +112,7 @@ def test_the_bristle_follows_its_closed_form_at_constant_velocity(v_r):
         g_before = steady_N
         now = v
         v, _, z = step(
-            dt, dt, 1e12, 0.0, k_t, 0.0, 0.0, steady_N, 1.0, 0.0, False, 0.0, 0.0, 0.0, v, now, z, before, g_before
+            dt, dt, 0.5, 1e12, 0.0, k_t, 0.0, 0.0, steady_N, 1.0, 0.0, False, 0.0, 0.0, 0.0, v, now, z, before, g_before
         )
         before = now
     z_end = math.copysign(steady_N / k_t, v_r)
@@ -141,3 +141,25 @@ def test_damping_is_that_of_table_2_and_critical(pair):
     assert numbers["damping_Ns_per_m"] == PRINTED_DAMPING_NS_PER_M[pair]
     critical_Ns_per_m = 2 * math.sqrt(numbers["stiffness_N_per_m"] * rig(pair).slide.mass_kg)
     assert critical_Ns_per_m == pytest.approx(PRINTED_DAMPING_NS_PER_M[pair], rel=0.005)
+
+
+@pytest.mark.parametrize("pair", [PAIR, "C45-PTFE @ 0.063"])
+@pytest.mark.parametrize("mass_kg", [0.15, 1.5, 15.0])
+def test_long_steps_of_a_slide_that_sticks_make_no_slip_and_miss_none(pair, mass_kg):
+    def slips_s(long_steps):
+        config = rig(pair, slide={"mass_kg": mass_kg}, drive={"profile": [[0.0, 0.0005], [9.0, 0.0005], [10.0, 0.0]]})
+        params, state = build(config)
+        assert params[0].steps_per_stick_sample < params[0].steps_per_sample
+        if not long_steps:
+            params[0].disturbed = 1
+        blocks = 12_000
+        analogue, truth = np.empty((len(CHANNELS), 20 * blocks)), np.empty((len(TRUTH), 20 * blocks))
+        drive = drive_velocity_mps(config, np.arange(blocks) * 1e-3)
+        run_blocks(params, state, drive, np.zeros(blocks), np.zeros(blocks), analogue, truth)
+        fast = truth[TRUTH.index("true_velocity_mps")] > 10 * DRIVE_MPS
+        return np.flatnonzero(fast[1:] & ~fast[:-1]) * 5e-5
+
+    found, expected = slips_s(long_steps=True), slips_s(long_steps=False)
+    assert (len(found) >= 5) == (pair == PAIR)
+    assert len(found) == len(expected)
+    assert found == pytest.approx(expected, abs=1.5e-4)

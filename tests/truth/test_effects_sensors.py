@@ -50,12 +50,13 @@ def test_the_reading_is_off_by_the_formula(effect, values, reading):
 
 
 def test_a_bias_is_what_is_read_whatever_the_amplifier():
-    def read_N(effects):
+    def read_N(bias_N):
+        effects = {"force-sensor-bias": {"bias_N": bias_N}}
         sensors = {"force_gain": 1.1, "force_noise_N": 0.0, "force_resolution_N": 0.0}
         payload = PlantNode(rig(effects, sensors=sensors), 1).advance([])[0].payload
         return sensor_block(20).read(payload, "sensors")["drive_force_N"][0]
 
-    assert read_N({"force-sensor-bias": {"bias_N": 5.0}}) - read_N({}) == pytest.approx(5.0, abs=1e-5)
+    assert read_N(6.0) - read_N(1.0) == pytest.approx(5.0, abs=1e-5)
 
 
 def test_a_drift_is_the_sensor_s_own_and_not_amplified_by_its_gain():

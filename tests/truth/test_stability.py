@@ -47,7 +47,7 @@ def force_near_steady(config, duration_s, away_N, vibration_mps=0.0, frequency_H
     v = config.drive.profile[0][1]
     s.z = v / float(contact(c, v, vibration_mps).relaxation_per_s)
     steady_N = c.stiffness_N_per_m * s.z
-    s.v, s.v_r, s.steps = v, v - vibration_mps, 1
+    s.v, s.v_r, s.dt_s = v, v - vibration_mps, config.solver.step_s
     s.g = c.coulomb_force_N + (c.static_force_N - c.coulomb_force_N) * math.exp(
         -((s.v_r / c.stribeck_velocity_mps) ** 2)
     )
