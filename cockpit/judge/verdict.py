@@ -215,8 +215,8 @@ def in_words(verdict: RunVerdict) -> list[str]:
     lines: list[str] = []
     if v.before is not None:
         lines.append(
-            f"before   {v.before.slips} slips in {v.before.seconds:.1f} s ({v.before.slips_per_min:.0f} per minute), "
-            f"drive force swings by {v.before.swing_N:.2f} N"
+            f"before   {v.before.slips} slips in {v.before.seconds:.1f} s ({v.before.slips_per_min:.0f} per minute of this "
+            f"phase), drive force swings by {v.before.swing_N:.2f} N"
         )
     if v.after is not None:
         lines.append(
@@ -251,9 +251,20 @@ def headline(verdict: RunVerdict) -> str:
     if v.drive_velocity_max_mps <= _STANDSTILL_MPS:
         return "the drive never moved: nothing was tested"
     if v.after is None:
-        return "the controller was not in charge in this run"
+        return _without_after(v)
     if v.after.slips:
         return f"stick-slip is still there: {v.after.slips} slips while the controller was in charge"
     if v.before is not None and v.before.slips:
         return f"stick-slip is gone: {v.before.slips} slips before, none with the controller in charge"
     return "no stick-slip with the controller in charge"
+
+
+def _without_after(verdict: RunVerdict) -> str:
+    """Why nothing can be said of the controller."""
+    in_charge_s = verdict.seconds - verdict.enabled_from_s - verdict.stopped_s
+    if in_charge_s <= 0.0:
+        return "the controller was not in charge in this run"
+    why = f"too short to judge: it has {_SETTLING_S:g} s to settle"
+    if in_charge_s > _SETTLING_S:  # the force is no number, or the operator left it no second to settle in
+        why = "but nothing there can be judged"
+    return f"the controller was in charge for {in_charge_s:.2g} s, {why}"

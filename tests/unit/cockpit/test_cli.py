@@ -159,6 +159,7 @@ def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> N
     verdict = judge_run(run)
     assert verdict.before is not None
     assert verdict.before.seconds == pytest.approx(0.25)
+    assert "per minute of this phase)" in in_words(verdict)[0]
     assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
 
 
@@ -241,6 +242,10 @@ def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
     [
         (["rig.drive.profile=[[0.0, 0.0]]"], "the drive never moved: nothing was tested"),
         (["controller.policy.enabled_from_s=100.0"], "the controller was not in charge in this run"),
+        (
+            ["controller.policy.enabled_from_s=0.1"],
+            "the controller was in charge for 0.4 s, too short to judge: it has 1 s to settle",
+        ),
     ],
 )
 def test_where_nothing_was_tested_the_headline_says_so(tmp_path: Path, settings: list[str], expected: str) -> None:
