@@ -185,7 +185,7 @@ def _files() -> list[str]:
         for path, told, rows in _sections(schema, schema.get("$defs", {}), ""):
             name = f"`[{path}]`" if path and not path.startswith("[") else f"`{path}`" if path else "top of the file"
             lines += [f"### {name}" if path else f"**{name}**", "", *([_paragraph(told), ""] if told else [])]
-            lines += _table(("key", "type and range", "default"), rows)
+            lines += _table(("key", "type and range", "default", "meaning"), rows)
     lines += [
         "## Friction pairs",
         "",
@@ -220,7 +220,7 @@ def _sections(schema: dict[str, Any], known: dict[str, Any], path: str) -> Itera
             default = (
                 "needed" if key in needed else f"`{one['default']}`" if one.get("default") not in (None, "", {}) else ""
             )
-            rows.append([f"`{key}`", _kind(table, known), default])
+            rows.append([f"`{key}`", _kind(table, known), default, _paragraph(one.get("description"))])
     if rows:
         yield path, schema.get("description", ""), rows
     for here, table in inner:

@@ -14,6 +14,9 @@ from bridge.faults import Fault
 from bridge.wire import realtime
 
 _PARENT_CHECK_S = 0.25
+_LONG_S = (
+    2.0  # of work that nobody waits for without a word; shorter, and a busy computer tells of every run of seconds
+)
 # what `stickslip[all]` brings and a plain installation lacks
 EXTRA_MODULES = frozenset({"jinja2", "joblib", "nptdms", "pyarrow", "threadpoolctl"})
 
@@ -68,6 +71,42 @@ def stopped_once() -> Generator[None]:
         for number, handler in before.items():
             # after one the command ends, and until then another would end it without its status
             signal.signal(number, signal.SIG_IGN if came.is_set() else handler)
+
+
+@contextlib.contextmanager
+def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
+    """Work that Ctrl-C or SIGTERM ends with Fault INTERRUPTED; a line on stderr says so where it takes long.
+
+    Args:
+        line: what is done, and that Ctrl-C leaves it.
+        left: what the fault says.
+        again: Ctrl-C was pressed before. Until the line came, another is that of a person who presses it twice: it does nothing.
+
+    """
+    heeded = threading.Event()
+    if not again:
+        heeded.set()
+
+    def tell() -> None:
+        heeded.set()
+        print(line, file=sys.stderr, flush=True)
+
+    def on_signal(_number: int, _frame: Any) -> None:
+        if heeded.is_set():
+            raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    timer = threading.Timer(_LONG_S, tell)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Fault("INTERRUPTED", left) from None
+    finally:
+        timer.cancel()
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def warn_without_priority() -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from bridge.faults import Fault
 from bridge.files import LOG, refuse_to_replace
 from bridge.log.logfile import refuse_a_live_log
-from cockpit.run.child_process import stop_event, warn_without_priority
+from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
 from cockpit.run.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
@@ -106,15 +106,24 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
             run_processes(arguments, scenario.bus.endpoint, path, lockstep, follower(scenario.bus, scenario.duration_s))
     except KeyboardInterrupt:
         interrupted = True
+    if interrupted and _stamp(path) == before:
+        raise Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded")
+    closed = f"stopped by Ctrl-C; {path} is closed"
+    left = f"{closed} and not judged; `stickslip log info {path}` judges it"
+    line = f"judging the log; Ctrl-C {'again ' if interrupted else ''}to leave it unjudged"
+    with left_on_ctrl_c(line, left, again=interrupted):
+        return _judged(scenario, path, closed if interrupted else "")
+
+
+def _judged(scenario: Scenario, path: Path, interrupted: str) -> RunOutcome:
+    """What came of a run. Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end."""
     from bridge.log.logfile import read_run
     from cockpit.judge.verdict import in_words, judge, judge_run
 
-    if interrupted and _stamp(path) == before:
-        raise Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded")
-    if interrupted and not endless:
+    if interrupted and scenario.duration_s:
         with contextlib.suppress(Fault):  # a log of a moment may hold nothing to judge
             print("\n".join(in_words(judge(path))), file=sys.stderr)
-        raise Fault("INTERRUPTED", f"stopped by Ctrl-C; {path} is closed")
+        raise Fault("INTERRUPTED", interrupted)
     run = read_run(path)
     if interrupted and not len(run.sensors):
         raise Fault("INTERRUPTED", f"stopped by Ctrl-C before the first block; {path} is closed")

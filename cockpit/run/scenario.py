@@ -26,9 +26,7 @@ class Scenario(Strict):
 
     name: str = "unnamed"
     description: str = ""
-    duration_s: Annotated[float, Field(ge=0)] = Field(
-        default=16.0, description="0: until stopped, by Ctrl-C for example."
-    )
+    duration_s: Annotated[float, Field(ge=0)] = Field(default=16.0, description="0: until Ctrl-C or SIGTERM.")
     seed: Annotated[int, Field(ge=0)] = 1
     rig: RigConfig
     controller: ControllerConfig = ControllerConfig()

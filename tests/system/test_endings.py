@@ -5,6 +5,7 @@ import os
 import resource
 import signal
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -97,7 +98,7 @@ def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped_and_is_
     finally:
         run.kill()
     assert run.returncode in {0, 1}
-    assert err == f"simulating until Ctrl-C; log {log}\n"
+    assert told(err) == [f"simulating until Ctrl-C; log {log}"]
     assert out.splitlines()[-1] == f"log      {log}"
     data = read_run(log)
     assert data.damage.closed
@@ -138,6 +139,36 @@ def test_a_second_ctrl_c_takes_nothing_away(tmp_path: Path, runs: list[Run], pau
         f"stickslip: INTERRUPTED: stopped by Ctrl-C; {run.log} is closed",
     ]
     assert read_run(run.log).damage.closed
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_judging_that_takes_long_is_told_and_can_be_left(tmp_path: Path, number: signal.Signals) -> None:
+    log = tmp_path / "run.mcap"
+    slow = (
+        "import time; from cockpit.judge import verdict; from cockpit.cli import main\n"
+        "verdict.judge_run = lambda _run: time.sleep(60)\n"
+        "main()"
+    )
+    words = ["run", "--in-process", "--set", "duration_s=0", "--log", str(log)]
+    run = subprocess.Popen([sys.executable, "-P", "-c", slow, *words], stderr=subprocess.PIPE, text=True)
+    try:
+        assert run.stderr is not None
+        assert run.stderr.readline() == f"simulating until Ctrl-C; log {log}\n"
+        until_s = time.monotonic() + 60
+        while (not log.exists() or log.stat().st_size < 200_000) and run.poll() is None and time.monotonic() < until_s:
+            time.sleep(0.02)
+        run.send_signal(number)
+        time.sleep(0.3)
+        run.send_signal(number)  # of a person who presses it twice to be sure
+        assert run.stderr.readline() == "judging the log; Ctrl-C again to leave it unjudged\n"
+        run.send_signal(number)
+        err = run.communicate(timeout=30)[1]
+    finally:
+        run.kill()
+    assert run.returncode == 130
+    left = f"stopped by Ctrl-C; {log} is closed and not judged; `stickslip log info {log}` judges it"
+    assert err == f"stickslip: INTERRUPTED: {left}\n"
+    assert read_run(log).damage.closed
 
 
 def _without_priority() -> None:
