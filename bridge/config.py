@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
@@ -20,13 +21,20 @@ class Strict(BaseModel):
 # two numbers; not strict, as TOML has only arrays and pydantic's strict mode refuses an array for a tuple
 Two = Annotated[tuple[float, float], Field(strict=False)]
 
+# Similarity (`difflib`) of two keys from which one is taken for the other misspelt. Smaller: other keys of the table count, such
+# as viscous_damping_Ns_per_m for contact_damping_Ns_per_m with 0.79. Larger: a wrong letter in a short key is not seen.
+_MISSPELT = 0.8
+_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
+
 T = TypeVar("T", bound=Strict)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read one TOML file. Raises Fault CONFIG when it cannot be read or is not TOML."""
+    text = ""
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))  # Notepad marks what it saves as UTF-8
+        text = path.read_bytes().decode("utf-8-sig")  # Notepad marks what it saves as UTF-8
+        return tomllib.loads(text)
     except FileNotFoundError:
         raise Fault("CONFIG", f"{path}: no such file; give the path of a TOML file") from None
     except OSError as error:
@@ -34,7 +42,15 @@ def read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
     except (ValueError, RecursionError) as error:  # also Python's own limits: 5000 digits, brackets 1000 deep
-        raise Fault("CONFIG", f"{path}: not valid TOML: {error}") from None
+        raise Fault("CONFIG", f"{path}: not valid TOML: {error}{_decimal_comma(text, str(error))}") from None
+
+
+def _decimal_comma(text: str, error: str) -> str:
+    """The remedy where the line that a TOML error names gives a number with a decimal comma; else nothing."""
+    at = re.search(r"at line (\d+)", error)
+    line = text.split("\n")[int(at[1]) - 1] if at else ""
+    comma = re.search(rf"=\s*({_COMMA.pattern})", line)
+    return f"; write a decimal point: {comma[1].replace(',', '.')}" if comma else ""
 
 
 def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, Any]:
@@ -81,7 +97,19 @@ def validate(model: type[T], table: dict[str, Any], source: str) -> T:
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        raise Fault("CONFIG", "\n".join(_line(model, source, problem) for problem in error.errors())) from None
+        problems = _without_misspelt(error.errors())
+        raise Fault("CONFIG", "\n".join(_line(model, source, problem) for problem in problems)) from None
+
+
+def _without_misspelt(problems: Sequence[Any]) -> list[Any]:
+    """The problems, but for keys that are missing because they are misspelt: the unknown key beside them says so."""
+    unknown = [problem["loc"] for problem in problems if problem["type"] == "extra_forbidden"]
+
+    def misspelt(table: tuple[str | int, ...], name: str) -> bool:
+        beside = [other[-1] for other in unknown if other[:-1] == table]
+        return bool(get_close_matches(name, beside, 1, _MISSPELT))
+
+    return [one for one in problems if one["type"] != "missing" or not misspelt(one["loc"][:-1], one["loc"][-1])]
 
 
 def _line(model: type[Strict], source: str, problem: Any) -> str:
@@ -89,15 +117,19 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
     key = ".".join(path) or "(file)"
     kind: str = problem["type"]
     if kind == "extra_forbidden":
-        known = ", ".join(_keys_beside(model, path)) or "none"
-        return f"{source}: {key} = {problem['input']!r}: unknown key; known here: {known}"
+        known = _keys_beside(model, path)
+        near = get_close_matches(path[-1], known, 1, _MISSPELT)
+        remedy = f"perhaps {near[0]}; " if near else ""
+        return f"{source}: {key} = {problem['input']!r}: unknown key; {remedy}known here: {', '.join(known) or 'none'}"
     if kind == "missing":
         return f"{source}: {key}: missing; add it"
     message: str = problem["msg"].removeprefix("Value error, ")
     if kind == "value_error":
         return f"{source}: {key}: {message}" if path else f"{source}: {message}"
     if kind in {"float_type", "int_type"} and isinstance(problem["input"], str):
-        return f"{source}: {key} = {problem['input']!r}: must be a number; write it without quotes"
+        comma = _COMMA.fullmatch(problem["input"].strip())
+        remedy = f"write a decimal point: {comma[0].replace(',', '.')}" if comma else "write it without quotes"
+        return f"{source}: {key} = {problem['input']!r}: must be a number; {remedy}"
     if kind in {"model_type", "dict_type"}:
         needed = [name for name, field in _fields(_model_at(model, path)).items() if field.is_required()]
         inside = ", ".join(f"{name} = VALUE" for name in needed or ["KEY"])

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
@@ -24,6 +24,7 @@ from diagnosis.evidence.manifest import (
     STANDARD,
     ChannelMap,
     DriveVelocity,
+    Positive,
     RigTable,
     RunTable,
     check_channel_names,
@@ -33,6 +34,7 @@ from diagnosis.evidence.manifest_text import manifest_text
 
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
+_POSITIVE: TypeAdapter[float] = TypeAdapter(Positive)
 _BLOCK_SAMPLES = 20
 _IRREGULAR_SHARE = 0.01  # of a step, up to which time counts as even: rounding of a printed column of a DAQ
 # Presliding length that is assumed when the map gives no contact stiffness: the paper's steel pair reaches its static force after
@@ -155,18 +157,24 @@ def _rig(given: dict[str, Any], map_name: str) -> tuple[RigTable, list[str]]:
     assumed: dict[str, Any] = {"viscous_damping_Ns_per_m": 0.0}
     if table.get("drive") == "spring":
         assumed["drive_damping_Ns_per_m"] = 0.0
-    mass_kg, static_N = table.get("mass_kg"), table.get("static_force_N")
-    if isinstance(mass_kg, float | int) and isinstance(static_N, float | int) and mass_kg > 0 and static_N > 0:
-        stiffness = table.get("contact_stiffness_N_per_m", static_N / _PRESLIDING_M)
-        assumed["contact_stiffness_N_per_m"] = stiffness
-        if isinstance(stiffness, float | int) and stiffness > 0:
-            # critical damping of the presliding motion, as for the paper's pairs
-            assumed["contact_damping_Ns_per_m"] = 2.0 * (stiffness * mass_kg) ** 0.5
+    mass_kg, static_N = _positive(table.get("mass_kg")), _positive(table.get("static_force_N"))
+    stiffness = _positive(table.get("contact_stiffness_N_per_m", static_N / _PRESLIDING_M))
+    assumed["contact_stiffness_N_per_m"] = stiffness
+    # critical damping of the presliding motion, as for the paper's pairs
+    assumed["contact_damping_Ns_per_m"] = 2.0 * (stiffness * mass_kg) ** 0.5
     filled = [name for name in assumed if name not in table]
     if isinstance(table.get("tolerance", {}), dict):  # any other type is refused by `validate`
         unsure = {name: _ASSUMED_TOLERANCE for name in filled if name.startswith("contact")}
         table["tolerance"] = unsure | table.get("tolerance", {})
     return validate(RigTable, assumed | table, f"{map_name}: rig"), filled
+
+
+def _positive(value: Any) -> float:
+    """The number, or 1 in place of what `validate` refuses: one wrong number must not make others seem to be missing."""
+    try:
+        return _POSITIVE.validate_python(value, strict=True)
+    except ValidationError:
+        return 1.0
 
 
 def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, out: Path) -> Imported:

@@ -6,11 +6,32 @@ from pathlib import Path
 
 import pytest
 
-from bridge.config import read_toml, validate, with_overrides
+from bridge.config import Strict, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from cockpit.run.scenario import load_rig, load_scenario, rig_setting
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
+
+
+@pytest.mark.parametrize("line", ["mass_kg = 2,0", "slide = { mass_kg = -2,0e-3 }"])
+def test_a_decimal_comma_is_told(tmp_path: Path, line: str) -> None:
+    (tmp_path / "rig.toml").write_text(f"# a rig\n{line}\n")
+    number = line.partition("kg = ")[2].rstrip(" }").replace(",", ".")
+    with pytest.raises(Fault, match=rf"rig.toml: not valid TOML: .*line 2.*; write a decimal point: {number}$"):
+        read_toml(tmp_path / "rig.toml")
+
+
+def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
+    class Slide(Strict):
+        mass_kg: float
+        length_m: float
+
+    with pytest.raises(Fault) as raised:
+        validate(Slide, {"mas_kg": 1.5}, "mine.toml")
+    assert raised.value.line.splitlines() == [
+        "mine.toml: length_m: missing; add it",
+        "mine.toml: mas_kg = 1.5: unknown key; perhaps mass_kg; known here: length_m, mass_kg",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -19,6 +40,7 @@ from plant.config import RigConfig
         (["rig.slide.mass_kg=-1.0"], ["rig.slide.mass_kg", "-1.0", "greater than 0"]),
         (["rig.slide.mas_kg=1.0"], ["rig.slide.mas_kg", "unknown key", "mass_kg"]),
         (['rig.slide.mass_kg="heavy"'], ["rig.slide.mass_kg", "'heavy'", "number"]),
+        (["rig.slide.mass_kg=2,5"], ["rig.slide.mass_kg", "'2,5'", "number", "write a decimal point: 2.5"]),
         (['rig.contact.pair="ice"'], ["ice", "unknown friction pair", "C45-C45 @ 0.063"]),
         (["rig.contact.pair=[1]"], ["pair = [1]", "unknown friction pair"]),
         (["rig.solver.step_s=2e-5"], ["step_s", "too coarse", "5000", "1e-05"]),

@@ -41,7 +41,7 @@ def test_a_good_folder(tmp_path: Path) -> None:
     [
         ('"evidence/1"', '"evidence/2"', "manifest.toml: format = 'evidence/2': must be"),
         ('format = "evidence/1"', "", "manifest.toml: format: missing"),
-        ("[[run]]", "[[runs]]", "manifest.toml: run: missing"),
+        ("[[run]]", "[[runs]]", ": unknown key; perhaps run; known here: channels, format, rig, run"),
         ('"spring"', '"springs"', "manifest.toml: rig.drive = 'springs'"),
         ('"spring"', '"force"', 'rig: drive_stiffness_N_per_m: unknown with drive = "force"'),
         ("drive_stiffness_N_per_m = 11700.0", "", "rig: drive_stiffness_N_per_m: missing"),
@@ -62,7 +62,7 @@ def test_a_good_folder(tmp_path: Path) -> None:
         (
             "[[run]]",
             '[channels]\nt_s = { colum = "t" }\n[[run]]',
-            "channels.t_s.colum = 't': unknown key; known here: column",
+            "channels.t_s.colum = 't': unknown key; perhaps column; known here: column",
         ),
         ("[[run]]", '[[run]]\nfile = "./run-01.csv"\n[[run]]', "run.file = './run-01.csv': 2 runs are called 'run-01'"),
         (

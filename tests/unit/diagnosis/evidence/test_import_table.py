@@ -224,6 +224,32 @@ def test_a_bad_map_is_one_clear_line_and_leaves_nothing(tmp_path: Path, old: str
     assert not (tmp_path / "evidence").exists()
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("mass_kg = 1.5", "mass_kg = -2", "map.toml: rig: mass_kg = -2: must be greater than 0; change the value"),
+        ("mass_kg = 1.5", 'mass_kg = "2 kg"', "map.toml: rig: mass_kg = '2 kg': must be a number; "),
+        ("mass_kg = 1.5", "mas_kg = 1.5", "map.toml: rig: mas_kg = 1.5: unknown key; perhaps mass_kg; "),
+        (
+            "static_force_N = 17.38",
+            "static_force_N = inf",
+            "map.toml: rig: static_force_N = inf: must be a finite number",
+        ),
+        (
+            "mass_kg = 1.5",
+            "mass_kg = 1.5\ncontact_stiffness_N_per_m = 0",
+            "map.toml: rig: contact_stiffness_N_per_m = 0: ",
+        ),
+    ],
+)
+def test_one_wrong_number_of_the_rig_makes_one_line(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    source, channel_map = setup(tmp_path, ".csv", MAP.replace(old, new, 1))
+    with pytest.raises(Fault) as caught:
+        import_file(source, channel_map, tmp_path / "evidence")
+    assert caught.value.line.startswith(expected)
+    assert "\n" not in caught.value.line
+
+
 def test_a_log_needs_a_clock_that_goes_forward(tmp_path: Path) -> None:
     source, channel_map = setup(tmp_path, ".csv")
     data = raw()
