@@ -10,7 +10,7 @@ import typer
 from bridge.faults import Fault
 from cockpit.commands.json_option import Json, JsonGroup, carry_out, tell
 from cockpit.run.child_process import end_like_ctrl_c
-from cockpit.run.writable import check_writable, writing
+from cockpit.run.writable import PAGE, check_output, writing
 
 if TYPE_CHECKING:
     from diagnosis.blind.opening import OpenedSet
@@ -23,7 +23,7 @@ blind_app = typer.Typer(
 SetArgument = Annotated[Path, typer.Argument(metavar="DIR", help="A set that `python -m tests.blind make` made.")]
 Jobs = Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")]
 Key = Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")]
-Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one HTML file.")]
+Report = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one .html file.")]
 
 
 _LEFT_TO_THE_COMMAND = {"allow_extra_args": True, "ignore_unknown_options": True}
@@ -95,7 +95,8 @@ def blind_score(
         end_like_ctrl_c()
         if as_json is not None and as_json.resolve() == key.resolve():
             raise Fault("CONFIG", f"--json {as_json}: is the key, which would be lost; choose another")
-        _check_file("--report", report)
+        if report is not None:
+            check_output("--report", report, PAGE)
         with writing(), watched() as progress:
             found = open_set(folder, key, partial)
             if baselines:
@@ -118,7 +119,8 @@ def blind_pool(
     def work() -> None:
         from diagnosis.blind.pooling import pooled
 
-        _check_file("--report", report)
+        if report is not None:
+            check_output("--report", report, PAGE)
         for option, path in (("--json", as_json), ("--report", report)):
             if path is not None and path.resolve() in {file.resolve() for file in files}:
                 raise Fault(
@@ -141,12 +143,3 @@ def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | No
             write_report(methods, found.sealed, name, report)
     words = [table(methods, found.sealed), *(["", f"report     {report}"] if report is not None else [])]
     tell(as_json, kept_scores(found, methods), words)
-
-
-def _check_file(option: str, path: Path | None) -> None:
-    """Refuse before the answers are opened what could not be written afterwards. Raises Fault."""
-    if path is None:
-        return
-    check_writable(option, path)
-    if path.is_dir():
-        raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")

@@ -15,7 +15,7 @@ from bridge.faults import FAULTS, Fault
 from bridge.files import write_json
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
 from cockpit.run.child_process import end_like_ctrl_c, report
-from cockpit.run.writable import check_writable, writing
+from cockpit.run.writable import JSON, PAGE, RIG, check_output, check_output_folder, writing
 
 if TYPE_CHECKING:
     from diagnosis.diagnose_many import EvidenceFolder, FolderResult
@@ -50,7 +50,7 @@ def diagnose(
         list[Path], typer.Argument(help="Evidence folders with a manifest.toml, or a folder that holds such folders.")
     ],
     report: Annotated[
-        Path | None, typer.Option(help="Write a report, one HTML file; for many folders a folder of them.")
+        Path | None, typer.Option(help="Write a report, one .html file; for many folders a folder of them.")
     ] = None,
     apply: Annotated[
         Path | None, typer.Option(help="Write a rig file, .toml, that has the effect that was found.")
@@ -87,12 +87,16 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolde
     from diagnosis.evidence.manifest import MANIFEST, RUN_SUFFIXES
 
     seen: dict[Path, str] = {}
-    for option, path in (("--json", wishes.json_file), ("--report", wishes.report), ("--apply", wishes.apply)):
+    asked = (("--json", wishes.json_file, JSON), ("--report", wishes.report, PAGE), ("--apply", wishes.apply, RIG))
+    for option, path, kinds in asked:
         if path is None:
             continue
         if path == STDOUT:
             raise Fault("CONFIG", f"{option} -: must be a file; only --json can go to stdout")
-        check_writable(option, path)
+        if option == "--report" and not one:
+            check_output_folder(option, path)
+        else:
+            check_output(option, path, kinds)
         whole = path.resolve()
         if whole in seen:
             raise Fault("CONFIG", f"{option} {path}: is where {seen[whole]} goes; choose another")
@@ -102,10 +106,6 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolde
             raise Fault(
                 "CONFIG", f"{option} {path}: belongs to the evidence, which is never overwritten; choose another"
             )
-        folder_wanted = option == "--report" and not one
-        if path.exists() and path.is_dir() != folder_wanted:
-            rule = "must be a folder, one report for each evidence" if folder_wanted else "must be a file, not a folder"
-            raise Fault("CONFIG", f"{option} {path}: {rule}; choose another")
 
 
 def _diagnose_one(source: "EvidenceFolder", wishes: _Wishes) -> int:

@@ -11,7 +11,7 @@ from bridge.faults import Fault
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import watched_share
 from cockpit.run.child_process import end_like_ctrl_c
-from cockpit.run.writable import check_writable, writing
+from cockpit.run.writable import check_output_folder, writing
 
 
 class EffectName(StrEnum):
@@ -60,7 +60,7 @@ def example(
         end_like_ctrl_c()
         if folder.exists() or folder.is_symlink():
             raise Fault("CONFIG", f"{folder}: is there already; nothing was written; choose another folder")
-        check_writable("FOLDER", folder)
+        check_output_folder("FOLDER", folder)
         beside = next(parent for parent in folder.absolute().parents if parent.exists())
         with (
             writing(folder),

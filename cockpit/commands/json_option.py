@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 from bridge.faults import Fault
 from bridge.files import JSON, refuse_to_replace, strict_json, write_json
 from cockpit.run.child_process import guarded, report
-from cockpit.run.writable import check_writable, writing
+from cockpit.run.writable import check_output, writing
 
 STDOUT = Path("-")
 _OPTION = "--json"
@@ -101,7 +101,4 @@ def _check(as_json: Path | None) -> None:
     if as_json.suffix.lower() != _SUFFIX:
         line = f"{_OPTION}={as_json}: must be - for stdout or end in {_SUFFIX}; choose another name"
         raise Fault("CONFIG", line)
-    check_writable(_OPTION, as_json)
-    refuse_to_replace(as_json, JSON, f"{_OPTION} {as_json}")
-    if as_json.is_dir():
-        raise Fault("CONFIG", f"{_OPTION} {as_json}: must be a file, not a folder; choose another")
+    check_output(_OPTION, as_json, (_SUFFIX,))

@@ -8,6 +8,7 @@ import typer
 
 from cockpit.commands.json_option import STDOUT, Json, JsonGroup, carry_out, tell
 from cockpit.commands.options import watched_share
+from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
 
 if TYPE_CHECKING:
     from bridge.log.logfile import Damage
@@ -35,7 +36,7 @@ def log_info(path: LogArgument, as_json: Json = None) -> None:
 @log_app.command("recover")
 def log_recover(
     path: LogArgument,
-    out: Annotated[Path | None, typer.Option(help="Write here instead of in place.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write here, FILE.mcap, instead of in place.")] = None,
     as_json: Json = None,
 ) -> None:
     """Save every message that can be read from a cut or damaged log, with a new index."""
@@ -43,6 +44,8 @@ def log_recover(
     def work() -> None:
         from bridge.log.logfile import recover
 
+        if out is not None:
+            check_output("--out", out, LOG)
         saved = recover(path, out or path)
         words = f"{out or path}: {saved.messages} messages, whole again; {_lost(saved.damage) or 'nothing was lost'}"
         tell(as_json, {"messages": saved.messages, "out": out or path} | saved.damage._asdict(), [words])
@@ -78,6 +81,7 @@ def log_export(
 
         from_s = time_s(f"--from {start}", start, "12.5s") if start else -math.inf
         until_s = time_s(f"--until {end}", end, "20s") if end else math.inf
+        check_output("--to", to, TABLE)
         names = [name.strip() for name in topic.split(",")] if topic else STREAMING
         with watched_share(f"exporting {path.name}", quiet=as_json == STDOUT) as progress:
             written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress)
@@ -108,6 +112,10 @@ def log_import(
     def work() -> None:
         from diagnosis.evidence.import_table import import_file
 
+        if out.suffix == ".mcap":
+            check_output("--out", out, LOG)
+        else:
+            check_output_folder("--out", out)
         done = import_file(path, channel_map, out)
         place = done.out if done.out.suffix == ".mcap" else done.out / done.file
         words = f"{place}: {done.rows} samples of {', '.join(done.columns)}"

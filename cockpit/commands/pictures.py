@@ -8,25 +8,16 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
+from bridge.files import check_file
 from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO
-from cockpit.run.writable import check_writable, writing
-
-_PICTURES = (".png", ".svg", ".pdf")
-
-
-def _check_picture(out: Path) -> None:
-    """Raise Fault CONFIG for a suffix that no picture has."""
-    if out.suffix.lower() not in _PICTURES:
-        raise Fault("CONFIG", f"--out {out}: must end in {', '.join(_PICTURES)}; choose one of these formats")
+from cockpit.run.writable import PAGE, PICTURE, check_output, writing
 
 
 @contextlib.contextmanager
-def _written(out: Path) -> Generator[None]:
-    """The work that ends with writing `out`. Raises Fault LOG_WRITE where it cannot, at its start if that is known then."""
-    check_writable("--out", out)
-    if out.is_dir():
-        raise Fault("LOG_WRITE", f"--out {out}: is a folder; give the name of a file in it")
+def _written(out: Path, suffixes: tuple[str, ...]) -> Generator[None]:
+    """The work that ends with writing `out`. Raises Fault where it cannot, at its start if that is known then."""
+    check_output("--out", out, suffixes)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         yield
@@ -47,12 +38,11 @@ def plot(
     def work() -> None:
         from cockpit.judge.run_plot import plot_run
 
+        check_file(log, "BAD_LOG", "give the path of a run log, .mcap")
         picture = out or log.parent / f"{log.stem}.png"
         if picture.resolve() == log.resolve():
             raise Fault("CONFIG", f"--out {picture}: is the log, which the picture would replace; choose another file")
-        if out is not None:
-            _check_picture(out)
-        with _written(picture):
+        with _written(picture, PICTURE):
             verdict = plot_run(log, picture)
         tell(as_json, {"picture": picture} | verdict.as_dict(), [f"picture  {picture}"])
 
@@ -77,8 +67,7 @@ def stability(
         from cockpit.run.scenario import load_rig
 
         made = load_rig(rig, settings)
-        _check_picture(out)
-        with _written(out):
+        with _written(out, PICTURE):
             result = stability_map(made, out)
         tell(as_json, result, [result.answer, f"picture  {out}"])
 
@@ -86,7 +75,7 @@ def stability(
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option(help="The report, one HTML file.")] = Path("runs/reproduce.html"),
+    out: Annotated[Path, typer.Option(help="The report, one .html file.")] = Path("runs/reproduce.html"),
     as_json: Json = None,
 ) -> None:
     """Redo the paper: its figures, tables and claims, each with its number and whether it holds."""
@@ -94,7 +83,7 @@ def reproduce(
     def work() -> int:
         from cockpit.paper.page import reproduce as redo
 
-        with _written(out):
+        with _written(out, PAGE):
             result = redo(out, progress=True)
         tell(as_json, result.as_json(), [result.verdict, f"report   {out}"])
         return 0 if result.passed else 1

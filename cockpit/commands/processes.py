@@ -19,6 +19,7 @@ from cockpit.commands.options import (
     as_settings,
 )
 from cockpit.run.child_process import stop_event, warn_without_priority
+from cockpit.run.writable import LOG, check_output
 
 
 class Served(NamedTuple):
@@ -126,6 +127,7 @@ def record(
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
         path = log_path(log, made.name)
+        check_output("--log", path, LOG)
 
         def ready() -> None:
             # `stickslip run` writes its log anew; started by hand after an incident, the one there holds what happened

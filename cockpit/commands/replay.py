@@ -9,6 +9,7 @@ from bridge.faults import Fault
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Prefix, as_settings
 from cockpit.run.child_process import stop_event
+from cockpit.run.writable import LOG, check_output
 
 
 def _only_with(mode: str, given: dict[str, bool]) -> None:
@@ -87,6 +88,7 @@ def replay_command(
             if out.resolve() == logs[0].resolve():
                 line = f"--log {out}: is the recorded run, which the new one would replace; choose another file"
                 raise Fault("CONFIG", line)
+            check_output("--log", out, LOG)
             compared = replaying.closed_loop(logs[0], settings, out)
             tell(as_json, compared, compared.in_words())
             return 0

@@ -9,7 +9,7 @@ import typer
 from bridge.faults import Fault
 from bridge.files import write_json
 from cockpit.commands.json_option import Json, carry_out, tell
-from cockpit.run.writable import check_writable, writing
+from cockpit.run.writable import check_output_folder, writing
 
 
 class Named(NamedTuple):
@@ -38,7 +38,7 @@ def schema(
             raise Fault("CONFIG", f"{name}: no such schema; known: {', '.join(FORMATS)}")
         wanted = [FORMATS[key]] if key else list(FORMATS.values())
         if out is not None:
-            check_writable("--out", out)
+            check_output_folder("--out", out)
             with writing(out):
                 for one in wanted:
                     write_json(out / f"{one.name}.json", one.schema())

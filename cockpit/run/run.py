@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
-from bridge.files import LOG, refuse_to_replace
 from bridge.log.logfile import refuse_a_live_log
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
 from cockpit.run.scenario import Scenario, load_scenario
+from cockpit.run.writable import LOG, check_output
 
 if TYPE_CHECKING:
     from cockpit.judge.margins import Margins
@@ -87,7 +87,7 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
     """
     scenario = load_scenario(name, settings)
     path = log_path(log, scenario.name)
-    refuse_to_replace(path, LOG, f"--log {path}")
+    check_output("--log", path, LOG)
     before = _stamp(path)
     endless = scenario.duration_s == 0.0
     if not (lockstep or in_process):

@@ -5,7 +5,41 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
+from bridge import files
 from bridge.faults import Fault
+from bridge.files import refuse_to_replace
+
+# suffixes of what commands write, by kind
+LOG = (".mcap",)
+PICTURE = (".png", ".svg", ".pdf")
+PAGE = (".html", ".htm")
+RIG = (".toml",)
+JSON = (".json",)
+TABLE = (".parquet", ".csv", ".mat")
+_NEVER_LOST = {LOG: files.LOG, JSON: files.JSON}  # a file of another kind under such a name is not replaced
+_NO_FOLDER = {*LOG, *PICTURE, *PAGE, *RIG, *JSON, *TABLE, ".tdms", ".txt"}
+
+
+def check_output(option: str, path: Path, suffixes: tuple[str, ...]) -> None:
+    """Raise Fault where a file of this kind cannot be written: CONFIG for its name, LOG_WRITE for its place."""
+    check_writable(option, path)
+    if suffixes in _NEVER_LOST:
+        refuse_to_replace(path, _NEVER_LOST[suffixes], f"{option} {path}")
+    if path.is_dir():
+        raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")
+    if path.suffix.lower() not in suffixes:
+        raise Fault("CONFIG", f"{option} {path}: must end in {', '.join(suffixes)}; choose another name")
+
+
+def check_output_folder(option: str, path: Path) -> None:
+    """Raise Fault where a folder cannot be made: CONFIG for a name that is a file's, LOG_WRITE for its place."""
+    check_writable(option, path)
+    if path.exists() and not path.is_dir():
+        raise Fault("CONFIG", f"{option} {path}: must be a folder, not a file; choose another")
+    if path.suffix.lower() in _NO_FOLDER and not path.exists():
+        raise Fault(
+            "CONFIG", f"{option} {path}: must be a folder, and {path.suffix} ends the name of a file; choose another"
+        )
 
 
 def check_writable(option: str, path: Path) -> None:

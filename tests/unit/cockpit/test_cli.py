@@ -68,8 +68,46 @@ def test_a_picture_of_another_kind_is_refused(log: Path, command: str, name: str
     out = log.with_name(name)
     result = call(command, *([str(log)] if command == "plot" else []), "--out", str(out))
     assert result.exit_code == 2
-    assert f"--out {out}: must end in .png, .svg, .pdf; choose one of these formats" in result.stderr
+    assert f"--out {out}: must end in .png, .svg, .pdf; choose another name" in result.stderr
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["diagnose", ".", "--report", "r.pdf"], "--report r.pdf: must end in .html, .htm; "),
+        (["diagnose", ".", "--apply", "r.json"], "--apply r.json: must end in .toml; "),
+        (
+            ["diagnose", ".", "..", "--report", "r.html"],
+            "--report r.html: must be a folder, and .html ends the name of a",
+        ),
+        (["reproduce", "--out", "r.pdf"], "--out r.pdf: must end in .html, .htm; "),
+        (
+            ["blind", "score", "set", "--key", "key.json", "--report", "r.pdf"],
+            "--report r.pdf: must end in .html, .htm; ",
+        ),
+        (["blind", "pool", "a.json", "--report", "r.pdf"], "--report r.pdf: must end in .html, .htm; "),
+        (["run", "--log", "r.csv"], "--log r.csv: must end in .mcap; "),
+        (["record", "--log", "r.csv"], "--log r.csv: must end in .mcap; "),
+        (["replay", "a.mcap", "--closed-loop", "--log", "r.csv"], "--log r.csv: must end in .mcap; "),
+        (["log", "recover", "a.mcap", "--out", "r.csv"], "--out r.csv: must end in .mcap; "),
+        (["log", "export", "a.mcap", "--to", "r.txt"], "--to r.txt: must end in .parquet, .csv, .mat; "),
+        (
+            ["log", "import", "a.csv", "--map", "m.toml", "--out", "r.csv"],
+            "--out r.csv: must be a folder, and .csv ends",
+        ),
+        (["schema", "--out", "r.json"], "--out r.json: must be a folder, and .json ends the name of a file; "),
+        (["example", "r.toml"], "FOLDER r.toml: must be a folder, and .toml ends the name of a file; "),
+    ],
+)
+def test_what_would_be_of_another_kind_than_its_name_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = call(*words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"stickslip: CONFIG: {told}")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_picture_without_a_name_is_beside_its_log(log: Path) -> None:
@@ -103,14 +141,15 @@ def test_what_is_no_time_is_refused(log: Path, time: str) -> None:
 @pytest.mark.parametrize("command", ["plot", "map", "reproduce"])
 def test_a_folder_as_the_file_to_write_is_refused_at_once(log: Path, command: str) -> None:
     more = [str(log)] if command == "plot" else []
-    folder = log.with_name("folder.png")
+    suffix = ".html" if command == "reproduce" else ".png"
+    folder = log.with_name(f"folder{suffix}")
     folder.mkdir()
     result = call(command, *more, "--out", str(folder))
-    assert result.exit_code == 5
-    assert result.stderr.startswith(f"stickslip: LOG_WRITE: --out {folder}: is a folder; ")
-    under_a_file = log / "picture.png"
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"stickslip: CONFIG: --out {folder}: must be a file, not a folder; ")
+    under_a_file = log / f"picture{suffix}"
     assert f"{under_a_file}: cannot be written" in call(command, *more, "--out", str(under_a_file)).stderr
-    long = log.parent / f"{'x' * 300}.png"
+    long = log.parent / f"{'x' * 300}{suffix}"
     assert f"{long}: cannot be written: File name too long" in call(command, *more, "--out", str(long)).stderr
 
 

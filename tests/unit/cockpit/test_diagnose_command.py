@@ -129,8 +129,8 @@ def test_an_option_that_would_be_the_name_of_a_file_is_refused_before_the_work(t
     result = diagnose("rig", "--report", "--jobs", "1")
     assert result.exit_code == FAULTS["CONFIG"].exit_status
     assert "--report --jobs: takes a file, and --jobs is an option" in result.stderr
-    assert diagnose("rig", "--report", tmp_path / "--jobs").exit_code == 0
-    assert "--jobs" in files(tmp_path)
+    assert diagnose("rig", "--report", tmp_path / "--jobs.html").exit_code == 0
+    assert "--jobs.html" in files(tmp_path)
 
 
 @pytest.mark.parametrize("option", ["--json", "--report", "--apply"])
@@ -205,6 +205,7 @@ def test_folders_of_the_same_name_keep_apart(tmp_path):
         (["--report", "rig/run-01.csv/report.html"], "LOG_WRITE"),
         (["rig2", "--apply", "rig.toml"], "CONFIG"),
         (["rig2", "--report", "rig/run-01.csv"], "CONFIG"),
+        (["--report", "rig/report.pdf"], "CONFIG"),
         (["--json=rig/run-01.csv"], "CONFIG"),
         (["--apply", "rig/manifest.toml"], "CONFIG"),
         (["--json", "a.json", "--report", "./a.json"], "CONFIG"),

@@ -43,8 +43,9 @@ def test_what_is_there_and_of_another_kind_stays(files, monkeypatch, words, vict
 
 
 def test_a_log_is_not_replaced_by_the_result_of_its_run(tmp_path):
-    log = tmp_path / "same.json"
-    result = CliRunner().invoke(app, [*RUN, "--log", str(log), "--json", str(log)])
+    log, other_name = tmp_path / "same.mcap", tmp_path / "other-name.json"
+    other_name.symlink_to(log)
+    result = CliRunner().invoke(app, [*RUN, "--log", str(log), "--json", str(other_name)])
     assert result.exit_code == FAULTS["CONFIG"].exit_status
     assert log.read_bytes().startswith(b"\x89MCAP")
 
