@@ -67,12 +67,15 @@ def diagnose(
         from joblib import cpu_count
 
         from diagnosis.diagnose_many import find_sources
+        from diagnosis.evidence.manifest import check_folder
 
         end_like_ctrl_c()
         wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster)
         sources = find_sources(evidence)
         one = all(path.resolve() == sources[0].folder for path in evidence)
         _check_destinations(wishes, one, sources)
+        for path in evidence:  # before minutes of work on the others
+            check_folder(path)
         return _diagnose_one(sources[0], wishes) if one else _diagnose_many(sources, wishes)
 
     carry_out(work, as_json)

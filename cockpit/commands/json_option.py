@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -17,6 +18,8 @@ from cockpit.run.writable import check_output, writing
 STDOUT = Path("-")
 _OPTION = "--json"
 _SUFFIX = ".json"
+# the word after `--json`, which is an input where it does not end in .json
+_AFTER: ContextVar[Sequence[str]] = ContextVar("after", default=())
 # typer has click inside since 0.27 and beside it before; what it exports is of the same kind in both
 _UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
 
@@ -35,7 +38,9 @@ class JsonGroup(TyperGroup):
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
         """Run a command line, that of the process if none is given."""
-        words = with_places(sys.argv[1:] if args is None else args)
+        given = list(sys.argv[1:] if args is None else args)
+        words = with_places(given)
+        _AFTER.set(given[given.index(_OPTION) + 1 : given.index(_OPTION) + 2] if _OPTION in given else [])
         if f"{_OPTION}={STDOUT}" not in words:
             return super().main(words, *more, **options)
         try:
@@ -43,7 +48,8 @@ class JsonGroup(TyperGroup):
         except _UsageError as error:
             wrong: Any = error
             command = wrong.ctx.command_path if wrong.ctx else "stickslip"
-            line = f"{command}: {wrong.format_message().rstrip('.')}; see {command} --help"
+            told = wrong.format_message().rstrip(".")
+            line = f"{command}: {told}{_perhaps_meant(told)}; see {command} --help"
             status = guarded(lambda: report(Fault("CONFIG", line), as_json=True))
         sys.exit(status or 0)
 
@@ -68,9 +74,18 @@ def carry_out(work: Callable[[], int | None], as_json: Path | None) -> NoReturn:
 
     def checked() -> int | None:
         _check(as_json)
-        return work()
+        try:
+            return work()
+        except Fault as fault:
+            raise Fault(fault.kind.code, fault.line + _perhaps_meant(fault.line)) from None
 
     sys.exit(guarded(checked, as_json == STDOUT))
+
+
+def _perhaps_meant(told: str) -> str:
+    """What to add to an error about a word too many, or an input that is not there: that it may be meant as the file."""
+    about = [word for word in _AFTER.get() if told.startswith(f"{word}: no ") or f"({word})" in told]
+    return f"; if it is meant as the file of {_OPTION}, it must end in {_SUFFIX}" if about else ""
 
 
 def tell(as_json: Path | None, result: Any, words: Iterable[str], indent: int | None = None) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
+from bridge.files import check_file
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Prefix, as_settings
 from cockpit.run.child_process import stop_event
@@ -59,6 +60,11 @@ def replay_command(
             _only_with("--to-bus, which plays the log on the bus", paced | meeting)
         if not closed_loop:
             _only_with("--closed-loop, whose new run goes there", {"--log": log is not None})
+        out = log or Path("runs/closed-loop.mcap")
+        if closed_loop:
+            check_output("--log", out, LOG)
+        for path in logs:  # before the work on the others
+            check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
         if to_bus:
             for option, given in (
                 ("--closed-loop", closed_loop),
@@ -79,7 +85,6 @@ def replay_command(
                     publish_log(path, bus, speed or 1.0, from_s, everything, roles, stop)
             return 0
         if closed_loop:
-            out = log or Path("runs/closed-loop.mcap")
             if len(logs) != 1:
                 raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")
             if from_s > 0.0:
@@ -88,7 +93,6 @@ def replay_command(
             if out.resolve() == logs[0].resolve():
                 line = f"--log {out}: is the recorded run, which the new one would replace; choose another file"
                 raise Fault("CONFIG", line)
-            check_output("--log", out, LOG)
             compared = replaying.closed_loop(logs[0], settings, out)
             tell(as_json, compared, compared.in_words())
             return 0

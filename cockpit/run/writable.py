@@ -16,7 +16,10 @@ PAGE = (".html", ".htm")
 RIG = (".toml",)
 JSON = (".json",)
 TABLE = (".parquet", ".csv", ".mat")
-_NEVER_LOST = {LOG: files.LOG, JSON: files.JSON}  # a file of another kind under such a name is not replaced
+_NEVER_LOST: dict[tuple[str, ...], str] = {
+    LOG: files.LOG,
+    JSON: files.JSON,
+}  # a file of another kind under such a name is not replaced
 _NO_FOLDER = {*LOG, *PICTURE, *PAGE, *RIG, *JSON, *TABLE, ".tdms", ".txt"}
 
 

@@ -162,10 +162,8 @@ def check_channel_names(channels: dict[str, Any]) -> None:
             raise ValueError(f"channels.{name}: unknown key; known here: {', '.join(STANDARD)}")
 
 
-def read_manifest(folder: Path) -> Manifest:
-    """Read and check `manifest.toml` of an evidence folder. Raises Fault BAD_EVIDENCE, with one line for each problem."""
-    if shown(folder) != str(folder):
-        raise Fault("BAD_EVIDENCE", f"{shown(folder)}: its name is not UTF-8; rename it")
+def check_folder(folder: Path) -> None:
+    """Raise Fault BAD_EVIDENCE where `folder` is no folder."""
     try:
         what = "" if folder.is_dir() else "no folder" if folder.exists() else "no such folder"
     except OSError as error:
@@ -173,6 +171,13 @@ def read_manifest(folder: Path) -> Manifest:
     if what:
         line = f"{folder}: {what}; evidence is a folder with {MANIFEST} and one data file a run"
         raise Fault("BAD_EVIDENCE", line)
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Read and check `manifest.toml` of an evidence folder. Raises Fault BAD_EVIDENCE, with one line for each problem."""
+    if shown(folder) != str(folder):
+        raise Fault("BAD_EVIDENCE", f"{shown(folder)}: its name is not UTF-8; rename it")
+    check_folder(folder)
     path = folder / MANIFEST
     check_file(path, "BAD_EVIDENCE", "an evidence folder needs it, see `stickslip log import`")
     try:

@@ -101,7 +101,6 @@ def test_json_has_no_numbers_that_json_does_not_know():
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("rig/" + "x" * 300, "cannot be read: File name too long; "),
         ("in its place", "in its place/manifest.toml: is a folder, must be a file; "),
         ("run in its place", "run-01.csv: is a folder, must be a file; "),
         ("long run", "cannot be read: File name too long; "),
@@ -122,6 +121,19 @@ def test_evidence_that_cannot_be_looked_at_is_bad_and_ends_no_other(name, why, t
     assert result.exit_code == 2
     assert "rig: effect: drive-backlash" in result.stdout
     assert why in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("absent", "no such folder; "), ("file.txt", "no folder; "), ("x" * 300, "cannot be read: File name too long; ")],
+)
+def test_evidence_that_is_not_there_is_said_before_the_work(name, why, tmp_path, monkeypatch):
+    monkeypatch.chdir(folders(tmp_path, "rig", "rig2"))
+    Path("file.txt").touch()
+    monkeypatch.setattr(many, "real_diagnose", made_up.endless)
+    result = diagnose("rig", "rig2", "--jobs", 1, name)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"stickslip: BAD_EVIDENCE: {name}: {why}")
 
 
 def test_an_option_that_would_be_the_name_of_a_file_is_refused_before_the_work(tmp_path, monkeypatch):

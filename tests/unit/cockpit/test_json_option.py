@@ -213,7 +213,8 @@ def test_a_replay_of_several_logs_is_a_list_and_words_come_as_they_are_known() -
     Path("again.mcap").write_bytes(Path("run.mcap").read_bytes())
     told = json.loads(call("replay", "run.mcap", "--json", "again.mcap").stdout)
     assert [(one["log"], one["identical"]) for one in told] == [("run.mcap", True), ("again.mcap", True)]
-    result = call("replay", "run.mcap", "no.mcap", "--json", "x.json")
+    Path("bad.mcap").write_bytes(b"no log")
+    result = call("replay", "run.mcap", "bad.mcap", "--json", "x.json")
     assert result.exit_code == FAULTS["BAD_LOG"].exit_status
     assert result.stdout.startswith("run.mcap: identical, ")
 
@@ -257,3 +258,26 @@ def test_an_export_of_nothing_is_told_and_leaves_an_older_table(tmp_path: Path) 
     assert result.exit_code == 1
     assert "nothing to write: no message of these topics in this time; a table that is there stays" in result.stdout
     assert table.read_text() == "of yesterday\n"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("log", "check", "run.mcap", "--json", "out.txt"),
+        ("log", "info", "--json", "out.txt"),
+        ("replay", "run.mcap", "--json", "out.txt"),
+        ("diagnose", ".", "--json", "out.txt"),
+    ],
+)
+def test_a_file_of_another_suffix_is_told_as_what_it_may_be(words: tuple[str, ...]) -> None:
+    result = call(*words)
+    assert result.exit_code in {FAULTS["CONFIG"].exit_status, FAULTS["BAD_LOG"].exit_status}
+    assert "out.txt" in json.loads(result.stdout)["line"]
+    assert "; if it is meant as the file of --json, it must end in .json" in json.loads(result.stdout)["line"]
+
+
+def test_a_missing_input_is_told_before_the_others_are_read(log: Path) -> None:
+    result = call("replay", str(log), "absent.mcap")
+    assert result.exit_code == FAULTS["BAD_LOG"].exit_status
+    assert result.stderr == "stickslip: BAD_LOG: absent.mcap: no such file; give the path of a run log, .mcap\n"
+    assert result.stdout == ""
