@@ -51,8 +51,9 @@ FAULTS = {
         FaultKind(
             "BAD_LOG",
             7,
-            "The file is not a run log of this project, is damaged beyond its first chunk, or holds another schema "
-            "version. `stickslip log info FILE` says what is in it; `stickslip log recover FILE` saves what can be read.",
+            "The file is not a run log of this project, is damaged beyond its first chunk, holds another schema version, or "
+            "lacks what the command needs: one that was imported has no controller to judge or to replay. `stickslip log check "
+            "FILE` says what is in a log of any kind; `stickslip log recover FILE` saves what can be read.",
         ),
         FaultKind(
             "BAD_MESSAGE",

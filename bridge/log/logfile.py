@@ -165,7 +165,10 @@ class RunData(NamedTuple):
         text = self.headers.get(role, {}).get("configuration")
         if text is None:
             line = f"{self.path}: holds no configuration of the {role}; it was not there when it was recorded"
-            raise Fault("BAD_LOG", line)
+            if "import" in self.headers:
+                line = f"{self.path}: is measured data of another program, imported, without a {role}: there is no run to judge"
+            remedy = "`stickslip log check` and `log export` read it, and `diagnose` as a run of an evidence folder"
+            raise Fault("BAD_LOG", f"{line}; {remedy}")
         try:
             return json.loads(text)
         except json.JSONDecodeError:
