@@ -18,6 +18,11 @@ _UNITS = (
 )
 
 
+def counted(number: int, one: str, many: str = "") -> str:
+    """A number of things: `1 gap`, `2 gaps`; `many` is the plural where it is not `one` with an s."""
+    return f"{number} {one if number == 1 else many or f'{one}s'}"
+
+
 def unit_of(name: str) -> str:
     """Unit of `name`, such as `N` for `drive_force_N`; `1` for a number without a unit, such as a count or a code."""
     return next((unit for suffix, unit in _UNITS if name.endswith(suffix)), "1")

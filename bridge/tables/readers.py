@@ -2,6 +2,7 @@
 
 import codecs
 import json
+import re
 import subprocess
 import sys
 import zlib
@@ -19,11 +20,14 @@ from scipy.io.matlab import MatReadError
 
 from bridge.faults import Fault
 from bridge.files import check_file
+from bridge.units import counted
 
 # Arrow handles Ctrl-C and SIGTERM itself while it reads a CSV file, and loses a signal that comes near the end.
 pa.enable_signal_handlers(False)
 
 Floats = npt.NDArray[np.float64]
+_HOW = "`stickslip log import` reads it with a map that has, under [source],"
+_SHOWN = 60  # characters of a line in an error
 SUFFIXES = (".csv", ".parquet", ".mat", ".tdms")
 
 
@@ -91,7 +95,6 @@ def _as_it_says(path: Path, dialect: Dialect) -> Dialect:
 
 def _check_dialect(path: Path, dialect: Dialect) -> None:
     """Raise Fault BAD_TABLE when the line of names does not fit the dialect: another encoding or delimiter."""
-    how = "`stickslip log import` reads it with a map that has, under [source],"
     lines: list[bytes] = []
     try:
         after = len("\n".encode(dialect.encoding).rpartition(b"\n")[2])  # bytes of a line's end: 1 in UTF-16
@@ -102,18 +105,18 @@ def _check_dialect(path: Path, dialect: Dialect) -> None:
         line = (
             f"{path.name}: line {len(lines)}: is not {dialect.encoding}: {error.reason} at character {error.start + 1}"
         )
-        raise Fault("BAD_TABLE", f'{line}; save it as UTF-8, or {how} encoding = "latin-1"') from None
+        raise Fault("BAD_TABLE", f'{line}; save it as UTF-8, or {_HOW} encoding = "latin-1"') from None
     except LookupError:
         raise Fault(
             "BAD_TABLE", f"source.encoding = {dialect.encoding!r}: is none that Python knows; try latin-1"
         ) from None
     if "\0" in names:
         line = f"{path.name}: line {len(lines)}: has zero bytes: is not {dialect.encoding}"
-        raise Fault("BAD_TABLE", f'{line}; save it as UTF-8, or {how} encoding = "utf-16-le"')
+        raise Fault("BAD_TABLE", f'{line}; save it as UTF-8, or {_HOW} encoding = "utf-16-le"')
     other = next((mark for mark in (";", "\t", ",") if mark in names), None)
     if dialect.delimiter not in names and other is not None:
         line = f"{path.name}: line {len(lines)}: the names are separated by {other!r}, not by {dialect.delimiter!r}"
-        raise Fault("BAD_TABLE", f"{line}; {how} delimiter = {json.dumps(other)}, and decimal where it is no point")
+        raise Fault("BAD_TABLE", f"{line}; {_HOW} delimiter = {json.dumps(other)}, and decimal where it is no point")
 
 
 def _csv(path: Path, dialect: Dialect) -> dict[str, Any]:
@@ -130,8 +133,23 @@ def _csv(path: Path, dialect: Dialect) -> dict[str, Any]:
     try:
         table = read(threads=True)
     except pa.ArrowInvalid:
-        table = read(threads=False)  # without threads the error names the row
+        try:
+            table = read(threads=False)  # without threads the error names the line
+        except pa.ArrowInvalid as error:
+            raise _wrong_line(path, dialect, str(error)) or error from None
     return {name.strip(): table.column(name) for name in table.column_names}
+
+
+def _wrong_line(path: Path, dialect: Dialect, error: str) -> Fault | None:
+    """What Arrow says of a line with too few or too many cells, as a fault; None for what it says of anything else."""
+    found = re.search(r"Row #(\d+): Expected (\d+) columns, got (\d+): (.*)", error)
+    if found is None:
+        return None
+    number, names, cells = map(int, found.groups()[:3])
+    under_the_names = number == dialect.skip_rows + 2  # then the line of names may be another one
+    remedy = f"if the names come later, {_HOW} skip_rows" if under_the_names else "delete the line"
+    line = f"line {number} = {found[4][:_SHOWN]!r}: has {counted(cells, 'cell')}: must have {names}, as many as there are names"
+    return Fault("BAD_TABLE", f"{path.name}: {line}; {remedy}")
 
 
 def _loaded(path: Path) -> dict[str, Any]:

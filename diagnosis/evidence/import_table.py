@@ -200,7 +200,8 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
         )
         raise Fault("CONFIG", line)
     _check_free(out / run.file)
-    findings = examine(columns, rig, run)[1]
+    # named as the file that is there: run.file is none before it is sound
+    findings = examine(columns, rig, run.model_copy(update={"file": path.name}))[1]
     findings += [
         Finding("assumed", f"{MANIFEST}: rig.{name}", f"not in {map_name}: taken as {getattr(rig, name):.6g}")
         for name in assumed

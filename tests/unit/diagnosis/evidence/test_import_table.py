@@ -209,7 +209,7 @@ def test_what_was_exported_can_be_imported(tmp_path: Path) -> None:
         ("scale = 0.5", "scale = 0.0", "map.toml: channels.drive_force_N: scale = 0: must not be 0"),
         ("mass_kg = 1.5", "", "map.toml: rig: mass_kg: missing"),
         ("[rig]", "[source]\nsample_rate_Hz = 2000.0\n[rig]", "source.sample_rate_Hz: there is a channel t_s too"),
-        ('"time", scale = 1e-3', '"acc"', "measured.parquet: t_s: "),
+        ('"time", scale = 1e-3', '"acc"', "measured.csv: t_s: "),
         ("scale = 0.5", "scale = 0.5e6", "drive_force_N"),
     ],
 )
@@ -258,6 +258,24 @@ def test_a_log_needs_a_clock_that_goes_forward(tmp_path: Path) -> None:
     with pytest.raises(Fault, match=r"measured\.csv: t_s: row 124"):
         import_file(source, channel_map, tmp_path / "made.mcap")
     assert not list(tmp_path.glob("made*"))
+
+
+def test_findings_of_an_import_name_the_file_that_was_measured(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    done = import_file(source, channel_map, tmp_path / "evidence")
+    named = {finding.where.partition(":")[0] for finding in done.findings}
+    assert named == {"measured.csv", "manifest.toml"}
+
+
+def test_an_imported_log_says_that_it_has_no_controller_and_what_reads_it(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".csv")
+    import_file(source, channel_map, tmp_path / "made.mcap")
+    with pytest.raises(Fault) as caught:
+        read_run(tmp_path / "made.mcap").configuration("controller")
+    assert caught.value.line == (
+        f"{tmp_path / 'made.mcap'}: is measured data of another program, imported, without a controller: there is no run to "
+        "judge; `stickslip log check` and `log export` read it, and `diagnose` as a run of an evidence folder"
+    )
 
 
 def test_a_log_needs_a_clock_that_ends(tmp_path: Path) -> None:
@@ -349,9 +367,19 @@ SOURCE = '[source]\ndelimiter = ";"\ndecimal = ","\n'
         (CSV.replace("9,56", "OVL", 1), SOURCE + GERMAN, "column F: row 7 = 'OVL': must be a number"),
         (CSV, GERMAN, "line 1: the names are separated by ';', not by ','"),
         (CSV.replace("F", "F/µm", 1), SOURCE + GERMAN, "line 1: is not utf-8"),
-        (CSV.replace("1,0;9,52", "1,0", 1), SOURCE + GERMAN, "Row #4: Expected 2 columns, got 1"),
+        (CSV.replace("1,0;9,52", "1,0", 1), SOURCE + GERMAN, "line 4 = '1,0': has 1 cell: must have 2, "),
+        (
+            f"{CSV}End of test\n",
+            SOURCE + GERMAN,
+            "a.csv: line 4002 = 'End of test': has 1 cell: must have 2, as many as",
+        ),
+        (
+            f"My rig\n{CSV}",
+            SOURCE + GERMAN,
+            "line 2 = 'Zeit;F': has 2 cells: must have 1, as many as there are names; if",
+        ),
     ],
-    ids=["text", "delimiter", "encoding", "ragged"],
+    ids=["text", "delimiter", "encoding", "ragged", "footer", "names further down"],
 )
 def test_a_csv_file_of_another_kind_names_place_and_remedy(tmp_path: Path, text: str, channel_map: str, expected: str):
     (tmp_path / "a.csv").write_text(text, encoding="latin-1")
