@@ -1,6 +1,7 @@
 """Pages of docs/reference that are made from the code: `make reference` writes them, tests/unit/test_docs.py compares them."""
 
 import inspect
+import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 
 from bridge.config import Strict
 from bridge.faults import FAULTS
+from bridge.wire.words import words
 from cockpit import cli
 from cockpit.run.scenario import Scenario
 from diagnosis.evidence.import_table import ImportMap
@@ -32,6 +34,12 @@ bit-identical to the ideal rig. The diagnosis tries every form of every effect. 
 formula against a closed form or SciPy.
 
 {_SYMBOLS}"""
+_FAULTS_INTRO = (
+    "`stickslip explain CODE` prints the same, and `stickslip explain WORD` a [word of a log](#words-of-a-log)."
+)
+_WORDS_INTRO = """\
+What the numbers of the columns `mode`, `state`, `reason` and `limit` of a log and of its tables mean.
+`stickslip explain reason` prints a column, `stickslip explain PIEZO_WEAK` a word."""
 _FILES_INTRO = """\
 Keys of the TOML files, with their defaults and ranges. A misspelt key or a value out of range is an error that names file,
 key, rule and remedy. Units are in the names."""
@@ -164,13 +172,21 @@ def _code_safe(formula: str) -> str:
 
 
 def _faults() -> list[str]:
-    told = CliRunner().invoke(cli.app, ["explain"]).stdout
-    rows = [line.strip().partition("  ")[::2] for line in told.splitlines()]
-    linked = [(status, f"[`{said}`](#{said.lower()})" if said in FAULTS else said) for status, said in rows]
-    lines = ["# Faults and exit statuses", "`stickslip explain CODE` prints the same.", ""]
+    told = json.loads(CliRunner().invoke(cli.app, ["explain", "--json"]).stdout)
+    linked = [
+        (str(one["exit_status"]), f"[`{one['fault']}`](#{one['fault'].lower()})" if one["fault"] else one["help"])
+        for one in told
+        if "exit_status" in one
+    ]
+    lines = ["# Faults and exit statuses", _FAULTS_INTRO, ""]
     lines += _table(("exit status", "fault or meaning"), linked)
     for kind in FAULTS.values():
         lines += [f"## {kind.code}", "", f"Exit status {kind.exit_status}. {kind.help}", ""]
+    lines += ["## Words of a log", "", _WORDS_INTRO, ""]
+    lines += _table(
+        ("column", "number", "word", "meaning"),
+        ([f"`{one.column}`", str(one.number), f"`{one.word}`", one.help] for one in words()),
+    )
     return lines
 
 

@@ -187,6 +187,14 @@ def _log_recover() -> dict[str, Any]:
     return schema_of(table(Damage, {"messages": int, "out": str}))
 
 
+def _explain() -> dict[str, Any]:
+    from bridge.wire.words import Word
+    from cockpit.commands.explain import Meaning
+    from cockpit.commands.json_types import schema_of
+
+    return schema_of(list[Meaning | Word])
+
+
 def _reproduce() -> dict[str, Any]:
     from cockpit.commands.json_types import schema_of, table
     from cockpit.paper.page import ReproduceResult
@@ -242,9 +250,7 @@ JSON = (
     ),
     Format("blind-run-result", "`stickslip blind run --json`.", _result_of("cockpit.commands.blind", "SetDone")),
     Format("scenarios-result", "`stickslip scenarios --json`.", _result_of("cockpit.commands.scenarios", "Known")),
-    Format(
-        "explain-result", "`stickslip explain --json`.", _result_of("cockpit.commands.explain", "Meaning", many=True)
-    ),
+    Format("explain-result", "`stickslip explain --json`.", _explain),
     Format("schema-result", "`stickslip schema --json`.", _result_of("cockpit.commands.schema", "Named", many=True)),
 )
 FORMATS = {one.name: one for one in (*TOML, *JSON)}

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from bridge.faults import FAULTS
 from bridge.files import strict_json
 from bridge.log.finding import Finding
+from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
 from cockpit.commands.json_option import with_places
 from tests.logs import short_log
@@ -224,7 +225,17 @@ def test_explain_is_a_list() -> None:
         {"exit_status": 6, "fault": "PEER_DIED", "help": FAULTS["PEER_DIED"].help}
     ]
     every = json.loads(call("explain", "--json").stdout)
-    assert {one["fault"] for one in every} == {*FAULTS, None}
+    assert {one["fault"] for one in every if "fault" in one} == {*FAULTS, None}
+
+
+def test_explain_knows_every_word_of_a_log() -> None:
+    enums = {"mode": wire.Mode, "state": wire.ContactState, "reason": wire.Reason, "limit": wire.Limit}
+    for column, enum in enums.items():
+        told = json.loads(call("explain", column, "--json").stdout)
+        assert {(one["word"], one["number"]) for one in told} == {*enum.items()}
+        assert all(one["help"] and one["column"] == column for one in told)
+    said = call("explain", "piezo_weak").stdout
+    assert said.startswith("reason 10  PIEZO_WEAK      v_a stays below 1.05 v_d with the amplitude at its limit")
 
 
 def test_a_named_tuple_is_an_object_and_what_json_does_not_know_is_null() -> None:
