@@ -2,6 +2,7 @@
 
 import math
 import re
+from typing import SupportsInt
 
 # longest suffix first: `_mps2` before `_mps` before `_s`
 _UNITS = (
@@ -18,7 +19,7 @@ _UNITS = (
 )
 
 
-def counted(number: int, one: str, many: str = "") -> str:
+def counted(number: SupportsInt, one: str, many: str = "") -> str:
     """A number of things: `1 gap`, `2 gaps`; `many` is the plural where it is not `one` with an s."""
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 

@@ -12,6 +12,7 @@ from bridge.log.log_reader import Damage
 from bridge.log.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
 from bridge.log.signal_range import Signal, SignalLook
 from bridge.log.topic_watch import TopicWatch
+from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import CHANNELS, SCHEMA_VERSION, parsed
 from bridge.wire.topics import BY_NAME
@@ -127,7 +128,12 @@ def damage_findings(damage: Damage, path: Path) -> list[Finding]:
         found.append(Finding("cut", path.name, text, max(damage.cut_bytes, 1)))
     if damage.bad_chunks:
         found.append(
-            Finding("damaged", path.name, f"{damage.bad_chunks} chunks are damaged; {remedy}", damage.bad_chunks)
+            Finding(
+                "damaged",
+                path.name,
+                f"{counted(damage.bad_chunks, 'chunk is', 'chunks are')} damaged; {remedy}",
+                damage.bad_chunks,
+            )
         )
     if damage.bad_records:
         text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense; {remedy}"
@@ -143,7 +149,12 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
             text = f"the {role} speaks schema version {version}: must be {SCHEMA_VERSION}"
             found.append(Finding("schema-version", path.name, text))
     found += [
-        Finding("unknown-topic", "/" + topic, f"{times} messages of a topic that this version does not know", times)
+        Finding(
+            "unknown-topic",
+            "/" + topic,
+            f"{counted(times, 'message')} of a topic that this version does not know",
+            times,
+        )
         for topic, times in seen.unknown.items()
     ]
     if seen.topics["sensors"].messages == 0:
@@ -153,7 +164,7 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
         if event.code in {"DROPPED", "PLANT_LOST", "STALE"}:
             found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", event.text))
         elif dropped and int(dropped[1]):
-            text = f"the {event.source} dropped {dropped[1]} messages because it was too slow"
+            text = f"the {event.source} dropped {counted(int(dropped[1]), 'message')} because it was too slow"
             found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
     plant_codes = [event.code for event in seen.events if event.source == "plant"]
     if reader.damage.closed and "START" in plant_codes and "END" not in plant_codes:
@@ -165,7 +176,7 @@ def _of_signal(where: str, seen: SignalLook, sample_s: float, limit: float | Non
     found: list[Finding] = []
     if seen.not_finite:
         at_s = seen.first_not_finite * sample_s
-        text = f"{seen.not_finite} samples are no finite number, first after {at_s:.3f} s of samples"
+        text = f"{counted(seen.not_finite, 'sample is', 'samples are')} no finite number, first after {at_s:.3f} s of samples"
         found.append(Finding("not-finite", where, text, seen.not_finite))
     if seen.constant:
         found.append(Finding("dead", where, f"constant at {seen.lowest:g} over the whole log", seen.samples))
@@ -177,8 +188,8 @@ def _of_signal(where: str, seen: SignalLook, sample_s: float, limit: float | Non
     # a limit that float32 cannot hold exactly is missed by rounding
     at_limit = limit is not None and max(seen.highest, -seen.lowest) >= limit * (1.0 - 1e-6)
     if seen.clipped_high or seen.clipped_low or at_limit:
-        ends = [f"{seen.clipped_high} samples at {seen.highest:g}"] if seen.clipped_high else []
-        ends += [f"{seen.clipped_low} samples at {seen.lowest:g}"] if seen.clipped_low else []
+        ends = [f"{counted(seen.clipped_high, 'sample')} at {seen.highest:g}"] if seen.clipped_high else []
+        ends += [f"{counted(seen.clipped_low, 'sample')} at {seen.lowest:g}"] if seen.clipped_low else []
         text = " and ".join(ends) or f"reaches the end of its range, {limit:g}"
         found.append(
             Finding(

@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.log.finding import Finding
+from bridge.units import counted
 from bridge.wire.messages import Records
 
 Integers = npt.NDArray[np.int64]
@@ -105,24 +106,33 @@ class TopicWatch:
         gaps = [*self._gaps_for_good, *_ranges(self._missing_numbers)]
         if gaps:
             missing = sum(len(gap) for gap in gaps)
-            add("gap", f"{missing} messages missing in {len(gaps)} gaps, first {gaps[0][0]} to {gaps[0][-1]}", missing)
+            add(
+                "gap",
+                f"{counted(missing, 'message')} missing in {counted(len(gaps), 'gap')}, first {gaps[0][0]} to {gaps[0][-1]}",
+                missing,
+            )
         if self.topic == "sensors" and self.first_number > 0:
             add("gap", f"begins with block {self.first_number}: those before were not recorded", self.first_number)
         if self._duplicates:
-            text = f"numbers come a second time at {len(self._duplicates)} places, first {self._duplicates[0]}"
+            text = (
+                f"numbers come a second time at {counted(len(self._duplicates), 'place')}, first {self._duplicates[0]}"
+            )
             add("duplicate", text, len(self._duplicates))
         if self._late:
-            add("order", f"{len(self._late)} messages came after a later one, first {self._late[0]}", len(self._late))
+            add(
+                "order",
+                f"{counted(len(self._late), 'message')} came after a later one, first {self._late[0]}",
+                len(self._late),
+            )
         if self._jumps:
             number, step_ns = self._jumps[0]
-            places = len(self._jumps)
-            text = (
-                f"t_ns does not follow the numbers at {places} places, first {number}: a step of {step_ns / 1e6:g} ms"
-            )
+            places = counted(len(self._jumps), "place")
+            text = f"t_ns does not follow the numbers at {places}, first {number}: a step of {step_ns / 1e6:g} ms"
             add("clock-jump", text, len(self._jumps))
         if self._arrived_before:
             number, step_ns = self._arrived_before[0]
-            text = f"log_time goes back at {len(self._arrived_before)} places, first {number}: by {-step_ns / 1e6:g} ms"
+            places = counted(len(self._arrived_before), "place")
+            text = f"log_time goes back at {places}, first {number}: by {-step_ns / 1e6:g} ms"
             add("log-time-back", text, len(self._arrived_before))
         return found
 

@@ -44,7 +44,7 @@ def in_a_line(outcome: "FolderResult") -> str:
     if outcome.diagnosis is not None:
         # the run that was held out unasked is no fault of the data
         doubts = sum(finding.kind != "holdout" for finding in outcome.diagnosis.findings)
-        told = f"; {doubts} findings about its data, see --json" if doubts else ""
+        told = f"; {units.counted(doubts, 'finding')} about its data, see --json" if doubts else ""
         return f"{outcome.source.name}: {words.headline(outcome.diagnosis)}{told}"
     code, line = outcome.fault or ("", "")
     return f"{outcome.source.name}: {code}: {line}"

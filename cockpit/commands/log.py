@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bridge.units import counted
 from cockpit.commands.json_option import STDOUT, Json, JsonGroup, carry_out, tell
 from cockpit.commands.options import watched_share
 from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
@@ -47,7 +48,7 @@ def log_recover(
         if out is not None:
             check_output("--out", out, LOG)
         saved = recover(path, out or path)
-        words = f"{out or path}: {saved.messages} messages, whole again; {_lost(saved.damage) or 'nothing was lost'}"
+        words = f"{out or path}: {counted(saved.messages, 'message')}, whole again; {_lost(saved.damage) or 'nothing was lost'}"
         tell(as_json, {"messages": saved.messages, "out": out or path} | saved.damage._asdict(), [words])
 
     carry_out(work, as_json)
@@ -55,9 +56,19 @@ def log_recover(
 
 def _lost(damage: "Damage") -> str:
     """What could not be read, in words; empty when all could."""
-    parts = [f"{damage.cut_bytes} bytes of an open chunk at the end"] if damage.cut_bytes else []
-    parts += [f"{damage.bad_chunks} damaged chunks"] if damage.bad_chunks else []
-    parts += [f"{damage.bad_records} damaged definitions, messages or stretches"] if damage.bad_records else []
+    parts = [f"{counted(damage.cut_bytes, 'byte')} of an open chunk at the end"] if damage.cut_bytes else []
+    parts += [counted(damage.bad_chunks, "damaged chunk")] if damage.bad_chunks else []
+    parts += (
+        [
+            counted(
+                damage.bad_records,
+                "damaged definition, message or stretch",
+                "damaged definitions, messages or stretches",
+            )
+        ]
+        if damage.bad_records
+        else []
+    )
     return "lost: " + ", ".join(parts) if parts else ""
 
 
@@ -85,7 +96,7 @@ def log_export(
         names = [name.strip() for name in topic.split(",")] if topic else STREAMING
         with watched_share(f"exporting {path.name}", quiet=as_json == STDOUT) as progress:
             written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress)
-        words = [f"{name:<8} {rows} rows" for name, rows in written.rows.items()]
+        words = [f"{name:<8} {counted(rows, 'row')}" for name, rows in written.rows.items()]
         nothing = "nothing to write: no message of these topics in this time; a table that is there stays as it is"
         words += [str(file) for file in written.files] or [nothing]
         lost = _lost(written.damage)
@@ -118,7 +129,7 @@ def log_import(
             check_output_folder("--out", out)
         done = import_file(path, channel_map, out)
         place = done.out if done.out.suffix == ".mcap" else done.out / done.file
-        words = f"{place}: {done.rows} samples of {', '.join(done.columns)}"
+        words = f"{place}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"
         tell(as_json, done, [words, *(finding.in_words() for finding in done.findings)])
 
     carry_out(work, as_json)
@@ -135,7 +146,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
             check = check_log(path, progress)
         counts = ", ".join(f"{name} {count}" for name, count in check.messages.items())
         late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())
-        words = f"{path}: {len(check.findings)} findings; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
+        words = f"{path}: {counted(len(check.findings), 'finding')}; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
         tell(as_json, check, [*(finding.in_words() for finding in check.findings), words])
         return 1 if check.findings else 0
 

@@ -7,6 +7,7 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import check_file
+from bridge.units import counted
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Prefix, as_settings
 from cockpit.run.child_process import stop_event
@@ -86,7 +87,10 @@ def replay_command(
             return 0
         if closed_loop:
             if len(logs) != 1:
-                raise Fault("CONFIG", f"--closed-loop: {len(logs)} logs: must be one; its new run goes to --log {out}")
+                raise Fault(
+                    "CONFIG",
+                    f"--closed-loop: {counted(len(logs), 'log')}: must be one; its new run goes to --log {out}",
+                )
             if from_s > 0.0:
                 line = f"--from {start}: not with --closed-loop, which simulates the run from its start; leave it out"
                 raise Fault("CONFIG", line)

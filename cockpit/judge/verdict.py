@@ -9,6 +9,7 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.log.log_check import damage_findings
 from bridge.log.logfile import RunData, read_run
+from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from diagnosis.features.cycles import Cycles, find_cycles
@@ -113,16 +114,16 @@ def judge_run(run: RunData) -> RunVerdict:
     ]
     for name in unreadable:
         bad = ~np.isfinite(run.sensors[name]).all(axis=1)
-        where, first = f"/sensors {name}: {np.count_nonzero(bad)} blocks", run.sensors["sequence"][bad][0]
-        faults.append(f"NOT_FINITE: {where} hold a sample that is no number, first {first}; they were left out")
+        many, first = counted(np.count_nonzero(bad), "block holds", "blocks hold"), run.sensors["sequence"][bad][0]
+        faults.append(f"NOT_FINITE: /sensors {name}: {many} a sample that is no number, first {first}; left out")
     slips = trace["slips"].astype(np.int64)
     rose = np.diff(slips, prepend=slips[:1]) > 0
     unmoved = rose & (trace["drive_velocity_mps"] <= _STANDSTILL_MPS)
     if unmoved.any():
         first_s = float(trace["t_ns"][unmoved][0]) * 1e-9
         faults.append(
-            f"DRIVE_UNSEEN: {np.count_nonzero(unmoved)} slips while the drive position stood, first at {first_s:.3f} s: is its "
-            "transducer at the end of its range, or loose?"
+            f"DRIVE_UNSEEN: {counted(np.count_nonzero(unmoved), 'slip')} while the drive position stood, first at "
+            f"{first_s:.3f} s: is its transducer at the end of its range, or loose?"
         )
     return RunVerdict(
         log=str(run.path),
@@ -215,12 +216,12 @@ def in_words(verdict: RunVerdict) -> list[str]:
     lines: list[str] = []
     if v.before is not None:
         lines.append(
-            f"before   {v.before.slips} slips in {v.before.seconds:.1f} s ({v.before.slips_per_min:.0f} per minute of this "
-            f"phase), drive force swings by {v.before.swing_N:.2f} N"
+            f"before   {counted(v.before.slips, 'slip')} in {v.before.seconds:.1f} s ({v.before.slips_per_min:.0f} per "
+            f"minute of this phase), drive force swings by {v.before.swing_N:.2f} N"
         )
     if v.after is not None:
         lines.append(
-            f"after    {v.after.slips} slips in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
+            f"after    {counted(v.after.slips, 'slip')} in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
         )
     if v.stopped_s > 0:
         lines.append(f"stopped  by an operator for {v.stopped_s:.1f} s, which is no part of what came after")
@@ -234,7 +235,10 @@ def in_words(verdict: RunVerdict) -> list[str]:
             f"{latency.p999_us:.0f} us; {100 * latency.within_1_ms:.2f} % within 1 ms"
         )
     lost = "none lost" if v.lost_blocks == 0 else f"{v.lost_blocks} LOST"
-    lines.append(f"blocks   {v.blocks}, {lost}" + (f"; {v.lost_messages} log messages lost" if v.lost_messages else ""))
+    lines.append(
+        f"blocks   {v.blocks}, {lost}"
+        + (f"; {counted(v.lost_messages, 'log message')} lost" if v.lost_messages else "")
+    )
     if v.normal_scheduling:
         who = " and ".join(v.normal_scheduling)
         lines.append(f"priority {who} under {realtime.NORMAL}: {realtime.NOT_GUARANTEED}")
@@ -253,9 +257,9 @@ def headline(verdict: RunVerdict) -> str:
     if v.after is None:
         return _without_after(v)
     if v.after.slips:
-        return f"stick-slip is still there: {v.after.slips} slips while the controller was in charge"
+        return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge"
     if v.before is not None and v.before.slips:
-        return f"stick-slip is gone: {v.before.slips} slips before, none with the controller in charge"
+        return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before, none with the controller in charge"
     return "no stick-slip with the controller in charge"
 
 

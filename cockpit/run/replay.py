@@ -10,6 +10,7 @@ import numpy as np
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, read_run
+from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.verdict import judge_run
 from cockpit.run.in_process import Word, run_onboard
@@ -89,12 +90,12 @@ class Replayed(NamedTuple):
     def in_words(self) -> list[str]:
         """The answer in lines for a person."""
         skipped = (
-            f"; {self.skipped_steps} steps could not be rebuilt, their block or the memory before them is not in the log"
+            f"; {counted(self.skipped_steps, 'step')} could not be rebuilt: a block or the memory before it is not in the log"
             if self.skipped_steps
             else ""
         )
         if self.difference is None:
-            same = f"identical, {self.compared_steps} steps, every command and trace in it bit for bit"
+            same = f"identical, {counted(self.compared_steps, 'step')}, every command and trace in it bit for bit"
             return [f"{self.log}: {same}{skipped}"]
         d = self.difference
         lines = [

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.log.signal_range import look
+from bridge.units import counted, percent
 from diagnosis.evidence.manifest import RigTable, RunTable
 from diagnosis.evidence.sign_and_unit import apparent_stiffness_N_per_m
 
@@ -69,11 +70,17 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     for name in list(usable):
         bad = ~np.isfinite(usable[name])
         if name in _COMMANDED and bad.any():  # the model would run without this vibration
-            line = f"{file}: {name}: {bad.sum()} of {len(bad)} samples are no finite number, first row {np.argmax(bad) + 1}"
-            raise Fault("BAD_EVIDENCE", f"{line}: must be one in every row; write 0 where the vibration is off")
+            where = f"{bad.sum()} of {counted(len(bad), 'row')}, first row {np.argmax(bad) + 1}"
+            raise Fault(
+                "BAD_EVIDENCE",
+                f"{file}: {name}: no finite number in {where}: must be one in every row; write 0 where the vibration is off",
+            )
         if name != "t_s" and bad.mean() > 0.5:
             note(
-                "not-finite", name, f"{bad.sum()} of {len(bad)} samples are no finite number; not used", int(bad.sum())
+                "not-finite",
+                name,
+                f"no finite number in {bad.sum()} of {counted(len(bad), 'row')}; not used",
+                int(bad.sum()),
             )
             del usable[name]
     usable, rows = _good_rows(usable, rig, file, findings)
@@ -84,11 +91,11 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     gaps = np.flatnonzero(step_s > _GAP_STEPS * usual_s)
     if len(gaps):
         at = gaps[0]
-        text = f"{len(gaps)} gaps in time, first at {t_s[at]:.6g} s: {step_s[at]:.3g} s without a sample"
+        text = f"{counted(len(gaps), 'gap')} in time, first at {t_s[at]:.6g} s: {step_s[at]:.3g} s without a sample"
         longest_s, share = float(step_s.max()), float(step_s[gaps].sum() / (t_s[-1] - t_s[0]))
         if longest_s > _LONGEST_GAP_S or share > _LARGEST_GAP_SHARE:
             line = (
-                f"{file}: t_s: {text}, the longest {longest_s:.3g} s, {100 * share:.2g} % of the run in all: must be "
+                f"{file}: t_s: {text}, the longest {longest_s:.3g} s, {percent(share)} of the run in all: must be "
                 f"{_LONGEST_GAP_S:g} s and {100 * _LARGEST_GAP_SHARE:g} % at most; split the file there into runs of their own"
             )
             raise Fault("BAD_EVIDENCE", line)
@@ -113,7 +120,12 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
             for times, limit in ((seen.clipped_high, seen.highest), (seen.clipped_low, seen.lowest)):
                 if times:
                     row = int(rows[np.flatnonzero(values == limit)[0]]) + 1
-                    note("clipped", name, f"{times} samples at {limit:g}, first row {row}; so are the model's", times)
+                    note(
+                        "clipped",
+                        name,
+                        f"{counted(times, 'sample')} at {limit:g}, first row {row}; so are the model's",
+                        times,
+                    )
             clipped[name] = (
                 seen.lowest if seen.clipped_low else -math.inf,
                 seen.highest if seen.clipped_high else math.inf,
@@ -162,13 +174,11 @@ def _check_shape(columns: Columns, file: str) -> None:
         raise Fault("BAD_EVIDENCE", f"{file}: t_s: missing; the file has {has}; add the column or map it in [channels]")
     rows = len(columns["t_s"])
     if rows < _FEWEST_ROWS:
-        line = f"{file}: t_s: {rows} rows: must have {_FEWEST_ROWS} at least; give a longer run"
+        line = f"{file}: t_s: {counted(rows, 'row')}: must have {_FEWEST_ROWS} at least; give a longer run"
         raise Fault("BAD_EVIDENCE", line)
     for name, values in columns.items():
         if len(values) != rows:
-            line = (
-                f"{file}: {name}: {len(values)} rows: must have {rows}, as t_s; every column needs one value a sample"
-            )
+            line = f"{file}: {name}: {counted(len(values), 'row')}: must have {rows}, as t_s: one value a sample"
             raise Fault("BAD_EVIDENCE", line)
 
 
@@ -186,7 +196,7 @@ def _good_rows(
     for name, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
-            text = f"{len(bad)} samples are no finite number, first row {bad[0] + 1}; these rows are not used"
+            text = f"{counted(len(bad), 'sample is', 'samples are')} no finite number, first row {bad[0] + 1}; not used"
             found.append(Finding("not-finite", f"{file}: {name}", text, len(bad)))
             good[bad] = False
         limit = _FORCE_FACTOR * rig.static_force_N if name == "drive_force_N" else _LARGEST.get(name, math.inf)
@@ -194,9 +204,8 @@ def _good_rows(
         # with a larger share of wild samples the unit is wrong: `_wrong_unit` says so
         if not name.endswith("position_m") and 0 < len(wild) <= _LARGEST_WILD_SHARE * rows:
             at = int(wild[0])
-            text = (
-                f"{len(wild)} samples are beyond {limit:g}, first row {at + 1}: {values[at]:g}; these rows are not used"
-            )
+            many = counted(len(wild), "sample is", "samples are")
+            text = f"{many} beyond {limit:g}, first row {at + 1}: {values[at]:g}; not used"
             found.append(Finding("wild", f"{file}: {name}", text, len(wild)))
             good[wild] = False
     latest_s = np.maximum.accumulate(np.where(np.isfinite(t_s), t_s, -np.inf))
@@ -206,8 +215,8 @@ def _good_rows(
     if len(back):
         at = int(back[0])
         text = (
-            f"{len(back)} rows are not later than the one before, first row {at + 1}: {t_s[at]:.9g} s after "
-            f"{latest_s[at - 1]:.9g} s; these rows are not used"
+            f"{counted(len(back), 'row is', 'rows are')} not later than the one before, first row {at + 1}: "
+            f"{t_s[at]:.9g} s after {latest_s[at - 1]:.9g} s; not used"
         )
         found.append(Finding("time", f"{file}: t_s", text, len(back)))
         good[back] = False

@@ -15,6 +15,7 @@ from bridge.faults import Fault
 from bridge.files import check_file
 from bridge.log.finding import Finding
 from bridge.tables.readers import Table, read_table
+from bridge.units import counted
 from diagnosis.evidence.column_checks import Columns, checked
 from diagnosis.evidence.exciter_harmonics import DISTORTED, Distortion, distortion
 from diagnosis.evidence.force_pickup import PICK_UP, PickUp, pick_up
@@ -161,7 +162,7 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
             yield (
                 "sign",
                 name,
-                f"{negative} samples are negative: must be 0 where it is off, above it else; not used there",
+                f"{counted(negative, 'sample is', 'samples are')} negative: must be 0 where it is off, above it else; not used",
             )
     rate_Hz = (len(t_s) - 1) / float(t_s[-1] - t_s[0])
     if len(given) == 2 and columns["vibration_amplitude_m"].any() and rate_Hz < SHAKE_RATE_HZ:

@@ -15,7 +15,7 @@ from bridge.log.finding import Finding
 from bridge.log.runlog import RunLog
 from bridge.tables.export import CHANNELS
 from bridge.tables.readers import Dialect, Table, read_table
-from bridge.units import unit_of
+from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
 from diagnosis.evidence.folder import examine
@@ -138,7 +138,7 @@ def _columns(table: Table, wanted: ImportMap, map_name: str) -> Columns:
     for name, values in columns.items():
         if len(values) != len(columns["t_s"]):
             line = (
-                f"{table.path.name}: column {wanted.channels[name].column}: {len(values)} rows: must have "
+                f"{table.path.name}: column {wanted.channels[name].column}: {counted(len(values), 'row')}: must have "
                 f"{len(columns['t_s'])}, as the time; every channel needs one value a sample"
             )
             raise Fault("BAD_TABLE", line)
@@ -247,7 +247,7 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
         findings.append(Finding("time", f"{path.name}: t_s", text))
     blocks = len(t_s) // _BLOCK_SAMPLES
     if left := len(t_s) - blocks * _BLOCK_SAMPLES:
-        text = f"the last {left} samples fill no block of {_BLOCK_SAMPLES} and were left out"
+        text = f"the last {counted(left, 'sample')} left out: too few for a block of {_BLOCK_SAMPLES}"
         findings.append(Finding("cut", path.name, text, left))
     missing = [name for name in CHANNELS if name not in columns]
     findings += [Finding("missing", f"{path.name}: {name}", "not in the source: zeros in the log") for name in missing]

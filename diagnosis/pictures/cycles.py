@@ -5,6 +5,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.units import counted
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment
@@ -118,7 +119,7 @@ def slip_picture(shown: ShownSegment, name: str, scales: Scales) -> Picture | No
         blocks = np.arange(len(values), dtype=np.float64)
         mean = np.mean([np.interp(middle + reach, blocks, values) for middle in middles], axis=0)
         curves.append(Curve(version.label, reach * BLOCK_S * 1e3, mean, version.style))
-    title = f"{_place(shown)}: mean of {count} slips, close up"
+    title = f"{_place(shown)}: mean of {counted(count, 'slip')}, close up"
     return Picture("cycle", title, "time after the middle of the slip [ms]", _AXES[name], tuple(curves))
 
 

@@ -86,18 +86,18 @@ def begins_late(tables: Tables) -> None:
 @pytest.mark.parametrize(
     ("change", "kind", "text"),
     [
-        (gap, "gap", "/sensors: 3 messages missing in 1 gaps, first 100 to 102"),
+        (gap, "gap", "/sensors: 3 messages missing in 1 gap, first 100 to 102"),
         (begins_late, "gap", "begins with block 7"),
-        (twice, "duplicate", "/command: numbers come a second time at 1 places, first 50"),
+        (twice, "duplicate", "/command: numbers come a second time at 1 place, first 50"),
         (late_one, "order", "/sensors: 2 messages came after a later one"),
         (two_runs, "two-runs", "numbers start again at 0 after"),
         (clipped, "clipped", "/sensors drive_force_N: "),
         (at_range, "clipped", "/sensors mass_accel_mps2: reaches the end of its range, 490.33"),
         (dead, "dead", "/sensors base_accel_mps2: constant at 0.25"),
         (not_finite, "not-finite", "/sensors mass_accel_mps2: 2 samples are no finite number, first after 0.010 s"),
-        (clock_jumps, "clock-jump", "/sensors: t_ns does not follow the numbers at 1 places, first 200"),
-        (clock_goes_back, "clock-jump", "/trace: t_ns does not follow the numbers at 1 places, first 200"),
-        (clock_goes_back, "log-time-back", "/trace: log_time goes back at 1 places, first 200: by 49 ms"),
+        (clock_jumps, "clock-jump", "/sensors: t_ns does not follow the numbers at 1 place, first 200"),
+        (clock_goes_back, "clock-jump", "/trace: t_ns does not follow the numbers at 1 place, first 200"),
+        (clock_goes_back, "log-time-back", "/trace: log_time goes back at 1 place, first 200: by 49 ms"),
         (late, "late", "/applied: 10.0 % of the messages were later than 1 ms"),
     ],
 )
@@ -114,7 +114,7 @@ def test_a_late_message_closes_its_gap(tmp_path: Path) -> None:
         tables["sensors"] = tables["sensors"][[*range(2), 3, 2, 4, *range(6, 400)]]
 
     found = kinds(doctored(tmp_path, change))
-    assert "/sensors: 1 messages missing in 1 gaps, first 5 to 5" in found["gap"]
+    assert "/sensors: 1 message missing in 1 gap, first 5 to 5" in found["gap"]
     assert "order" in found
 
 

@@ -217,7 +217,7 @@ def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value
     assert before.swing_N == pytest.approx(was.swing_N, rel=0.02)
     assert before.mean_force_N == pytest.approx(was.mean_force_N, rel=0.02)
     assert judge_run(spoilt).faults == [
-        "NOT_FINITE: /sensors drive_force_N: 2 blocks hold a sample that is no number, first 100; they were left out"
+        "NOT_FINITE: /sensors drive_force_N: 2 blocks hold a sample that is no number, first 100; left out"
     ]
     assert outcome(spoilt).drive_work_J == pytest.approx(outcome(sound).drive_work_J, rel=0.02)
 
@@ -235,7 +235,7 @@ def test_what_was_not_measured_is_no_velocity_ratio(tmp_path: Path) -> None:
     from_the_start = json.dumps({"block_s": 0.001, "policy": {"enabled_from_s": 0.0}})
     verdict = judge_run(run._replace(headers=run.headers | {"controller": {"configuration": from_the_start}}))
     assert verdict.faults == [
-        "NOT_FINITE: /sensors base_accel_mps2: 50 blocks hold a sample that is no number, first 250; they were left out"
+        "NOT_FINITE: /sensors base_accel_mps2: 50 blocks hold a sample that is no number, first 250; left out"
     ]
     assert (verdict.velocity_ratio_min, verdict.velocity_ratio_max) == (pytest.approx(1.2), pytest.approx(1.2))
 

@@ -85,11 +85,11 @@ def slow_accelerometer(data: Columns) -> None:
     ("change", "kind", "text", "unused", "rows"),
     [
         (spike_of_nan, "not-finite", "mass_accel_mps2: 2 samples are no finite number, first row 8", "", 3998),
-        (repeated_time, "time", "t_s: 1 rows are not later than the one before, first row 101", "", 3999),
+        (repeated_time, "time", "t_s: 1 row is not later than the one before, first row 101", "", 3999),
         (dead_sensor, "constant", "mass_accel_mps2: is 0 in every row; not used", "mass_accel_mps2", 4000),
         (accel_in_other_unit, "units", "mass_accel_mps2: reaches", "mass_accel_mps2", 4000),
         (clipped_force, "clipped", "drive_force_N: ", "", 4000),
-        (hole_in_time, "time-gap", "t_s: 1 gaps in time, first at 0.4995 s: 0.1", "", 4000),
+        (hole_in_time, "time-gap", "t_s: 1 gap in time, first at 0.4995 s: 0.1", "", 4000),
         (
             drive_in_mm,
             "units",
@@ -100,7 +100,7 @@ def slow_accelerometer(data: Columns) -> None:
         (mass_in_mm, "units", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
         (twice_as_fast, "units", "moves at 0.001 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
         (force_the_other_way, "sign", "drive_force_N: pulls against the drive's motion", "drive_force_N", 4000),
-        (wild_force, "wild", "drive_force_N: 2 samples are beyond 5214, first row 501: -9999; these rows", "", 3998),
+        (wild_force, "wild", "drive_force_N: 2 samples are beyond 5214, first row 501: -9999; not used", "", 3998),
         (negative_vibration, "sign", "vibration_amplitude_m: 4000 samples are negative", "", 4000),
         (slow_accelerometer, "rate", "mass_accel_mps2: 2000 Hz, below 8000 Hz: how strongly it vibrates", "", 4000),
     ],
@@ -235,11 +235,11 @@ def test_a_drive_that_rests_before_it_starts_is_not_cut_off(tmp_path: Path) -> N
     [
         (
             lambda values: np.where(np.arange(4000) < 2500, np.nan, values),
-            "2500 of 4000 samples are no finite number, first row 1",
+            "no finite number in 2500 of 4000 rows, first row 1",
         ),
         (
             lambda values: np.where(np.arange(4000) == 7, np.nan, values),
-            "1 of 4000 samples are no finite number, first row 8",
+            "no finite number in 1 of 4000 rows, first row 8",
         ),
         (lambda values: values * 1e6, "reaches 0.02: must be below 0.001, the unit cannot be right; set channels"),
     ],
