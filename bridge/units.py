@@ -32,6 +32,7 @@ def unit_of(name: str) -> str:
 _UNIT = re.compile(r"^(?:(.*?)_)?((?:Ns2|Ns|N|mps2|mps|m2|m|s|kg|Hz|rad)(?:_per_(?:N|m2|m|s))?|per_s)$")
 _SYMBOLS = {"mps2": "m/s²", "mps": "m/s", "Ns2": "N s²", "Ns": "N s", "m2": "m²", "per": "1"}
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+_PERSONS = {"coulomb", "stribeck"}
 _WITHOUT_PREFIX = {"", "%", "kg", "rad", "1/s"}
 
 
@@ -54,12 +55,17 @@ def name_and_unit(name: str) -> tuple[str, str]:
         return "relative change", "%"
     found = _UNIT.match(name)
     if found is None:
-        return name.replace("_", " "), ""
+        return _words(name), ""
     top, _, bottom = found[2].partition("_per_")
     if top.startswith("per_"):
         top, bottom = "per", top.removeprefix("per_")
     unit = _SYMBOLS.get(top, top) + (f"/{_SYMBOLS.get(bottom, bottom)}" if bottom else "")
-    return (found[1] or name).replace("_", " "), unit
+    return _words(found[1] or name), unit
+
+
+def _words(name: str) -> str:
+    """Parts of a name as words; those after a person are capital."""
+    return " ".join(part.capitalize() if part in _PERSONS else part for part in name.split("_"))
 
 
 def quantity(value: float, unit: str) -> str:

@@ -10,6 +10,7 @@ from bridge.log.finding import Finding
 
 Floats = npt.NDArray[np.floating[Any]]
 FORMAT = "diagnosis/1"
+PARAMETERS = "parameters alone"  # the baseline among what is compared on the held-out runs
 
 
 class Estimate(NamedTuple):
@@ -45,7 +46,7 @@ class Shrinkage(NamedTuple):
     `retuned` is the gap of the baseline.
     """
 
-    who: str  # the effect or effects, "parameters alone", "flexible residual"
+    who: str  # the effect or effects, PARAMETERS, "flexible residual"
     gap: float
     shrinkage: float | None  # None: there was no gap to close
     interval_90: tuple[float, float] | None

@@ -22,10 +22,10 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
     gap, after = diagnosis.gap, diagnosis.next_experiment
     lines = [words.headline(diagnosis), *diagnosis.summary]
     for label, one in zip(("candidates", "", ""), diagnosis.candidates[:_SHOWN_CANDIDATES], strict=False):
-        sizes = "; ".join(words.estimate_in_words(*item) for item in one.parameters.items())
+        sizes = "; ".join(words.estimate_in_words(one.effect, *item) for item in one.parameters.items())
         lines.append(f"{label:<10} {one.effect:<28} {units.percent(one.probability):>8}   {sizes}".rstrip())
     if gap.runs:
-        numbers = [f"{units.times(gap.nominal)} as described", f"{units.times(gap.retuned)} retuned"]
+        numbers = [f"{units.times(gap.nominal)} as described", f"{units.times(gap.retuned)} baseline"]
         if diagnosis.effects:
             numbers.append(f"{units.times(gap.with_effect)} with {' and '.join(diagnosis.effects)}")
         shrinkage = "" if gap.shrinkage is None else f"; {words.closed_in_words(gap.shrinkage)} of the gap closed"

@@ -4,12 +4,13 @@ import math
 from typing import Any
 
 from diagnosis.blind.outcomes import Opened
+from diagnosis.result import PARAMETERS
 
 Said = dict[str, Any]
 # Gap that the baseline leaves on held-out runs, in noise floors, from which these methods say that there is a gap.
 # Too small: rigs without a gap get one. Too large: small effects are missed. Counted: docs/method/blind.md.
 _NO_GAP = 1.25
-PARAMETERS, FLEXIBLE = "parameters alone", "flexible residual"
+FLEXIBLE = "flexible residual"
 
 
 def parameters_only(case: Opened) -> Opened:

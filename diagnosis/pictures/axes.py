@@ -44,7 +44,7 @@ Y: Final = {
     "friction": Axis("friction force - friction law [N]", 1.0),
 }
 TITLES: Final = {
-    BREAKAWAY: "Breakaway force against the retuned static friction, without vibration",
+    BREAKAWAY: "Breakaway force against the baseline's static friction, without vibration",
     "spring": "Does the spring pull as it is extended? Zero if it does",
     "curvature": "Does the force bend as the mass accelerates? Zero if it does",
     "motion": "Do accelerometer and displacement agree? Zero if they do",

@@ -24,7 +24,7 @@ def pictures(
     """
     models = [
         Overlay("rig as described", "nominal", {run.file: problem.signals(run, nominal) for run in problem.runs}),
-        Overlay("retuned", "retuned", {run.file: problem.signals(run, baseline) for run in problem.runs}),
+        Overlay("baseline", "retuned", {run.file: problem.signals(run, baseline) for run in problem.runs}),
     ]
     if named is not None:
         label = "with " + " and ".join(effects)

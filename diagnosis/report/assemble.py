@@ -25,7 +25,7 @@ from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.pictures.choice import pictures
 from diagnosis.report.summary import summary
-from diagnosis.result import Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
+from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.verdict.blend import flexible_differences
 from diagnosis.verdict.confirmation import Confirmation
 from diagnosis.verdict.held_out import Closed, HeldOut
@@ -133,7 +133,7 @@ def _judged(contest: Contest, outcome: Confirmation, held_out: HeldOut, tried: l
         _shrinkage(" and ".join(fit.hypothesis.effects), held_out.closed_by(fit))
         for fit in compared_fits(verdict, gone)
     ]
-    compared.append(_shrinkage("parameters alone", held_out.closed_by(baseline)))
+    compared.append(_shrinkage(PARAMETERS, held_out.closed_by(baseline)))
     blend = flexible_differences(fitter, baseline, tried, held_out, jobs)
     compared.append(_shrinkage("flexible residual", held_out.closed_by_differences(blend)))
     named = verdict.named is not None

@@ -62,6 +62,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
     environment.filters |= {
         "percent": units.percent,
         "times": units.times,
+        "who": words.who_in_words,
         "closed": words.closed_in_words,
         "closed_between": words.closed_between,
         "sd": lambda shift: f"{shift:+.1f}",
@@ -91,7 +92,9 @@ def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
 
 
 def _estimates(candidate: Candidate) -> list[str]:
-    return [words.estimate_in_words(name, estimate) for name, estimate in candidate.parameters.items()]
+    return [
+        words.estimate_in_words(candidate.effect, name, estimate) for name, estimate in candidate.parameters.items()
+    ]
 
 
 def _meaning(effect: str) -> str:
@@ -101,7 +104,7 @@ def _meaning(effect: str) -> str:
 
 def gap_bars(gap: Gap, named: bool) -> list[GapBar]:
     """Bars for the rig as described, the baseline, and the named effect if there is one; a gap of NaN has no width."""
-    bars = [("the rig as described", gap.nominal, "nominal"), ("retuned inside its tolerances", gap.retuned, "retuned")]
+    bars = [("the rig as described", gap.nominal, "nominal"), ("baseline", gap.retuned, "retuned")]
     if named:
         bars.append(("with the best explanation", gap.with_effect, "effect"))
     widest = _widest(gap)

@@ -37,7 +37,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             explain, it = ("explains", "it") if len(gap.refuted) == 1 else ("explain", "them")
             sentences.append(
                 f"{names} {explain} the runs that were fitted, but not {', '.join(gap.runs)}, held out: "
-                f"there the gap is {times(with_it)} noise floors with {it}, {times(gap.retuned)} without."
+                f"there the gap is {times(with_it)} noise floors with {it}, {times(gap.retuned)} for the baseline."
             )
         nearest = next((one for one in diagnosis.candidates if one.effect not in ("none", "unexplained")), None)
         if nearest is not None and nearest.form == "random":
@@ -56,7 +56,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     if gap.runs and math.isfinite(gap.nominal):
         sentences.append(
             f"On {', '.join(gap.runs)}, held out, rig and model are {times(gap.nominal)} noise floors apart as described, and "
-            f"{times(gap.retuned)} after refitting the rig's numbers inside their tolerances; 1 is a perfect model."
+            f"{times(gap.retuned)} for the baseline, which is refitted inside its tolerances; 1 is a perfect model."
             + (
                 " So the gap shows in the fitted runs alone."
                 if unexplained and not vibrating and gap.retuned <= 1.0
@@ -68,7 +68,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
     sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
     for i, name in enumerate(diagnosis.effects):
         candidate = next(one for one in diagnosis.candidates if one.effect == name)
-        numbers = ", ".join(estimate_in_words(*item) for item in candidate.parameters.items())
+        numbers = ", ".join(estimate_in_words(name, *item) for item in candidate.parameters.items())
         says = "explains it" if i == 0 else "is needed besides"
         if len(diagnosis.effects) > 1 and i == 0:
             says = f"explains it together with {diagnosis.effects[1]}"

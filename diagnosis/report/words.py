@@ -5,12 +5,13 @@ from typing import Final
 
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, times
 from diagnosis.hypotheses.catalogue import CATALOGUE
-from diagnosis.result import Diagnosis, Estimate
+from diagnosis.result import PARAMETERS, Diagnosis, Estimate
 
 EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "none": "the rig as described, inside its tolerances, is enough",
     "unexplained": "there is a gap, and nothing in the library closes it",
 }
+_BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # by effect and parameter
 # Noise floors that the baseline may leave on held-out runs for an answer of "no gap". Too small: a good "no gap" is doubted.
 # Too large: a gap that shows only on held-out runs is not told. Counted: docs/method/report.md.
 _FAR_FOR_NO_GAP = 2.0
@@ -53,8 +54,16 @@ def closed_between(interval_90: tuple[float, float] | None) -> str:
     return interval(interval_90 and (min(interval_90[0], 1.0), min(interval_90[1], 1.0)))
 
 
-def estimate_in_words(name: str, estimate: Estimate) -> str:
-    """A parameter in words, such as `gap 81 µm (90 %: 76 to 86)`; an interval that is not finite is left out."""
+def who_in_words(who: str) -> str:
+    """What is compared on the held-out runs, in the glossary's word; an effect keeps its name."""
+    return "baseline" if who == PARAMETERS else who
+
+
+def estimate_in_words(effect: str, name: str, estimate: Estimate) -> str:
+    """A parameter in words, such as `gap 81 µm (90 %: 76 to 86)`; an interval that is not finite is left out.
+
+    Where the number is below 0 and the effect is called after the opposite, it is said what the number is.
+    """
     word, unit = name_and_unit(name)
     low, high = estimate.interval_90
     known = math.isfinite(low) and math.isfinite(high)
@@ -62,8 +71,7 @@ def estimate_in_words(name: str, estimate: Estimate) -> str:
     factor, shown = prefixed(max(sizes), unit)
     digits = decimals_of((high - low) * factor) if known and high > low else None
     text = f"{word} {fixed_digits(estimate.value * factor, digits)} {shown}".rstrip()
-    return (
-        f"{text} (90 %: {fixed_digits(low * factor, digits)} to {fixed_digits(high * factor, digits)})"
-        if known
-        else text
-    )
+    if known:
+        text += f" (90 %: {fixed_digits(low * factor, digits)} to {fixed_digits(high * factor, digits)})"
+    below = _BELOW_0.get((effect, name))
+    return f"{text}, {below}" if below and estimate.value < 0.0 else text

@@ -12,7 +12,7 @@ def lines(found: Diagnosis) -> list[str]:
     gap = found.gap
     said = [f"verdict     {found.verdict}: {headline(found)}"]
     for one in found.candidates[:_SHOWN]:
-        sizes = "; ".join(estimate_in_words(*item) for item in one.parameters.items())
+        sizes = "; ".join(estimate_in_words(one.effect, *item) for item in one.parameters.items())
         said.append(f"candidate   {one.effect} {percent(one.probability)}{': ' if sizes else ''}{sizes}")
     said += [f"alike       {', '.join(group)}" for group in found.not_distinguishable]
     said.append(

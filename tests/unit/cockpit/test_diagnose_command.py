@@ -48,7 +48,9 @@ def test_one_folder_says_the_verdict_first(tmp_path):
     ]
     assert "drive-hardening" in lines[4]
     assert "unexplained" in lines[5]
-    assert lines[6].startswith("gap        6.2 as described, 5.9 retuned, 1.08 with drive-backlash; perfect is 1; 98 %")
+    assert lines[6].startswith(
+        "gap        6.2 as described, 5.9 baseline, 1.08 with drive-backlash; perfect is 1; 98 %"
+    )
     assert lines[7].startswith("next       Reverse the drive")
     assert lines[8:] == [
         "data       run-01.parquet: base_accel_mps2: not there: what the piezo delivers cannot be seen",

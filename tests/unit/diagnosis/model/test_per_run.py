@@ -90,7 +90,7 @@ def test_a_rig_file_has_the_phase_of_the_first_run():
 
 
 def test_a_phase_is_named_with_its_run():
-    assert estimate_in_words(phase_of("run-02.csv"), Estimate(1.234, (1.13, 1.33))) == (
+    assert estimate_in_words("normal-load-fluctuation", phase_of("run-02.csv"), Estimate(1.234, (1.13, 1.33))) == (
         "phase in run-02.csv 1.23 rad (90 %: 1.13 to 1.33)"
     )
 
