@@ -1,6 +1,7 @@
 """Strict configuration from TOML: a misspelt or out-of-range key is one clear line, never a default."""
 
 import re
+import reprlib
 import tomllib
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -10,6 +11,7 @@ from typing import Annotated, Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bridge.faults import Fault
+from bridge.files import check_file
 
 
 class Strict(BaseModel):
@@ -28,15 +30,19 @@ _COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 
 T = TypeVar("T", bound=Strict)
 
+# of a value in a line of a fault: a file may hold a text of megabytes, or tables 1000 deep, which Python's own repr cannot show
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 200
+in_short = _SHORT.repr
+
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read one TOML file. Raises Fault CONFIG when it cannot be read or is not TOML."""
+    check_file(path, "CONFIG", "give the path of a TOML file")  # also no pipe, which nobody may ever write into
     text = ""
     try:
         text = path.read_bytes().decode("utf-8-sig")  # Notepad marks what it saves as UTF-8
         return tomllib.loads(text)
-    except FileNotFoundError:
-        raise Fault("CONFIG", f"{path}: no such file; give the path of a TOML file") from None
     except OSError as error:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
     except UnicodeDecodeError as error:
@@ -58,7 +64,7 @@ def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, 
 
     Raises Fault CONFIG when a setting has no `=`, or goes below a value that is not a table.
     """
-    result = _copied(table)
+    result = dict(table)
     for setting in settings:
         key, separator, text = setting.partition("=")
         if not separator:
@@ -70,9 +76,11 @@ def with_overrides(table: dict[str, Any], settings: Iterable[str]) -> dict[str, 
         at = result
         parts = key.strip().split(".")
         for part in parts[:-1]:
-            at = at.setdefault(part, {})
-            if not isinstance(at, dict):
+            inner = at.get(part, {})
+            if not isinstance(inner, dict):
                 raise Fault("CONFIG", f"--set {setting}: {part} is a value, not a table; nothing lies below it")
+            at[part] = dict(inner)
+            at = at[part]
         at[parts[-1]] = value
     return result
 
@@ -86,10 +94,6 @@ def blamed(fault: Fault, source: str, settings: Sequence[str]) -> Fault:
         place = ", ".join(f"--set {setting}" for setting in about or settings)
         lines.append(line.replace(f"{source}: ", f"{place}: ", 1) if line.startswith(f"{source}: ") else line)
     return Fault(fault.kind.code, "\n".join(lines))
-
-
-def _copied(table: dict[str, Any]) -> dict[str, Any]:
-    return {key: _copied(value) if isinstance(value, dict) else value for key, value in table.items()}
 
 
 def validate(model: type[T], table: dict[str, Any], source: str) -> T:
@@ -120,7 +124,8 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
         known = _keys_beside(model, path)
         near = get_close_matches(path[-1], known, 1, _MISSPELT)
         remedy = f"perhaps {near[0]}; " if near else ""
-        return f"{source}: {key} = {problem['input']!r}: unknown key; {remedy}known here: {', '.join(known) or 'none'}"
+        shown = in_short(problem["input"])
+        return f"{source}: {key} = {shown}: unknown key; {remedy}known here: {', '.join(known) or 'none'}"
     if kind == "missing":
         return f"{source}: {key}: missing; add it"
     message: str = problem["msg"].removeprefix("Value error, ")
@@ -129,16 +134,17 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
     if kind in {"float_type", "int_type"} and isinstance(problem["input"], str):
         comma = _COMMA.fullmatch(problem["input"].strip())
         remedy = f"write a decimal point: {comma[0].replace(',', '.')}" if comma else "write it without quotes"
-        return f"{source}: {key} = {problem['input']!r}: must be a number; {remedy}"
+        return f"{source}: {key} = {in_short(problem['input'])}: must be a number; {remedy}"
     if kind in {"model_type", "dict_type"}:
         needed = [name for name, field in _fields(_model_at(model, path)).items() if field.is_required()]
         inside = ", ".join(f"{name} = VALUE" for name in needed or ["KEY"])
-        return f"{source}: {key} = {problem['input']!r}: must be a table; write {path[-1] if path else 'it'} = {{ {inside} }}"
+        name = path[-1] if path else "it"
+        return f"{source}: {key} = {in_short(problem['input'])}: must be a table; write {name} = {{ {inside} }}"
     if kind == "list_type" and isinstance(problem["input"], dict):
         return f"{source}: {key}: is one table: must be a list of them; write [[{key}]] above each"
     rule = message[:1].lower() + message[1:]
     rule = rule.replace("input should be", "must be")
-    return f"{source}: {key} = {problem['input']!r}: {rule}; change the value"
+    return f"{source}: {key} = {in_short(problem['input'])}: {rule}; change the value"
 
 
 def _keys_beside(model: type[Strict], path: list[str]) -> list[str]:

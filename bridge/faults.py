@@ -109,10 +109,17 @@ FAULTS = {
             "to the environment that has stickslip; with pipx or uv, install stickslip anew with [all]. Nothing was started.",
         ),
         FaultKind(
+            "NO_MEMORY",
+            13,
+            "A command needed more memory than the machine, or a limit set for the command, allows. The line names the files it "
+            "was given. A log that claims far more than a run of its length is damaged, or made to do this: do not trust it. "
+            "Else end other programs, raise the limit, or take a part of the file.",
+        ),
+        FaultKind(
             "INTERRUPTED",
             130,
-            "Somebody pressed Ctrl-C. In real time the vibration was ramped down first. A log that was being written is closed, "
-            "what is done stays, and every process has ended.",
+            "Somebody pressed Ctrl-C, ended the command (SIGTERM), or closed its terminal (SIGHUP). In real time the vibration "
+            "was ramped down first. A log that was being written is closed, what is done stays, and every process has ended.",
         ),
     )
 }

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +34,13 @@ _BEGINS = {LOG: (b"\x89MCAP",), JSON: (b"{", b"[")}
 
 
 def refuse_to_replace(path: Path, kind: str, place: str) -> None:
-    """Raise Fault CONFIG where `path` is a file that is not of this kind (LOG or JSON), which would be lost.
+    """Raise Fault CONFIG where `path` is a file that is not of this kind (LOG or JSON), or a log would go into a pipe.
 
     `place` is what the error names: the option that gave the path, or the path.
     """
     try:
+        if kind == LOG and (path.is_fifo() or path.is_socket()):  # would wait for a reader, and cannot be read again
+            raise Fault("CONFIG", f"{place}: is no file on a disk, which a log must be; choose another file")
         if not path.is_file() or path.stat().st_size == 0:
             return
         with path.open("rb") as file:
@@ -46,6 +49,19 @@ def refuse_to_replace(path: Path, kind: str, place: str) -> None:
         return
     if not begins.startswith(_BEGINS[kind]):
         raise Fault("CONFIG", f"{place}: {path.name} is there and is no {kind}, it would be lost; choose another file")
+
+
+def refuse_to_lose(inputs: Iterable[Path], what: str, option: str, path: Path | None) -> None:
+    """Raise Fault CONFIG where `path`, which `option` names, is one of `inputs` by any name; a hard link is one too."""
+    if path is not None and any(_same_file(path, one) for one in inputs):
+        raise Fault("CONFIG", f"{option} {path}: is {what}, which would be lost; choose another file")
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except (OSError, ValueError):  # one of them is not there, or no file can have its name
+        return False
 
 
 def shown(path: Path) -> str:

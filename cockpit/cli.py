@@ -3,6 +3,7 @@
 import logging
 import os
 import platform
+import sys
 from importlib.metadata import version
 from typing import Annotated
 
@@ -20,6 +21,7 @@ from cockpit.commands.replay import replay_command
 from cockpit.commands.run import run
 from cockpit.commands.scenarios import scenarios
 from cockpit.commands.schema import schema
+from cockpit.run.child_process import guarded, prepare_stdout
 
 app = typer.Typer(
     cls=JsonGroup,
@@ -112,6 +114,19 @@ def main() -> None:
     # for joblib, which starts its workers with `python -m`: the folder of the person who calls would be searched first, and
     # may hold a plant.py or numpy.py of that person's own
     os.environ["PYTHONSAFEPATH"] = "1"
+    os.environ["MPLBACKEND"] = (
+        "Agg"  # pictures are files; matplotlib refuses to start where the variable names none it knows
+    )
     # a picture looks the same where a read-only home keeps no cache of its fonts, of which matplotlib warns in two lines
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    app()
+    prepare_stdout()
+    sys.exit(guarded(_status))
+
+
+def _status() -> int:
+    """Exit status of the command line; help and version are guarded as results are."""
+    try:
+        app()
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 0
+    return 0

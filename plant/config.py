@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from bridge.config import Strict, Two, read_toml, validate
+from bridge.config import Strict, Two, in_short, read_toml, validate
 from plant.effects.library import checked
 from plant.effects.sensors import LONGEST_DELAY
 from plant.pairs import PAIRS
@@ -17,6 +17,9 @@ NotNegative = Annotated[float, Field(ge=0)]
 # Steps of the solver in a period of the vibration, and of the slide on its spring. Fewer: slips that are not real, and peaks of
 # force that are off. More: sound rigs are refused. Counted: docs/method/plant.md.
 _FEWEST_STEPS_A_PERIOD = 20
+# Steps of the solver in a block. A step takes 0.04 to 0.06 us (measured with steps of 0.1 us, two rigs): this many take 50 ms,
+# 50 times real time with blocks of 1 ms. More: a run seems to hang, in a kernel that Ctrl-C does not reach.
+_MOST_STEPS_A_BLOCK = 1_000_000
 
 
 class ContactConfig(Strict):
@@ -51,7 +54,7 @@ class ContactConfig(Strict):
         if not isinstance(table, dict) or "pair" not in table or table["pair"] == "":
             return table
         if not isinstance(table["pair"], str) or table["pair"] not in PAIRS:
-            raise ValueError(f"pair = {table['pair']!r}: unknown friction pair; known: {', '.join(PAIRS)}")
+            raise ValueError(f"pair = {in_short(table['pair'])}: unknown friction pair; known: {', '.join(PAIRS)}")
         return PAIRS[table["pair"]] | table
 
     @model_validator(mode="after")
@@ -167,6 +170,11 @@ class RigConfig(Strict):
                 f"solver.step_s = {solver.step_s:g}: too coarse for piezo.frequency_max_Hz = {piezo.frequency_max_Hz:g}: "
                 f"below {_FEWEST_STEPS_A_PERIOD} steps a period the contact shows slips that are not real; "
                 f"use {coarsest_s:g} or less, or lower the frequency"
+            )
+        if solver.block_s / solver.step_s > _MOST_STEPS_A_BLOCK:
+            raise ValueError(
+                f"solver.step_s = {solver.step_s:g}: must not make more than {_MOST_STEPS_A_BLOCK:g} steps in solver.block_s = "
+                f"{solver.block_s:g}, which takes 50 ms or so; lengthen it to {solver.block_s / _MOST_STEPS_A_BLOCK:g} or more"
             )
         steps = solver.block_s / (solver.step_s * solver.samples_per_block)
         if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:

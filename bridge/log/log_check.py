@@ -1,15 +1,16 @@
 """Check of a run log in one pass; the memory does not grow with the log."""
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bridge.faults import Fault
 from bridge.files import check_file
 from bridge.log.finding import Finding
 from bridge.log.log_reader import Damage
 from bridge.log.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
+from bridge.log.metadata import configuration_of, is_number, number_of
 from bridge.log.signal_range import Signal, SignalLook
 from bridge.log.topic_watch import TopicWatch
 from bridge.units import counted
@@ -91,12 +92,11 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
     findings = _of_file(path, reader, seen)
     for watch in seen.topics.values():
         findings += watch.findings()
-    plant = _table(reader, "plant", "configuration")
-    absent = _table(reader, "import", "missing")
+    findings += _of_configurations(reader)
+    absent = reader.metadata.get("import", {}).get("missing", "")
     for name, signal in seen.signals.items():
         if seen.topics["sensors"].messages and name not in absent:
-            limit = plant.get("rig", {}).get("sensors", {}).get(_RANGES[name]) if isinstance(plant, dict) else None
-            findings += _of_signal("/sensors " + name, signal.result(), _sample_s(seen), limit)
+            findings += _of_signal("/sensors " + name, signal.result(), _sample_s(seen), _limit(reader, _RANGES[name]))
     shares = {f"/{name}": late / max(seen.topics[name].messages, 1) for name, late in seen.late.items()}
     for where, share in shares.items():
         if share > LATE_SHARE:
@@ -111,12 +111,29 @@ def _sample_s(seen: _Pass) -> float:
     return seen.period_ns / 1e9 / max(seen.samples_per_block, 1)
 
 
-def _table(reader: LogReader, name: str, key: str) -> Any:
-    """A table that the log holds as JSON; empty where it is missing or damaged."""
+def _limit(reader: LogReader, name: str) -> float | None:
+    """The range of a sensor; None where the plant does not tell."""
     try:
-        return json.loads(reader.metadata[name][key])
-    except (KeyError, json.JSONDecodeError):
-        return {}
+        limit = configuration_of(reader.metadata, "plant", reader.path)["rig"]["sensors"][name]
+    except (Fault, KeyError, TypeError, IndexError):
+        return None
+    return float(limit) if is_number(limit) else None
+
+
+def _of_configurations(reader: LogReader) -> list[Finding]:
+    """A finding for each process whose configuration cannot be used; an imported log has none."""
+    found: list[Finding] = []
+    if "import" in reader.metadata:
+        return found
+    for role in ("controller", "plant"):
+        try:
+            table = configuration_of(reader.metadata, role, reader.path)
+            if role == "controller":
+                number_of(table, "block_s", reader.path)
+        except Fault as fault:
+            text = fault.line.removeprefix(f"{reader.path}: ").partition("; ")[0]
+            found.append(Finding("configuration", reader.path.name, text))
+    return found
 
 
 def damage_findings(damage: Damage, path: Path) -> list[Finding]:
@@ -160,7 +177,7 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
     if seen.topics["sensors"].messages == 0:
         found.append(Finding("empty", path.name, "holds no sensor block"))
     for event in seen.events:
-        dropped = re.search(r"dropped=(\d+)", event.text)
+        dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
         if event.code in {"DROPPED", "PLANT_LOST", "STALE"}:
             found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", event.text))
         elif dropped and int(dropped[1]):

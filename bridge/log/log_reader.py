@@ -50,6 +50,11 @@ class Damage(NamedTuple):
     closed: bool  # the file has its footer
     bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
 
+    @property
+    def whole(self) -> bool:
+        """Whether the log was closed and everything in it could be read."""
+        return self.closed and not (self.cut_bytes or self.bad_chunks or self.bad_records)
+
 
 class LogReader:
     """One pass over a log. `damage` is complete after the pass; `metadata` and `channels` grow during it."""

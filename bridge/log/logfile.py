@@ -2,7 +2,6 @@
 
 import contextlib
 import fcntl
-import json
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +15,7 @@ from bridge.files import LOG, check_file, refuse_to_replace
 from bridge.kernel import kernel
 from bridge.log.log_reader import CHANNEL, END, LOG_TIME, START, Bytes, Damage, LogReader, MessageRows
 from bridge.log.mcap_chunks import ChunkWriter
+from bridge.log.metadata import configuration_of
 from bridge.log.runlog import LIBRARY
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import (
@@ -162,18 +162,7 @@ class RunData(NamedTuple):
 
     def configuration(self, role: str) -> dict[str, Any]:
         """The configuration of `role`, every default included. Raises Fault BAD_LOG when the log has none."""
-        text = self.headers.get(role, {}).get("configuration")
-        if text is None:
-            line = f"{self.path}: holds no configuration of the {role}; it was not there when it was recorded"
-            if "import" in self.headers:
-                line = f"{self.path}: is measured data of another program, imported, without a {role}: there is no run to judge"
-            remedy = "`stickslip log check` and `log export` read it, and `diagnose` as a run of an evidence folder"
-            raise Fault("BAD_LOG", f"{line}; {remedy}")
-        try:
-            return json.loads(text)
-        except json.JSONDecodeError:
-            line = f"{self.path}: the configuration of the {role} is damaged; take another copy of the log"
-            raise Fault("BAD_LOG", line) from None
+        return configuration_of(self.headers, role, self.path)
 
 
 def read_run(path: Path) -> RunData:

@@ -51,6 +51,7 @@ class RunLog:
         self._last_t_ns = 0
         self._events = 0
         self._whole_bytes = 0
+        self._whole_t_ns: int | None = None  # of the latest message in a chunk that is whole in the file
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
         refuse_to_replace(path, LOG, str(path))
         try:
@@ -152,13 +153,20 @@ class RunLog:
             write()
             self._file.flush()
             self._whole_bytes = self._file.tell()
+            if self._next and not self._writer.open_bytes:
+                self._whole_t_ns = self._last_t_ns
         except OSError as error:
             self._end_without_index()
-            line = (
-                f"{self.path}: {error.strerror}; the log was closed at {self._last_t_ns * 1e-9:.2f} s, what came before "
-                f"is kept; free space, then `stickslip log recover {self.path}` gives it its index back"
-            )
-            raise Fault("LOG_WRITE", line) from None
+            raise Fault("LOG_WRITE", f"{self.path}: {error.strerror}; {self._kept()}") from None
+
+    def _kept(self) -> str:
+        """What is in the file that a fault has closed, and what to do."""
+        if self._whole_t_ns is None:
+            return "the log was closed before anything was recorded; free space, or choose another --log"
+        return (
+            f"the log was closed at {self._whole_t_ns * 1e-9:.2f} s, what came before is kept; free space, then "
+            f"`stickslip log recover {self.path}` gives it its index back"
+        )
 
     def _end_without_index(self) -> None:
         """Close the file after its last whole chunk, with 50 bytes; removing the chunk that did not fit makes room for them."""

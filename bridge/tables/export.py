@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from bridge.faults import Fault
-from bridge.files import check_file
+from bridge.files import check_file, refuse_to_lose
 from bridge.log.logfile import STREAMING, Damage, LogReader, block_period_ns, iter_pieces, sample_times_s
 from bridge.tables.writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
 from bridge.wire.messages import CHANNELS, Records
@@ -53,6 +53,8 @@ def export(
     """
     check_request(to, topics, from_s, until_s)
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    for file in _files(to, topics).values():
+        refuse_to_lose([path], "the log", "--to", file)
     reader = LogReader(path)
     owners: list[TableWriter | MatFile] = []
     finished = False
@@ -75,13 +77,18 @@ def export(
     return Exported(files, rows, reader.damage)
 
 
+def _files(to: Path, topics: list[str]) -> dict[str, Path]:
+    """The file of each topic."""
+    if to.suffix == ".mat" or len(topics) == 1:
+        return dict.fromkeys(topics, to)
+    return {topic: to.with_name(f"{to.stem}.{topic}{to.suffix}") for topic in topics}
+
+
 def _writers(to: Path, topics: list[str]) -> dict[str, TableWriter]:
     if to.suffix == ".mat":
         file = MatFile(to)
         return {topic: MatTable(file, topic) for topic in topics}
-    if len(topics) == 1:
-        return {topics[0]: ArrowTable(to)}
-    return {topic: ArrowTable(to.with_name(f"{to.stem}.{topic}{to.suffix}")) for topic in topics}
+    return {topic: ArrowTable(path) for topic, path in _files(to, topics).items()}
 
 
 def _stream(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from bridge.faults import Fault
+from bridge.files import refuse_to_lose
 from cockpit.commands.json_option import Json, JsonGroup, carry_out, tell
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import PAGE, check_output, writing
@@ -93,8 +94,8 @@ def blind_score(
         from diagnosis.blind.opening import open_set, with_baselines
 
         end_like_ctrl_c()
-        if as_json is not None and as_json.resolve() == key.resolve():
-            raise Fault("CONFIG", f"--json {as_json}: is the key, which would be lost; choose another")
+        for option, path in (("--json", as_json), ("--report", report)):
+            refuse_to_lose([key], "the key", option, path)
         if report is not None:
             check_output("--report", report, PAGE)
         with writing(), watched() as progress:
@@ -122,10 +123,7 @@ def blind_pool(
         if report is not None:
             check_output("--report", report, PAGE)
         for option, path in (("--json", as_json), ("--report", report)):
-            if path is not None and path.resolve() in {file.resolve() for file in files}:
-                raise Fault(
-                    "CONFIG", f"{option} {path}: is one of the files to read, which would be lost; choose another"
-                )
+            refuse_to_lose(files, "one of the files to read", option, path)
         _told(pooled(files), ", ".join(path.stem for path in files), as_json, report)
 
     carry_out(work, as_json)

@@ -58,17 +58,10 @@ def _lost(damage: "Damage") -> str:
     """What could not be read, in words; empty when all could."""
     parts = [f"{counted(damage.cut_bytes, 'byte')} of an open chunk at the end"] if damage.cut_bytes else []
     parts += [counted(damage.bad_chunks, "damaged chunk")] if damage.bad_chunks else []
-    parts += (
-        [
-            counted(
-                damage.bad_records,
-                "damaged definition, message or stretch",
-                "damaged definitions, messages or stretches",
-            )
-        ]
-        if damage.bad_records
-        else []
-    )
+    if damage.bad_records:
+        names = "damaged definition, message or stretch", "damaged definitions, messages or stretches"
+        parts.append(counted(damage.bad_records, *names))
+    parts += ["its end"] if not (parts or damage.whole) else []
     return "lost: " + ", ".join(parts) if parts else ""
 
 
@@ -83,7 +76,7 @@ def log_export(
     end: Annotated[str, typer.Option("--until", help="Up to this time of the run, e.g. 20s.")] = "",
     as_json: Json = None,
 ) -> None:
-    """Write a log as tables: sensors one row a sample, the other topics one row a message; exit status 1 with no row."""
+    """Write a log as tables, sensors one row a sample, others one row a message; exit status 1: no row, or a damaged log."""
 
     def work() -> int:
         from bridge.log.logfile import STREAMING
@@ -101,7 +94,7 @@ def log_export(
         words += [str(file) for file in written.files] or [nothing]
         lost = _lost(written.damage)
         tell(as_json, written, [*words, f"warning  the log is damaged; {lost}"] if lost else words)
-        return 0 if written.files else 1
+        return 0 if written.files and not lost else 1
 
     carry_out(work, as_json)
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bridge.faults import Fault
-from bridge.files import check_file
+from bridge.files import check_file, refuse_to_lose
 from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO
 from cockpit.run.writable import PAGE, PICTURE, check_output, writing
@@ -40,8 +39,7 @@ def plot(
 
         check_file(log, "BAD_LOG", "give the path of a run log, .mcap")
         picture = out or log.parent / f"{log.stem}.png"
-        if picture.resolve() == log.resolve():
-            raise Fault("CONFIG", f"--out {picture}: is the log, which the picture would replace; choose another file")
+        refuse_to_lose([log], "the log", "--out", picture)
         with _written(picture, PICTURE):
             verdict = plot_run(log, picture)
         tell(as_json, {"picture": picture} | verdict.as_dict(), [f"picture  {picture}"])

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
-from bridge.files import check_file
+from bridge.files import check_file, refuse_to_lose
 from bridge.units import counted
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Prefix, as_settings
@@ -49,7 +49,7 @@ def replay_command(
     prefix: Prefix = None,
     as_json: Json = None,
 ) -> None:
-    """Feed a log to today's controller: the same bits (exit 0), or the first difference (exit 1)."""
+    """Feed a log to today's controller: the same bits (exit 0), or the first difference or a damaged log (exit 1)."""
 
     def work() -> int:
         from cockpit.run import replay as replaying
@@ -94,9 +94,7 @@ def replay_command(
             if from_s > 0.0:
                 line = f"--from {start}: not with --closed-loop, which simulates the run from its start; leave it out"
                 raise Fault("CONFIG", line)
-            if out.resolve() == logs[0].resolve():
-                line = f"--log {out}: is the recorded run, which the new one would replace; choose another file"
-                raise Fault("CONFIG", line)
+            refuse_to_lose(logs, "the recorded run", "--log", out)
             compared = replaying.closed_loop(logs[0], settings, out)
             tell(as_json, compared, compared.in_words())
             return 0
@@ -106,6 +104,6 @@ def replay_command(
             if as_json != STDOUT:
                 print("\n".join(replayed[-1].in_words()), flush=True)  # the next log may be a bad one
         tell(as_json, replayed, [])
-        return 0 if all(one.identical for one in replayed) else 1
+        return 0 if all(one.identical and not one.damage for one in replayed) else 1
 
     carry_out(work, as_json)

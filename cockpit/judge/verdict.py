@@ -1,14 +1,15 @@
 """What came of a run, read from its log alone: in numbers for scripts and in words for a mechanic."""
 
 import math
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.faults import Fault
 from bridge.log.log_check import damage_findings
 from bridge.log.logfile import RunData, read_run
+from bridge.log.metadata import number_of
 from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
@@ -19,6 +20,7 @@ _ALARM_RATIO = 1.05
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
 _CONTROLLED = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m")
 _STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
+_BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; a foreign rig need not say it
 _RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
 
 
@@ -48,7 +50,8 @@ class RunVerdict(NamedTuple):
     seconds: float
     blocks: int
     lost_blocks: int
-    lost_messages: int
+    lost_messages: int  # at least: of blocks alone it is known how many there were
+    all_losses_known: bool  # False: a log that is cut or damaged may lack more than it shows
     enabled_from_s: float
     stopped_s: float  # by an operator, and no part of `after`
     before: Phase | None
@@ -59,14 +62,15 @@ class RunVerdict(NamedTuple):
     latency: Latency | None
     faults: list[str]
     normal_scheduling: list[str]  # processes without a real-time priority; in lockstep none needs it
+    untested: str  # why nothing was tested; empty where the drive moved with the controller in charge
 
     @property
     def good(self) -> bool:
-        """Whether stick-slip is gone while the controller is in charge, and nothing was lost.
+        """Whether something was tested, stick-slip is gone while the controller is in charge, and nothing was lost.
 
         A machine that pauses for some 20 ms loses nothing: the controller ramps down and up again, which is told and no more.
         """
-        gone = self.after is None or self.after.slips == 0
+        gone = not self.untested and self.after is not None and self.after.slips == 0
         return gone and self.lost_blocks == 0 and all(fault.startswith("STALE: ") for fault in self.faults)
 
     def as_dict(self) -> dict[str, Any]:
@@ -85,13 +89,8 @@ def judge(path: Path) -> RunVerdict:
 def judge_run(run: RunData) -> RunVerdict:
     """Judge a run that was read."""
     controller = run.configuration("controller")
-    try:
-        block_s, enabled_from_s = float(controller["block_s"]), float(controller["policy"]["enabled_from_s"])
-    except (KeyError, TypeError, ValueError) as error:
-        line = f"{run.path}: configuration of the controller: must hold block_s and policy.enabled_from_s as numbers"
-        raise Fault(
-            "BAD_LOG", f"{line} ({type(error).__name__}: {error}); see bridge/wire/PROTOCOL.md, Header"
-        ) from None
+    block_s = number_of(controller, "block_s", run.path)
+    enabled_from_s = number_of(controller, "policy.enabled_from_s", run.path)
     blocks = len(run.sensors)
     t_s = run.sensors["t_ns"] * 1e-9
     force_N = run.sensors["drive_force_N"].astype(np.float64)
@@ -125,16 +124,20 @@ def judge_run(run: RunData) -> RunVerdict:
             f"DRIVE_UNSEEN: {counted(np.count_nonzero(unmoved), 'slip')} while the drive position stood, first at "
             f"{first_s:.3f} s: is its transducer at the end of its range, or loose?"
         )
+    lost_blocks, all_losses_known = _lost_blocks(run)
+    stopped_s = sum(min(until_s - _SETTLING_S, seconds) - from_s for from_s, until_s in stops)
+    after = _phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, stops)
     return RunVerdict(
         log=str(run.path),
         seconds=seconds,
         blocks=blocks,
-        lost_blocks=_lost(run.sensors),
-        lost_messages=sum(map(_lost, (run.sensors, run.applied, run.command, run.trace, run.state))),
+        lost_blocks=lost_blocks,
+        lost_messages=lost_blocks + sum(map(_lost, (run.applied, run.command, run.trace, run.state))),
+        all_losses_known=all_losses_known,
         enabled_from_s=enabled_from_s,
-        stopped_s=sum(min(until_s - _SETTLING_S, seconds) - from_s for from_s, until_s in stops),
+        stopped_s=stopped_s,
         before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds), []),
-        after=_phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, stops),
+        after=after,
         drive_velocity_max_mps=float(trace["drive_velocity_mps"].max(initial=0.0)),
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
@@ -143,7 +146,26 @@ def judge_run(run: RunData) -> RunVerdict:
         normal_scheduling=[
             event.source for event in run.events if event.code == "START" and event.text.startswith(realtime.NORMAL)
         ],
+        untested=_untested(run, after, seconds - enabled_from_s - stopped_s),
     )
+
+
+def _untested(run: RunData, after: Phase | None, in_charge_s: float) -> str:
+    """Why nothing was tested, in words; empty where something was. `in_charge_s`: time of the controller, its settling too."""
+    if not len(run.sensors):
+        return "no block was recorded"
+    if not len(run.trace):
+        return "no step of a controller was recorded: nothing was tested"
+    if not (run.trace["drive_velocity_mps"] > _STANDSTILL_MPS).any():
+        return "the drive never moved: nothing was tested"
+    if after is not None:
+        return ""
+    if in_charge_s <= 0.0:
+        return "the controller was not in charge in this run"
+    why = f"too short to judge: it has {_SETTLING_S:g} s to settle"
+    if in_charge_s > _SETTLING_S:  # the force is no number, or the operator left it no second to settle in
+        why = "but nothing there can be judged"
+    return f"the controller was in charge for {in_charge_s:.2g} s, {why}"
 
 
 def _slowest_fall_s(run: RunData) -> float:
@@ -153,7 +175,7 @@ def _slowest_fall_s(run: RunData) -> float:
     try:
         rig = run.configuration("plant")["rig"]
         return max(0.1, 3.0 * math.sqrt(rig["slide"]["mass_kg"] / rig["drive"]["stiffness_N_per_m"]))
-    except (KeyError, TypeError, ValueError, ZeroDivisionError):  # another rig need not tell
+    except (KeyError, TypeError, ValueError, ArithmeticError):  # another rig need not tell
         return 0.1
 
 
@@ -171,6 +193,22 @@ def _vibrating(trace: Any, block_s: float) -> Any:
     starts = np.where(excited & ~np.concatenate([[False], excited[:-1]]), np.arange(len(excited)), 0)
     since = np.arange(len(excited)) - np.maximum.accumulate(starts)
     return excited & (since * block_s > _RAMP_S)
+
+
+def _lost_blocks(run: RunData) -> tuple[int, bool]:
+    """Blocks that are not in the log, and whether it tells of all.
+
+    A damaged chunk may hold the first blocks or the last ones: then the plant's END counts, which says how many there were.
+    """
+    numbers = np.unique(run.sensors["sequence"].astype(np.int64))
+    whole = run.damage.whole
+    ends = [_BLOCKS.search(event.text) for event in run.events if (event.source, event.code) == ("plant", "END")]
+    told = [int(found[1]) for found in ends if found]
+    if not told:
+        return _lost(run.sensors), whole
+    first = int(numbers[0]) if whole and len(numbers) else 0  # a recorder may have come late
+    end = max(told[-1], int(numbers[-1]) + 1 if len(numbers) else 0)
+    return end - first - len(numbers), True
 
 
 def _lost(table: Any) -> int:
@@ -235,10 +273,10 @@ def in_words(verdict: RunVerdict) -> list[str]:
             f"{latency.p999_us:.0f} us; {100 * latency.within_1_ms:.2f} % within 1 ms"
         )
     lost = "none lost" if v.lost_blocks == 0 else f"{v.lost_blocks} LOST"
-    lines.append(
-        f"blocks   {v.blocks}, {lost}"
-        + (f"; {counted(v.lost_messages, 'log message')} lost" if v.lost_messages else "")
-    )
+    if not v.all_losses_known:
+        lost = f"at least {lost}" if v.lost_blocks else "how many are lost is not known"
+    also = f"; at least {counted(v.lost_messages, 'log message')} lost" if v.lost_messages else ""
+    lines.append(f"blocks   {v.blocks}, {lost}{also}")
     if v.normal_scheduling:
         who = " and ".join(v.normal_scheduling)
         lines.append(f"priority {who} under {realtime.NORMAL}: {realtime.NOT_GUARANTEED}")
@@ -250,25 +288,10 @@ def in_words(verdict: RunVerdict) -> list[str]:
 def headline(verdict: RunVerdict) -> str:
     """The answer in one line."""
     v = verdict
-    if v.blocks == 0:
-        return "no block was recorded"
-    if v.drive_velocity_max_mps <= _STANDSTILL_MPS:
-        return "the drive never moved: nothing was tested"
-    if v.after is None:
-        return _without_after(v)
+    if v.untested or v.after is None:
+        return v.untested
     if v.after.slips:
         return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge"
     if v.before is not None and v.before.slips:
         return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before, none with the controller in charge"
     return "no stick-slip with the controller in charge"
-
-
-def _without_after(verdict: RunVerdict) -> str:
-    """Why nothing can be said of the controller."""
-    in_charge_s = verdict.seconds - verdict.enabled_from_s - verdict.stopped_s
-    if in_charge_s <= 0.0:
-        return "the controller was not in charge in this run"
-    why = f"too short to judge: it has {_SETTLING_S:g} s to settle"
-    if in_charge_s > _SETTLING_S:  # the force is no number, or the operator left it no second to settle in
-        why = "but nothing there can be judged"
-    return f"the controller was in charge for {in_charge_s:.2g} s, {why}"

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import io
 import json
 import os
 import signal
@@ -14,15 +15,16 @@ from bridge.faults import Fault
 from bridge.wire import realtime
 
 _PARENT_CHECK_S = 0.25
-_LONG_S = (
-    2.0  # of work that nobody waits for without a word; shorter, and a busy computer tells of every run of seconds
-)
+_LONG_S = 2.0  # of work that nobody waits for without a word; shorter: a busy computer tells of every run of seconds
+# a full disk, a size limit, a quota, a terminal that went away, a file that was closed
+_STDOUT_REFUSED = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF})
+_LONGEST_NAME = 255  # of a file; what is longer holds a name
 # what `stickslip[all]` brings and a plain installation lacks
 EXTRA_MODULES = frozenset({"jinja2", "joblib", "nptdms", "pyarrow", "threadpoolctl"})
 
 
 def stop_event(parent: int = 0) -> threading.Event:
-    """An event that SIGINT and SIGTERM set, and for a child the death of its parent: no orphan keeps a rig running.
+    """An event that Ctrl-C, SIGTERM and SIGHUP set, and for a child the death of its parent: no orphan keeps a rig running.
 
     Args:
         parent: the process that started this one; asked for only here, it could be dead and another in its place. 0: nobody
@@ -34,10 +36,7 @@ def stop_event(parent: int = 0) -> threading.Event:
     def on_signal(_number: int, _frame: Any) -> None:
         stop.set()
 
-    signal.signal(signal.SIGINT, on_signal)
-    signal.signal(signal.SIGTERM, on_signal)
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # a terminal that closes; nohup ignores it
-        signal.signal(signal.SIGHUP, on_signal)
+    handle_endings(on_signal)
     if parent:
 
         def watch() -> None:
@@ -49,14 +48,26 @@ def stop_event(parent: int = 0) -> threading.Event:
     return stop
 
 
+def _like_ctrl_c() -> list[signal.Signals]:
+    """SIGTERM, and SIGHUP of a terminal that closes, but for a command that was started with nohup, which ignores it."""
+    hangs_up = signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN
+    return [signal.SIGTERM, signal.SIGHUP] if hangs_up else [signal.SIGTERM]
+
+
+def handle_endings(handler: Callable[[int, Any], Any]) -> dict[signal.Signals, Any]:
+    """Let Ctrl-C, SIGTERM and SIGHUP do the same; the handlers before, by signal."""
+    return {number: signal.signal(number, handler) for number in (signal.SIGINT, *_like_ctrl_c())}
+
+
 def end_like_ctrl_c() -> None:
-    """Let SIGTERM end the command as Ctrl-C does: it stops its workers, keeps whole files only, and says INTERRUPTED."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    """Let SIGTERM and SIGHUP end the command as Ctrl-C does: it stops its workers, keeps whole files, and says INTERRUPTED."""
+    for number in _like_ctrl_c():
+        signal.signal(number, signal.default_int_handler)
 
 
 @contextlib.contextmanager
 def stopped_once() -> Generator[None]:
-    """Ctrl-C or SIGTERM raises KeyboardInterrupt in what is done here, once: what then stops and judges is not interrupted."""
+    """Ctrl-C, SIGTERM or SIGHUP raises KeyboardInterrupt in what is done here, once: what then stops and judges goes on."""
     came = threading.Event()
 
     def on_signal(_number: int, _frame: Any) -> None:
@@ -64,7 +75,7 @@ def stopped_once() -> Generator[None]:
             came.set()
             raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = handle_endings(on_signal)
     try:
         yield
     finally:
@@ -75,7 +86,7 @@ def stopped_once() -> Generator[None]:
 
 @contextlib.contextmanager
 def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
-    """Work that Ctrl-C or SIGTERM ends with Fault INTERRUPTED; a line on stderr says so where it takes long.
+    """Work that Ctrl-C, SIGTERM or SIGHUP ends with Fault INTERRUPTED; a line on stderr says so where it takes long.
 
     Args:
         line: what is done, and that Ctrl-C leaves it.
@@ -95,7 +106,7 @@ def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
         if heeded.is_set():
             raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = handle_endings(on_signal)
     timer = threading.Timer(_LONG_S, tell)
     timer.daemon = True
     timer.start()
@@ -128,19 +139,26 @@ def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
     """Run a command's work; its exit status, faults and Ctrl-C included."""
     try:
         status = _status(work, as_json)
-        if sys.stdout is not None:  # None where the caller closed it  # pyright: ignore[reportUnnecessaryComparison]
-            sys.stdout.flush()  # here, where a closed pipe or a full disk can still be told
+        sys.stdout.flush()  # here, where a closed pipe or a full disk can still be told
     except BrokenPipeError:
         _stdout_to_nowhere()
         return 128 + signal.SIGPIPE
     except OSError as error:
-        if error.errno != errno.ENOSPC or error.filename is not None:
+        if error.errno not in _STDOUT_REFUSED or error.filename is not None:
             raise
         _stdout_to_nowhere()
-        return report(
-            Fault("LOG_WRITE", "stdout: cannot be written: the disk is full; free space or write elsewhere"), False
-        )
+        line = f"stdout: cannot be written: {error.strerror}; free space or write elsewhere"
+        return report(Fault("LOG_WRITE", line), False)
     return status
+
+
+def prepare_stdout() -> None:
+    """Let stdout escape what its encoding does not have, and refuse what is written where the caller closed it."""
+    if sys.stdout is None:  # pyright: ignore[reportUnnecessaryComparison]
+        # not closed, or the next file that is opened would be stdout; not to be written, or a result would be lost unsaid
+        sys.stdout = os.fdopen(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _stdout_to_nowhere() -> None:
@@ -155,6 +173,15 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         return report(fault, as_json)
     except KeyboardInterrupt:
         return report(Fault("INTERRUPTED", "stopped by Ctrl-C"), as_json)
+    except MemoryError:
+        files = ", ".join(word for word in sys.argv[1:] if os.access(word, os.F_OK)) or "the command"
+        line = f"{files}: needs more memory than there is; end other programs, or use a machine with more or a smaller file"
+        return report(Fault("NO_MEMORY", line), as_json)
+    except UnicodeEncodeError as error:  # of a library that takes only UTF-8; stdout escapes what it cannot show
+        name = error.object if len(error.object) <= _LONGEST_NAME else error.object[error.start : error.end]
+        shown = name.removesuffix(".part").encode(errors="backslashreplace").decode()
+        line = f"{shown}: is not UTF-8, which is needed here; rename it"
+        return report(Fault("CONFIG", line), as_json)
     except ModuleNotFoundError as error:
         module = (error.name or "").partition(".")[0]
         if module not in EXTRA_MODULES:

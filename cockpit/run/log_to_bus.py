@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from bridge.faults import Fault
 from bridge.log.logfile import RunData, read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS, STATE, TRACE, Topic
@@ -70,8 +71,8 @@ def publish_log(
         bus.announce()
         wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
         send_event(_event("START", f"replay of {path.name} at {speed:g} times real time"))
-        _play(schedule, tables, send, speed, pause, stop)
-        send_event(_event("END", f"blocks={len(run.sensors)}"))
+        blocks = _play(schedule, tables, send, speed, pause, stop)
+        send_event(_event("END", f"blocks={blocks}"))
         bus.wait_until_alone(_GOODBYE_S)
 
 
@@ -94,9 +95,11 @@ def _play(
     speed: float,
     pause: threading.Event,
     stop: threading.Event,
-) -> None:
+) -> int:
+    """Send what is due, until the end or `stop`; how many blocks were sent."""
+    blocks = 0
     if not schedule:
-        return
+        return blocks
     first_ns = schedule[0][0]
     began_s = time.perf_counter()
     shown_s = 0.0
@@ -110,25 +113,31 @@ def _play(
                     time.sleep(_KEY_LOOK_S)
                 began_s += time.perf_counter() - paused_s
             if stop.is_set():
-                return
+                break
             left_s = began_s + (t_ns - first_ns) * 1e-9 / speed - time.perf_counter()
             if left_s > 0:
                 time.sleep(left_s)
             topic, table = tables[place]
             send[topic.name](table[row : row + 1].tobytes())
+            blocks += topic is SENSORS
             if live is not None and t_ns * 1e-9 > shown_s + 0.2 * speed:
                 shown_s = t_ns * 1e-9
                 live.update(Text(f"{shown_s:7.1f} s of {schedule[-1][0] * 1e-9:.1f} s; space pauses"))
+    return blocks
 
 
 def _header(run: RunData, role: str) -> wire.Header:
     fields = run.headers[role]
-    return wire.Header(
-        role=role,
-        schema_version=int(fields["schema_version"]),
-        configuration=fields["configuration"],
-        versions=fields["versions"],
-    )
+    try:
+        return wire.Header(
+            role=role,
+            schema_version=int(fields["schema_version"]),
+            configuration=fields["configuration"],
+            versions=fields["versions"],
+        )
+    except (KeyError, ValueError):
+        line = f"{run.path}: the {role} does not say its schema_version, configuration and versions"
+        raise Fault("BAD_LOG", f"{line}; take another copy of the log") from None
 
 
 def _event(code: str, text: str) -> bytes:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import FAULTS, Fault
+from cockpit.run.child_process import handle_endings
 
 _GRACE_S = 6.0  # to fade out, say goodbye on the bus and close the log
 _LOOK_S = 0.05
@@ -108,13 +109,13 @@ def run_processes(
 
 @contextlib.contextmanager
 def _ctrl_c_afterwards() -> Generator[None]:
-    """Ctrl-C and SIGTERM wait for the end of the block: a child that has started and is not noted yet would be left behind."""
+    """Ctrl-C, SIGTERM and SIGHUP wait for the end of the block: a child that is not noted yet would be left behind."""
     came = threading.Event()
 
     def note(_number: int, _frame: Any) -> None:
         came.set()
 
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = handle_endings(note)
     try:
         yield
     finally:

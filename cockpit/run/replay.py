@@ -9,7 +9,9 @@ import numpy as np
 
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
+from bridge.log.log_check import damage_findings
 from bridge.log.logfile import RunData, read_run
+from bridge.log.metadata import table_of, texts_of
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.verdict import judge_run
@@ -38,7 +40,8 @@ def time_s(option: str, text: str, example: str) -> float:
 def changes_of(run: RunData, settings: list[str]) -> list[Change]:
     """The log's own configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
     recorded = table = run.configuration("controller")
-    source = f"{run.path.name} with --set"
+    validate(ControllerConfig, recorded, run.path.name)  # by itself: no setting is to blame
+    source = f"{run.path.name} with --set" if settings else run.path.name
     timed: dict[int, list[str]] = {0: []}
     for setting in [*_timed_then(run), *settings]:
         plain, _, time = setting.rpartition("@")
@@ -63,11 +66,7 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
 
 def _timed_then(run: RunData) -> list[str]:
     """What `--closed-loop` had set from a time on when it made this log; what it set from the start is in the header."""
-    try:
-        return [setting for setting in json.loads(run.headers.get("run", {}).get("settings", "[]")) if "@" in setting]
-    except (ValueError, TypeError):
-        line = f"{run.path}: the settings of its run are damaged; take another copy of the log"
-        raise Fault("BAD_LOG", line) from None
+    return [setting for setting in texts_of(run.headers, "run", "settings", run.path) if "@" in setting]
 
 
 def _words_of(run: RunData) -> list[Word]:
@@ -86,6 +85,7 @@ class Replayed(NamedTuple):
     difference: Difference | None
     likely_reason: str
     changed: bool  # by a setting
+    damage: list[str]  # of the log: what is in the damaged part was not replayed
 
     def in_words(self) -> list[str]:
         """The answer in lines for a person."""
@@ -94,14 +94,16 @@ class Replayed(NamedTuple):
             if self.skipped_steps
             else ""
         )
+        damage = [f"  warning: {text}" for text in self.damage]
         if self.difference is None:
             same = f"identical, {counted(self.compared_steps, 'step')}, every command and trace in it bit for bit"
-            return [f"{self.log}: {same}{skipped}"]
+            return [f"{self.log}: {same}{skipped}", *damage]
         d = self.difference
         lines = [
             f"{self.log}: differs from block {d.block} at {d.t_s:.3f} s on: {d.table}.{d.field} was {d.logged:.9g}, "
             f"is {d.replayed:.9g}{skipped}",
             f"  likely reason: {self.likely_reason}",
+            *damage,
         ]
         if self.changed:
             lines.append(
@@ -121,8 +123,16 @@ def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
         line = f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
         raise Fault("BAD_LOG", f"{line}; use an earlier --from")
     reason = "" if result.identical else likely_reason(run, settings)
+    damage = [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, path)]
     return Replayed(
-        str(run.path), result.identical, result.compared, result.skipped, result.difference, reason, bool(settings)
+        str(run.path),
+        result.identical,
+        result.compared,
+        result.skipped,
+        result.difference,
+        reason,
+        bool(settings),
+        damage,
     )
 
 
@@ -133,7 +143,7 @@ def likely_reason(run: RunData, settings: list[str]) -> str:
     scenario = Scenario.model_construct(
         controller=validate(ControllerConfig, run.configuration("controller"), run.path.name)
     )
-    was = json.loads(run.headers["controller"]["versions"])
+    was = table_of(run.headers, "controller", "versions", run.path)
     now = json.loads(header(scenario, "controller", lockstep=False).versions)
     changed = [f"{name} {was.get(name)} then, {now[name]} now" for name in now if was.get(name) != now[name]]
     if changed:

@@ -81,7 +81,7 @@ class RunOutcome(NamedTuple):
 
 
 def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: bool, log: Path | None) -> RunOutcome:
-    """Run a scenario and judge it. A run without an end is over with Ctrl-C or SIGTERM, and judged like any other.
+    """Run a scenario and judge it. A run without an end is over with Ctrl-C, SIGTERM or SIGHUP, and judged like any other.
 
     Raises Fault INTERRUPTED where one with an end was stopped before, with its verdict on stderr first.
     """

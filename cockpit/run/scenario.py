@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from bridge.config import Strict, blamed, read_toml, validate, with_overrides
 from bridge.faults import Fault
@@ -21,10 +21,17 @@ from plant.config_limits import refuse_what_no_rig_does
 _RIG_FILE = "rig={file="  # of the setting that names another rig
 
 
+def _plain(name: str) -> str:
+    if name in {"", ".", ".."} or "/" in name or not name.isprintable():
+        rule = "must be a plain file name, as the log is runs/NAME.mcap"
+        raise ValueError(f"{name!r}: {rule}; leave out every / and control character")
+    return name
+
+
 class Scenario(Strict):
     """One run, with every default filled in."""
 
-    name: str = "unnamed"
+    name: Annotated[str, AfterValidator(_plain)] = "unnamed"
     description: str = ""
     duration_s: Annotated[float, Field(ge=0)] = Field(default=16.0, description="0: until Ctrl-C or SIGTERM.")
     seed: Annotated[int, Field(ge=0)] = 1

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from bridge.config import Strict, read_toml, validate
+from bridge.config import Strict, in_short, read_toml, validate
 from bridge.faults import Fault
 from bridge.files import check_file, shown
 
@@ -183,7 +183,7 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         table = read_toml(path)
         if "format" in table and table["format"] != FORMAT:
-            line = f'{MANIFEST}: format = {table["format"]!r}: must be "{FORMAT}"; this version reads no other'
+            line = f'{MANIFEST}: format = {in_short(table["format"])}: must be "{FORMAT}"; this version reads no other'
             raise Fault("BAD_EVIDENCE", line)
         return validate(Manifest, table, MANIFEST)
     except Fault as fault:

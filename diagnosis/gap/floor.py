@@ -156,7 +156,8 @@ def floor_of(problem: Problem, point: Point, drawn: Floats, before: Floor | None
     # A further run differs from the mean of `count` replicates by a little more than the replicates do among themselves.
     others = (len(drawn) + 1.0) / (len(drawn) - 1.0)
     squares = np.where(lost[compared], 1.0, z * z)
-    level = np.sqrt(others * np.mean([cell_means(row, cells).mean() for row in squares]))
+    # no cell: the model shows nothing of what was measured, which has no mean; who asked for the floor says so
+    level = np.sqrt(others * np.mean([cell_means(row, cells).mean() for row in squares])) if cells else np.nan
     segments = [(file, label.segment) for (file, label), use in zip(labels, compared, strict=True) if use]
     return Floor(bias, powers, scatter, compared, _whitening(z, promised, segments), cells, float(level))
 

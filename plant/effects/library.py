@@ -7,6 +7,7 @@ folded into it by `plant.records.build`, the others run in a kernel of their own
 
 from typing import Any, Final
 
+from bridge.config import in_short
 from plant.effects.drive import DRIVE
 from plant.effects.friction import FRICTION
 from plant.effects.friction_memory import FRICTION_MEMORY
@@ -28,19 +29,21 @@ def checked(name: str, table: Any) -> dict[str, float | str]:
     if name not in EFFECTS:
         raise ValueError(f"effects.{name}: unknown effect; known: {', '.join(EFFECTS)}")
     if not isinstance(table, dict):
-        raise ValueError(f"effects.{name} = {table!r}: must be a table; write [effects.{name}] and its keys below it")
+        raise ValueError(
+            f"effects.{name} = {in_short(table)}: must be a table; write [effects.{name}] and its keys below it"
+        )
     forms = EFFECTS[name].forms
     form = table.get("form", first_form(name))
     if not isinstance(form, str) or form not in forms:
         known = ", ".join(f'"{known}"' for known in forms if known) or "none; leave it out"
-        raise ValueError(f"effects.{name}.form = {form!r}: unknown form; known: {known}")
+        raise ValueError(f"effects.{name}.form = {in_short(form)}: unknown form; known: {known}")
     rows = {row.name: row for row in forms[form].parameters}
     filled: dict[str, float | str] = {"form": form}
     for key, value in table.items():
         if key != "form" and key not in rows:
             raise ValueError(f"effects.{name}.{key}: unknown key; known here: form, {', '.join(rows)}")
         if key != "form" and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise ValueError(f"effects.{name}.{key} = {value!r}: must be a number")
+            raise ValueError(f"effects.{name}.{key} = {in_short(value)}: must be a number")
     for row in rows.values():
         value = table.get(row.name, row.default)
         if not row.low <= value <= row.high:

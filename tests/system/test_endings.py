@@ -78,7 +78,7 @@ def test_ctrl_c_while_a_child_starts_leaves_nobody_behind(tmp_path: Path, monkey
             process.kill()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped_and_is_judged(
     tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -106,7 +106,7 @@ def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped_and_is_
     assert check_log(log).findings == []
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_run_without_an_end_is_judged_when_it_is_stopped(
     tmp_path: Path, runs: list[Run], number: signal.Signals
 ) -> None:

@@ -47,7 +47,8 @@ def call(folder: Path, *arguments: str, status: int = 0, search: Path | None = N
 
 
 def test_a_run_in_a_folder_with_files_of_the_same_names(crowded: Path) -> None:
-    said = call(crowded, "run", "--lockstep", "--set", "duration_s=0.5", "--endpoint", free_endpoint())
+    words = f"run --lockstep --scenario from-the-start --set duration_s=0.5 --endpoint {free_endpoint()}"
+    said = call(crowded, *words.split())
     assert "blocks   500, none lost" in said
 
 
@@ -86,8 +87,8 @@ def plain(tmp_path: Path) -> Path:
 
 def test_what_a_plain_installation_does_needs_no_extra(tmp_path: Path, plain: Path) -> None:
     lines = [
-        "run --in-process --set duration_s=0.5 --log run.mcap",
-        f"run --lockstep --set duration_s=0.5 --log bus.mcap --endpoint {free_endpoint()}",
+        "run --in-process --scenario from-the-start --set duration_s=0.5 --log run.mcap",
+        f"run --lockstep --scenario from-the-start --set duration_s=0.5 --log bus.mcap --endpoint {free_endpoint()}",
         "replay run.mcap",
         "log info run.mcap",
         "log check run.mcap",

@@ -50,7 +50,7 @@ def test_what_the_wheel_holds_runs_in_an_empty_folder(wheel: Path, tmp_path: Pat
     zipfile.ZipFile(wheel).extractall(unpacked)
     # interpreted: the kernels at another path would be compiled anew, for half a minute, and kept for nobody
     said = run(
-        sys.executable, "-P", "-m", "cockpit", "run", "--in-process", "--set", "duration_s=0.05",
+        sys.executable, "-P", "-m", "cockpit", "run", "--in-process", "--scenario", "from-the-start", "--set", "duration_s=0.05",
         cwd=empty, PYTHONPATH=str(unpacked), NUMBA_DISABLE_JIT="1",
     )  # fmt: skip
     assert "blocks   50, none lost" in said
@@ -74,8 +74,8 @@ def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> 
     files = [path for path in (tmp_path / "base" / "lib").rglob("*") if path.is_file()]
     assert sum(path.stat().st_blocks * 512 for path in files) < BASE_MB * 2**20
     said = run(
-        at / "stickslip", "run", "--lockstep", "--set", "duration_s=1", "--endpoint", free_endpoint(),
-        cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path),
+        at / "stickslip", "run", "--lockstep", "--scenario", "from-the-start", "--set", "duration_s=1",
+        "--endpoint", free_endpoint(), cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path),
     )  # fmt: skip
     assert "blocks   1000, none lost" in said
 

@@ -1,6 +1,7 @@
 """Bad configuration is one clear line: place, value, rule, remedy."""
 
 import contextlib
+import os
 import re
 from pathlib import Path
 
@@ -126,6 +127,16 @@ def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
             ["controller.onset.window_s=0.007"],
             ["onset.window_s = 0.007", "8 to 128 blocks of 0.001 s", "0.008 to 0.128"],
         ),
+        (["name=../../x"], ["name: '../../x': must be a plain file name", "runs/NAME.mcap", "leave out every /"]),
+        (['name="a\\u001b[31m\\nb"'], [r"name: 'a\x1b[31m\nb': must be a plain file name"]),
+        (['name=""'], ["name: '': must be a plain file name"]),
+        *(
+            (
+                [f"rig.solver.step_s={step_s}"],
+                [f"solver.step_s = {step_s}: must not make more than 1e+06", "to 1e-09 or more"],
+            )
+            for step_s in ("9e-10", "1e-12", "1e-300", "4.94066e-324")
+        ),
         (["bus.endpoint=here"], ["bus.endpoint", "here"]),
         (["bus.endpoint=tls/127.0.0.1:7447"], ["bus.endpoint", "tls/127.0.0.1:7447", "tcp/"]),
         (["bus.endpoint=tcp/127.0.0.1:99999"], ["bus.endpoint", "tcp/127.0.0.1:99999", "from 1 to 65535"]),
@@ -153,7 +164,7 @@ def test_unknown_scenario_names_the_known_ones(name: str) -> None:
 def test_missing_and_broken_files(tmp_path: Path) -> None:
     with pytest.raises(Fault, match="no such file"):
         load_rig(str(tmp_path / "none.toml"), [])
-    with pytest.raises(Fault, match="cannot be read: Is a directory"):
+    with pytest.raises(Fault, match="is a folder, must be a file"):
         read_toml(tmp_path)
     broken = tmp_path / "broken.toml"
     broken.write_text("a = = 1")
@@ -239,3 +250,22 @@ def test_a_file_that_is_too_much_for_pythons_own_reader_is_told(tmp_path: Path, 
     (tmp_path / "rig.toml").write_text(text)
     with pytest.raises(Fault, match=r"CONFIG: .*rig.toml: not valid TOML: "):
         read_toml(tmp_path / "rig.toml")
+
+
+def test_a_pipe_is_no_file_to_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    for load in (load_rig, load_scenario):
+        with pytest.raises(Fault, match=r"CONFIG: .*pipe.toml: must be a file on a disk; give the path of a TOML file"):
+            load(str(tmp_path / "pipe.toml"), [])
+
+
+@pytest.mark.parametrize("key", ["x", "slide", "slide.mass_kg", "contact.pair", "effects.drive-backlash", "name"])
+def test_a_value_that_is_too_much_for_a_line_is_shortened(tmp_path: Path, key: str) -> None:
+    path = tmp_path / "deep.toml"
+    for value in (f"{key}.{'a.' * 1500}a = 1\n", f'{key} = "{"a" * 100_000}"\n'):
+        path.write_text(value)
+        for settings in ([], [value.strip()], ["slide.mass_kg=1.5"]):
+            with pytest.raises(Fault) as caught:
+                load_rig(str(path), settings)
+            assert caught.value.kind.code == "CONFIG"
+            assert max(len(line) for line in caught.value.line.splitlines()) < 1000 + len("".join(settings))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
 from typer.testing import CliRunner
 
@@ -13,6 +14,7 @@ from bridge.faults import Fault
 from bridge.log.log_check import check_log
 from bridge.log.logfile import read_run
 from cockpit.commands.log import log_app
+from cockpit.judge.verdict import in_words, judge
 from tests.logs import Tables, doctored, short_log
 
 
@@ -174,3 +176,19 @@ def test_the_verdict_on_a_cut_log_says_what_was_lost(tmp_path: Path) -> None:
     told = json.loads(result.stdout)
     assert (result.exit_code, told["good"]) == (1, False)
     assert "bytes of an open chunk were lost" in " ".join(told["faults"])
+    assert told["all_losses_known"] is False
+
+
+@pytest.mark.parametrize(("chunk", "lost", "known"), [(0, 40, True), (4, 40, True), (9, 40, True), (-1, 0, False)])
+def test_the_verdict_counts_the_blocks_of_a_damaged_chunk(tmp_path: Path, chunk: int, lost: int, known: bool) -> None:
+    """The last of all chunks holds no block, but the plant's END."""
+    data, path = bytearray(short_log()), tmp_path / "flipped.mcap"
+    path.write_bytes(data)
+    with path.open("rb") as file:
+        start = make_reader(file).get_summary().chunk_indexes[chunk].chunk_start_offset
+    data[start + 60] ^= 0x40
+    path.write_bytes(data)
+    told = judge(path)
+    assert (told.lost_blocks, told.all_losses_known) == (lost, known)
+    expected = f"{lost} LOST" if known else "how many are lost is not known"
+    assert f"blocks   {400 - lost}, {expected}" in "\n".join(in_words(told))

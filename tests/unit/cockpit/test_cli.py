@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from bridge.faults import Fault
+from bridge.faults import FAULTS, Fault
 from bridge.log.logfile import read_run
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
@@ -290,7 +290,54 @@ def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
 def test_where_nothing_was_tested_the_headline_says_so(tmp_path: Path, settings: list[str], expected: str) -> None:
     log = tmp_path / "still.mcap"
     run_onboard(load_scenario("from-the-start", ["duration_s=0.5", *settings]), log, {})
-    assert headline(judge_run(read_run(log))) == expected
+    verdict = judge_run(read_run(log))
+    assert (headline(verdict), verdict.good) == (expected, False)
+
+
+@pytest.mark.parametrize(
+    ("topic", "rows", "expected"),
+    [
+        ("sensors", 0, "no block was recorded"),
+        ("trace", 0, "no step of a controller was recorded: nothing was tested"),
+        ("trace", 1, "the drive never moved: nothing was tested"),
+    ],
+)
+def test_a_log_with_nothing_to_judge_is_not_good(tmp_path: Path, topic: str, rows: int, expected: str) -> None:
+    log = tmp_path / "run.mcap"
+    run_onboard(load_scenario("from-the-start", ["duration_s=0.5"]), log, {})
+    run = read_run(log)
+    assert judge_run(run).good
+    verdict = judge_run(run._replace(**{topic: getattr(run, topic)[:rows]}))
+    assert (headline(verdict), verdict.good) == (expected, False)
+
+
+def test_what_is_made_of_a_damaged_log_says_so(log: Path, tmp_path: Path) -> None:
+    data = bytearray(short_log())
+    data[data.index(b"zstd", len(data) // 2) + 100] ^= 0x40
+    log.write_bytes(data)
+    replay, export = (
+        ("replay", str(log)),
+        ("log", "export", str(log), "--topic", "trace", "--to", str(tmp_path / "a.csv")),
+    )
+    for words, warning in ((replay, "warning: damaged: 1 chunk is damaged"), (export, "lost: 1 damaged chunk\n")):
+        said = call(*words)
+        assert said.exit_code == 1
+        assert warning in said.stdout
+    [replayed] = json.loads(call(*replay, "--json").stdout)
+    assert replayed["identical"]
+    assert replayed["skipped_steps"] > 0
+    assert replayed["damage"][0].startswith("damaged: 1 chunk is")
+
+
+def test_a_log_that_needs_too_much_memory_is_one_line(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_path: Path) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("cockpit.judge.verdict.judge", full)
+    monkeypatch.setattr(sys, "argv", ["stickslip", "log", "info", str(log)])
+    said = call("log", "info", str(log))
+    assert said.exit_code == FAULTS["NO_MEMORY"].exit_status
+    assert said.stderr.startswith(f"stickslip: NO_MEMORY: {log}: needs more memory than there is; ")
 
 
 def test_export_takes_times_as_replay_does(log: Path, tmp_path: Path) -> None:
@@ -324,7 +371,7 @@ def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_p
     run = read_run(doctored(tmp_path, lambda _tables: None))
     bare = run._replace(headers=run.headers | {"controller": {"configuration": '{"block_s": 0.001}'}})
     with pytest.raises(
-        Fault, match=r"BAD_LOG: .*configuration of the controller: must hold block_s and policy.enabled_from_s"
+        Fault, match=r"BAD_LOG: .*configuration of the controller: must hold policy.enabled_from_s as a number"
     ):
         judge_run(bare)
 

@@ -24,9 +24,10 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Two runs of a second, made in an empty working folder."""
     monkeypatch.setitem(PROTOCOLS, "ladder", SHORT)
     monkeypatch.chdir(tmp_path)
-    before = signal.getsignal(signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     yield
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def example(*arguments: str):
@@ -73,7 +74,7 @@ def test_nothing_is_overwritten(there: str, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["made"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_ctrl_c_leaves_nothing_behind(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = making.spring_run
 

@@ -83,10 +83,10 @@ def test_the_next_word_is_its_file_only_where_it_looks_like_one(words: str, expe
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["log", "info", "run.mcap", "--json"],
-        ["log", "info", "--json", "run.mcap"],
-        ["log", "info", "--json", "-", "run.mcap"],
-        ["log", "info", "run.mcap", "--json=-"],
+        ["log", "check", "run.mcap", "--json"],
+        ["log", "check", "--json", "run.mcap"],
+        ["log", "check", "--json", "-", "run.mcap"],
+        ["log", "check", "run.mcap", "--json=-"],
     ],
 )
 def test_on_stdout_there_is_nothing_but_json(arguments: list[str], tmp_path: Path) -> None:
@@ -100,16 +100,16 @@ def test_on_stdout_there_is_nothing_but_json(arguments: list[str], tmp_path: Pat
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["log", "info", "run.mcap", "--json", "new/x.json"],
-        ["log", "info", "--json", "new/x.json", "run.mcap"],
-        ["log", "info", "--json=new/x.json", "run.mcap"],
+        ["log", "check", "run.mcap", "--json", "new/x.json"],
+        ["log", "check", "--json", "new/x.json", "run.mcap"],
+        ["log", "check", "--json=new/x.json", "run.mcap"],
     ],
 )
 def test_with_a_file_the_words_stay_on_stdout(arguments: list[str]) -> None:
     result = call(*arguments)
     assert result.exit_code == 0, result.output
-    assert result.stdout == call("log", "info", "run.mcap").stdout
-    assert json.loads(Path("new/x.json").read_text()) == json.loads(call("log", "info", "run.mcap", "--json").stdout)
+    assert result.stdout == call("log", "check", "run.mcap").stdout
+    assert json.loads(Path("new/x.json").read_text()) == json.loads(call("log", "check", "run.mcap", "--json").stdout)
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,7 @@ def test_json_does_not_replace_the_key_of_a_blind_set(tmp_path: Path) -> None:
         (["log", "recover", "run.mcap"], {"messages", "out", "closed"}),
         (["log", "export", "run.mcap", "--to", "x.csv", "--topic", "trace"], {"files", "rows", "damage"}),
         (["scenarios"], {"scenarios", "rigs"}),
-        (["run", "--in-process", "--set", "duration_s=0.05"], {"log", "good", "rig"}),
+        (["run", "--in-process", "--scenario", "from-the-start", "--set", "duration_s=0.05"], {"log", "good", "rig"}),
         (["replay", "run.mcap", "--closed-loop"], {"was", "now", "log"}),
     ],
 )

@@ -1,5 +1,6 @@
 """A file that a command would replace, and that is of another kind, stays; and a full disk is one line."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -42,6 +43,28 @@ def test_what_is_there_and_of_another_kind_stays(files, monkeypatch, words, vict
     assert files[victim].read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (("replay", "run.mcap", "--closed-loop", "--log", "link.mcap"), "link.mcap"),
+        (("plot", "run.mcap", "--out", "link.png"), "link.png"),
+        (("log", "export", "run.mcap", "--to", "link.csv", "--topic", "trace"), "link.csv"),
+        (("log", "export", "run.mcap", "--to", "link.csv"), "link.trace.csv"),
+        (("blind", "score", "set", "--key", "run.mcap", "--report", "link.html"), "link.html"),
+        (("blind", "pool", "run.mcap", "--report", "link.html"), "link.html"),
+    ],
+)
+def test_another_name_of_an_input_is_no_place_for_a_result(files, monkeypatch, words, name):
+    log = files["run.mcap"]
+    monkeypatch.chdir(log.parent)
+    Path(name).hardlink_to(log)
+    result = CliRunner().invoke(app, [*words])
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert f"{name}: is " in result.output
+    assert log.samefile(name)
+    assert log.read_bytes() == short_log()
+
+
 def test_a_log_is_not_replaced_by_the_result_of_its_run(tmp_path):
     log, other_name = tmp_path / "same.mcap", tmp_path / "other-name.json"
     other_name.symlink_to(log)
@@ -50,21 +73,33 @@ def test_a_log_is_not_replaced_by_the_result_of_its_run(tmp_path):
     assert log.read_bytes().startswith(b"\x89MCAP")
 
 
-@pytest.mark.parametrize("words", [("scenarios",), ("explain", "--json")])
-def test_a_full_disk_is_one_line(words):
-    with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "cockpit", *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False
-        )
+@pytest.mark.parametrize(("where", "why"), [(">/dev/full", "No space left on device"), (">&-", "Bad file descriptor")])
+@pytest.mark.parametrize("words", ["scenarios", "explain --json", "--version", "log --help"])
+def test_a_stdout_that_takes_nothing_is_one_line(words, where, why):
+    done = _in_a_shell(f"-m cockpit {words} {where}")
     assert done.returncode == FAULTS["LOG_WRITE"].exit_status
-    assert (
-        done.stderr
-        == "stickslip: LOG_WRITE: stdout: cannot be written: the disk is full; free space or write elsewhere\n"
-    )
+    assert done.stderr == f"stickslip: LOG_WRITE: stdout: cannot be written: {why}; free space or write elsewhere\n"
 
 
-def test_a_closed_stdout_is_no_error():
-    done = subprocess.run(
-        ["sh", "-c", f"{sys.executable} -m cockpit scenarios >&-"], stderr=subprocess.PIPE, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+def test_stdout_escapes_what_it_cannot_show(tmp_path):
+    (tmp_path / "ü.toml").write_bytes(b"")
+    done = _in_a_shell(f"-m cockpit schema --out {tmp_path}/ü/ rig", PYTHONIOENCODING="ascii")
+    assert (done.returncode, done.stdout) == (0, f"written  {tmp_path}/\\xfc/rig.json\n")
+
+
+def test_a_name_that_is_not_utf_8_is_one_line(files):
+    done = _in_a_shell(f"-m cockpit log export {files['run.mcap']} --to \"$(printf '\\377.csv')\" --topic trace")
+    assert done.returncode == FAULTS["CONFIG"].exit_status
+    assert done.stderr == "stickslip: CONFIG: \\udcff.csv: is not UTF-8, which is needed here; rename it\n"
+
+
+def test_a_picture_is_made_whatever_backend_the_environment_names(files):
+    picture = files["run.mcap"].with_name("run.png")
+    done = _in_a_shell(f"-m cockpit plot {files['run.mcap']}", MPLBACKEND="foo")
+    assert (done.returncode, done.stdout) == (0, f"picture  {picture}\n")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def _in_a_shell(words: str, **environment: str):
+    command = ["sh", "-c", f"{sys.executable} -P {words}"]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ | environment)

@@ -32,9 +32,10 @@ def stand_ins(monkeypatch):
     monkeypatch.setattr(strata, "_real_faults", lambda: 0)
     monkeypatch.setattr(strata, "UNCLEAR", (strata.Unclear(("force-sensor-gain", "drive-backlash"), ()),))
     monkeypatch.setattr(many, "real_diagnose", made_up.quick)
-    before = signal.getsignal(signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     yield
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def blind(*arguments):

@@ -1,0 +1,68 @@
+"""What the processes of a run say of themselves in its log: JSON that another program, or damage, may have made anything."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bridge.faults import Fault
+
+Metadata = Mapping[str, Mapping[str, str]]  # of a log: its tables by name, each with texts by key
+
+
+def table_of(metadata: Metadata, name: str, key: str, path: Path) -> dict[str, Any]:
+    """The JSON object under `key` of the table `name`. Raises Fault BAD_LOG when there is none."""
+    text = metadata.get(name, {}).get(key)
+    if text is None:
+        line = f"{path}: holds no {key} of the {name}; it was not there when it was recorded"
+        if "import" in metadata:
+            line = f"{path}: is measured data of another program, imported, without a {name}: there is no run to judge"
+        remedy = "`stickslip log check` and `log export` read it, and `diagnose` as a run of an evidence folder"
+        raise Fault("BAD_LOG", f"{line}; {remedy}")
+    table = _parsed(text, f"{path}: the {key} of the {name}")
+    if not isinstance(table, dict):
+        line = f"{path}: the {key} of the {name} is no table: must be a JSON object"
+        raise Fault("BAD_LOG", f"{line}; take another copy of the log")
+    return table
+
+
+def texts_of(metadata: Metadata, name: str, key: str, path: Path) -> list[str]:
+    """The JSON list of texts under `key` of the table `name`, empty when it is not there. Raises Fault BAD_LOG."""
+    where = f"{path}: the {key} of the {name}"
+    values = _parsed(metadata.get(name, {}).get(key, "[]"), where)
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise Fault("BAD_LOG", f"{where}: must be a list of texts; take another copy of the log")
+    return values
+
+
+def _parsed(text: str, where: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):  # also Python's own limits: integers of 4300 digits, brackets 1000 deep
+        raise Fault("BAD_LOG", f"{where} is damaged, no JSON; take another copy of the log") from None
+
+
+def configuration_of(metadata: Metadata, role: str, path: Path) -> dict[str, Any]:
+    """The configuration of a process, every default included. Raises Fault BAD_LOG when the log has none."""
+    return table_of(metadata, role, "configuration", path)
+
+
+def number_of(controller: Mapping[str, Any], key: str, path: Path) -> float:
+    """A number at `key`, as in `policy.enabled_from_s`, of the controller's configuration. Raises Fault BAD_LOG."""
+    value: Any = controller
+    for part in key.split("."):
+        value = value.get(part) if isinstance(value, dict) else None
+    least, rule = (0.0, "a positive number") if key == "block_s" else (-math.inf, "a number")
+    if not is_number(value) or value <= least:
+        line = f"{path}: configuration of the controller: must hold {key} as {rule}"
+        raise Fault("BAD_LOG", f"{line}; see bridge/wire/PROTOCOL.md, Header")
+    return float(value)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of JSON is a finite number that a float can hold."""
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # an integer of more than 308 digits
+        return False
