@@ -12,6 +12,7 @@ settings.register_profile("stickslip", deadline=None, derandomize=True)
 settings.load_profile("stickslip")
 # a suite that a script starts with `&` inherits an ignored SIGINT, and so would all that the tests start: Ctrl-C is tested
 signal.signal(signal.SIGINT, signal.default_int_handler)
+_NIGHTLY_S = 1800.0  # a whole diagnosis beside other work
 _REALTIME_S = 120.0  # nobody waits longer for a process: one that hangs is known soon
 
 
@@ -19,3 +20,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.timeout(_REALTIME_S))
+        elif item.get_closest_marker("nightly") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(_NIGHTLY_S))
