@@ -22,6 +22,9 @@ from tests.system.told import told
 
 pytestmark = pytest.mark.realtime
 
+# one handler serves them all, so that by day two are enough: Ctrl-C, and that of a terminal that closes
+ENDINGS = [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.nightly), signal.SIGHUP]
+
 
 def test_ctrl_c_fades_out_closes_the_log_and_says_so(tmp_path: Path, runs: list[Run]) -> None:
     run = Run(tmp_path / "run.mcap", "--set", "controller.policy.enabled_from_s=0.0")
@@ -78,7 +81,7 @@ def test_ctrl_c_while_a_child_starts_leaves_nobody_behind(tmp_path: Path, monkey
             process.kill()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", ENDINGS)
 def test_a_run_in_one_process_without_an_end_goes_on_until_it_is_stopped_and_is_judged(
     tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -122,7 +125,7 @@ def test_a_run_without_an_end_is_judged_when_it_is_stopped(
     assert read_run(run.log).damage.closed
 
 
-@pytest.mark.parametrize("pause_s", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("pause_s", [0.0, pytest.param(0.1, marks=pytest.mark.nightly), 0.3])
 def test_a_second_ctrl_c_takes_nothing_away(tmp_path: Path, runs: list[Run], pause_s: float) -> None:
     run = Run(tmp_path / "run.mcap")
     runs.append(run)
@@ -141,7 +144,7 @@ def test_a_second_ctrl_c_takes_nothing_away(tmp_path: Path, runs: list[Run], pau
     assert read_run(run.log).damage.closed
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", ENDINGS[:2])
 def test_judging_that_takes_long_is_told_and_can_be_left(tmp_path: Path, number: signal.Signals) -> None:
     log = tmp_path / "run.mcap"
     slow = (

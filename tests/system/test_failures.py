@@ -54,24 +54,8 @@ def told_lost(data: RunData, topic: str) -> int:
     return sum(int(text.split()[1]) for text in texts if text.startswith(f"/{topic}: "))
 
 
-@pytest.mark.parametrize("victim", ["plant", "controller", "recorder"])
-def test_in_lockstep_a_pause_costs_nothing(tmp_path: Path, runs: list[Run], victim: str) -> None:
-    """A busy machine pauses processes for longer than the lease of real time, which would break the link and lose messages."""
-    run = Run(tmp_path / "run.mcap", "--lockstep", seconds=5.0)
-    runs.append(run)
-    run.wait_until_recording()
-    os.kill(run.children[victim], signal.SIGSTOP)
-    time.sleep(0.5)
-    os.kill(run.children[victim], signal.SIGCONT)
-    status, _, err = run.end()
-    assert (status, err) == (0, "")
-    data = read_run(run.log)
-    assert len(data.sensors) == len(data.command) == 5_000
-    assert told_lost(data, "sensors") == 0
-
-
 def test_a_controller_that_stood_still_goes_on(tmp_path: Path, runs: list[Run]) -> None:
-    run = Run(tmp_path / "run.mcap", seconds=5.0)
+    run = Run(tmp_path / "run.mcap", seconds=3.5)
     runs.append(run)
     run.wait_until_recording()
     os.kill(run.children["controller"], signal.SIGSTOP)
@@ -81,7 +65,7 @@ def test_a_controller_that_stood_still_goes_on(tmp_path: Path, runs: list[Run]) 
     assert err == ""
     data = read_run(run.log)
     assert [event.code for event in data.events if event.source == "controller"][-2:] == ["FRESH", "END"]
-    assert int(data.command["block"].max()) > 4900
+    assert int(data.command["block"].max()) > 3400
 
 
 def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:
