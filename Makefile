@@ -8,13 +8,13 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo quick test nightly warm check docs reference bench blind real bless lock proto schemas clean
+.PHONY: demo quick test test-realtime test-others nightly warm check docs reference bench blind real bless lock proto schemas clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
 
 # linear algebra with one thread a process: there are as many processes as cores
-PARALLEL := OMP_NUM_THREADS=1 $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+PARALLEL = OMP_NUM_THREADS=1 $(NICE) $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 EACH_CPU_S := 5 # of a test that is not marked slow
 QUICK_CPU_S := 110 # of all tests of `make quick`: may only fall; 106 beside other work, with evidence still to be made
 
@@ -23,7 +23,13 @@ quick: warm ## under a minute once kernels are compiled; what every edit is trie
 
 test: $(READY)
 	@$(MAKE) --no-print-directory -j2 check warm
+	@$(MAKE) --no-print-directory -j2 --output-sync=target test-realtime test-others
+
+test-realtime: ## mostly waits, so that the others take what it leaves; each shows what it has to say at its end
 	@$(BIN)/pytest -m "realtime and not nightly"
+
+test-others: NICE = nice -n 19
+test-others:
 	@$(PARALLEL) -m "not realtime and not nightly"
 
 nightly: check warm bench ## everything: an hour or so
