@@ -45,8 +45,8 @@ def run(
         granted = ""
         if lockstep:
             # Plant and controller take turns: on one core waking the other process takes a tenth of the time. Runs at the
-            # same time have other ports and so other cores. No priority: they would hold up a rig in real time.
-            realtime.pin(realtime.core(bus_config.port))
+            # same time have other ports and so other cores.
+            realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
         else:
             granted = realtime.claim(realtime.core(1))  # before the announcement, as the rig may begin right after
         bus.announce()

@@ -43,7 +43,7 @@ def run(
         process = _Process(node, bus)
         # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
         if lockstep:
-            realtime.pin(realtime.core(bus_config.port))
+            realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
             granted = "lockstep"  # the same text everywhere: the same run gives the same log
         else:
             granted = realtime.claim(realtime.core(0))

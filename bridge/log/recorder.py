@@ -56,8 +56,8 @@ def run(
         log.add_metadata("run", about)
         for role in sorted(headers):
             log.add_header(headers[role])
-        if lockstep:
-            realtime.pin(realtime.core(bus_config.port + 1))  # beside plant and controller
+        if lockstep:  # beside plant and controller
+            realtime.claim(realtime.core(bus_config.port + 1), realtime.LOCKSTEP_PRIORITY)
         else:
             realtime.claim(None, realtime.RECORDER_PRIORITY)
         bus.announce()

@@ -17,6 +17,9 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = (
     4,
 )  # on fault: the stacks of all threads, 8 MB each, are not filled at once
 LOOP_PRIORITY = 50
+# Lockstep waits for nobody's clock: it goes on where the loops in real time and their recorders leave a core to it. Without a
+# priority of its own it took half as long again (docs/method/bridge.md).
+LOCKSTEP_PRIORITY = 1
 RECORDER_PRIORITY = 10  # below the loop, above every process without SCHED_FIFO: a starved recorder loses blocks
 
 # A wait that ends so much later was a pause of this process. Shorter: a busy core looks like one. Longer: a peer is given up.

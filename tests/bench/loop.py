@@ -21,6 +21,7 @@ SECONDS = 60.0
 PINGS = 10_000  # 10 s at 1000 per second
 PING = bytes(428)  # a SensorBlock
 LOCKSTEP_SECONDS = 16.0
+IN_PROCESS_SECONDS = 90.0  # the drive leaves its range later on
 
 
 def _echo(kind: str, address: str) -> "subprocess.Popen[bytes]":
@@ -140,9 +141,10 @@ def bench() -> bool:
         limit = 1e6 / (float(np.median(zenoh_ns)) * 1e-3) / 1000.0
         kept.append(_bar("over Zenoh [x real time]", speed, speed >= 5.0, "at least 5"))
         print(f"  {'the paced ping-pong allows':<30} {limit:8.1f}   the loop reaches {100 * speed / limit:.0f} % of it")
-        short, long = (_run(log, seconds, "--in-process")[1] for seconds in (1.0, 1.0 + 2 * LOCKSTEP_SECONDS))
-        alone = 2 * LOCKSTEP_SECONDS / (long - short)
-        kept.append(_bar("in one process [x real time]", alone, alone >= 30.0, "at least 30"))
+        _run(log, 1.0, "--in-process")  # compiles where nobody did
+        short, long = (_run(log, seconds, "--in-process")[1] for seconds in (1.0, 1.0 + IN_PROCESS_SECONDS))
+        alone = IN_PROCESS_SECONDS / (long - short)
+        kept.append(_bar("in one process [x real time]", alone, alone >= 200.0, "at least 200"))
         return all(kept)
 
 
