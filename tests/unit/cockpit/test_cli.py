@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,12 +15,9 @@ from bridge.log.logfile import read_run
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
-from cockpit.judge.verdict import headline, in_words, judge_run
-from cockpit.run.in_process import run_onboard
+from cockpit.judge.verdict import judge_run
 from cockpit.run.progress import progress_line
-from cockpit.run.replay import outcome
 from cockpit.run.run import keep_aside
-from cockpit.run.scenario import load_scenario
 from tests.logs import doctored, empty_log, short_log
 
 PNG = b"\x89PNG"
@@ -187,128 +183,6 @@ def test_options_that_a_replay_would_not_follow_are_refused(
     assert result.exit_code == 2, words
     assert place.format(log=log) in words
     assert remedy in words
-
-
-def test_a_log_that_begins_late_counts_from_its_first_block(tmp_path: Path) -> None:
-    def begin_late(tables):
-        for name, table in tables.items():
-            tables[name] = table[table["t_ns"] > 150_000_000]
-
-    run = read_run(doctored(tmp_path, begin_late))
-    verdict = judge_run(run)
-    assert verdict.before is not None
-    assert verdict.before.seconds == pytest.approx(0.25)
-    assert "per minute of this phase)" in in_words(verdict)[0]
-    assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value: float) -> None:
-    def spoil(tables):
-        tables["sensors"]["drive_force_N"][[100, 250], 3] = value
-        tables["trace"]["drive_force_N"][[100, 250]] = value
-
-    (tmp_path / "sound.mcap").write_bytes(short_log())
-    sound, spoilt = read_run(tmp_path / "sound.mcap"), read_run(doctored(tmp_path, spoil))
-    before, was = judge_run(spoilt).before, judge_run(sound).before
-    assert before is not None
-    assert was is not None
-    assert before.slips == was.slips
-    assert before.swing_N == pytest.approx(was.swing_N, rel=0.02)
-    assert before.mean_force_N == pytest.approx(was.mean_force_N, rel=0.02)
-    assert judge_run(spoilt).faults == [
-        "NOT_FINITE: /sensors drive_force_N: 2 blocks hold a sample that is no number, first 100; left out"
-    ]
-    assert outcome(spoilt).drive_work_J == pytest.approx(outcome(sound).drive_work_J, rel=0.02)
-
-
-def test_what_was_not_measured_is_no_velocity_ratio(tmp_path: Path) -> None:
-    def spoil(tables):
-        trace = tables["trace"]
-        trace["mode"], trace["drive_velocity_mps"], trace["vibration_velocity_mps"] = wire.EXCITE, 5e-4, 6e-4
-        trace["limit"] = wire.NO_LIMIT
-        tables["sensors"]["base_accel_mps2"][250:300, 3] = np.nan
-        trace["limit"][250:300] = wire.NOT_FINITE
-        trace["vibration_velocity_mps"][300:] = 4e-4
-
-    run = read_run(doctored(tmp_path, spoil))
-    from_the_start = json.dumps({"block_s": 0.001, "policy": {"enabled_from_s": 0.0}})
-    verdict = judge_run(run._replace(headers=run.headers | {"controller": {"configuration": from_the_start}}))
-    assert verdict.faults == [
-        "NOT_FINITE: /sensors base_accel_mps2: 50 blocks hold a sample that is no number, first 250; left out"
-    ]
-    assert (verdict.velocity_ratio_min, verdict.velocity_ratio_max) == (pytest.approx(1.2), pytest.approx(1.2))
-
-
-def test_a_slip_of_a_heavy_slide_is_slow_and_counts(tmp_path: Path) -> None:
-    log = tmp_path / "heavy.mcap"
-    settings = ["duration_s=12.0", "rig.slide.mass_kg=60.0", "controller.policy.enabled_from_s=100.0"]
-    run_onboard(load_scenario("paper-c45-c45", settings), log, {})
-    before = judge_run(read_run(log)).before
-    assert before is not None
-    assert before.slips >= 4
-    assert before.swing_N > 3.0
-
-
-@pytest.mark.parametrize(("code", "good"), [("STALE", True), ("DROPPED", False)])
-def test_a_pause_that_lost_nothing_is_told_and_no_fault(tmp_path: Path, code: str, good: bool) -> None:
-    log = tmp_path / "run.mcap"
-    run_onboard(load_scenario("from-the-start", ["duration_s=1.0"]), log, {})
-    run = read_run(log)
-    event = wire.Event(sequence=1, t_ns=5, source="controller", code=code, text="for 24 ms")
-    verdict = judge_run(run._replace(events=[*run.events, event]))
-    assert verdict.good is good
-    assert f"warning  {code}: for 24 ms" in in_words(verdict)
-
-
-def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
-    """Here by a transducer that ends after 2 mm; 16 s at 0.5 mm/s are 8 mm."""
-    log = tmp_path / "short-range.mcap"
-    scenario = load_scenario("from-the-start", [])
-    rig = scenario.rig.model_copy(
-        update={"sensors": scenario.rig.sensors.model_copy(update={"position_range_m": 2e-3})}
-    )
-    run_onboard(scenario.model_copy(update={"rig": rig}), log, {})
-    verdict = judge_run(read_run(log))
-    assert not verdict.good
-    assert re.search(
-        r"DRIVE_UNSEEN: \d+ slips while the drive position stood, first at [4-6]\.", "\n".join(verdict.faults)
-    )
-
-
-@pytest.mark.parametrize(
-    ("settings", "expected"),
-    [
-        (["rig.drive.profile=[[0.0, 0.0]]"], "the drive never moved: nothing was tested"),
-        (["controller.policy.enabled_from_s=100.0"], "the controller was not in charge in this run"),
-        (
-            ["controller.policy.enabled_from_s=0.1"],
-            "the controller was in charge for 0.4 s, too short to judge: it has 1 s to settle",
-        ),
-    ],
-)
-def test_where_nothing_was_tested_the_headline_says_so(tmp_path: Path, settings: list[str], expected: str) -> None:
-    log = tmp_path / "still.mcap"
-    run_onboard(load_scenario("from-the-start", ["duration_s=0.5", *settings]), log, {})
-    verdict = judge_run(read_run(log))
-    assert (headline(verdict), verdict.good) == (expected, False)
-
-
-@pytest.mark.parametrize(
-    ("topic", "rows", "expected"),
-    [
-        ("sensors", 0, "no block was recorded"),
-        ("trace", 0, "no step of a controller was recorded: nothing was tested"),
-        ("trace", 1, "the drive never moved: nothing was tested"),
-    ],
-)
-def test_a_log_with_nothing_to_judge_is_not_good(tmp_path: Path, topic: str, rows: int, expected: str) -> None:
-    log = tmp_path / "run.mcap"
-    run_onboard(load_scenario("from-the-start", ["duration_s=0.5"]), log, {})
-    run = read_run(log)
-    assert judge_run(run).good
-    verdict = judge_run(run._replace(**{topic: getattr(run, topic)[:rows]}))
-    assert (headline(verdict), verdict.good) == (expected, False)
 
 
 def test_what_is_made_of_a_damaged_log_says_so(log: Path, tmp_path: Path) -> None:

@@ -1,11 +1,7 @@
 """Import: every format gives the same evidence, and bad input leaves nothing behind."""
 
 import json
-import os
-import signal
-import threading
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,7 +9,6 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 import scipy.io
-from nptdms import ChannelObject, TdmsWriter
 from typer.testing import CliRunner
 
 from bridge.config import validate
@@ -21,58 +16,12 @@ from bridge.faults import Fault
 from bridge.log.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.tables.export import export
-from bridge.tables.readers import Dialect, read_table
+from bridge.tables.readers import read_table
 from cockpit.commands.log import log_app
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.evidence.import_table import ImportMap, import_file
 from tests.logs import short_log
-
-MAP = """
-[channels]
-t_s = { column = "time", scale = 1e-3 }
-drive_force_N = { column = "F", scale = 0.5, offset = 1.0 }
-mass_accel_mps2 = { column = "acc", scale = 9.80665 }
-[rig]
-drive = "spring"
-mass_kg = 1.5
-drive_stiffness_N_per_m = 11700.0
-coulomb_force_N = 14.49
-static_force_N = 17.38
-stribeck_velocity_mps = 0.0005
-[rig.tolerance]
-mass_kg = 0.005
-[run]
-drive_velocity_mps = 0.0005
-"""
-ROWS = 4010
-
-
-def raw() -> dict[str, Any]:
-    random = np.random.default_rng(3)
-    time_ms = np.arange(ROWS) * 0.5
-    force = 28 + 4 * np.sin(time_ms * 9e-3) + random.normal(0, 0.02, ROWS)
-    return {"time": time_ms, "F": force, "acc": random.normal(0, 0.1, ROWS), "note": np.zeros(ROWS)}
-
-
-def write_raw(path: Path, data: dict[str, Any]) -> None:
-    if path.suffix == ".csv":
-        pyarrow.csv.write_csv(pa.table(data), path)
-    elif path.suffix == ".parquet":
-        pq.write_table(pa.table(data), path)
-    elif path.suffix == ".mat":
-        scipy.io.savemat(path, data | {"gain": 35.15})
-    else:
-        with TdmsWriter(path) as writer:
-            writer.write_segment(
-                [ChannelObject("DAQ", name, values, {"wf_increment": 0.0005}) for name, values in data.items()]
-            )
-
-
-def setup(at: Path, suffix: str, text: str = MAP) -> tuple[Path, Path]:
-    source, channel_map = at / f"measured{suffix}", at / "map.toml"
-    write_raw(source, raw())
-    channel_map.write_text(text)
-    return source, channel_map
+from tests.unit.diagnosis.evidence.measured_tables import MAP, ROWS, raw, setup, write_raw
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mat", ".tdms"])
@@ -352,101 +301,3 @@ def test_a_log_tells_what_it_cannot_hold(tmp_path: Path) -> None:
     findings = import_file(source, channel_map, tmp_path / "made.mcap").findings
     told = [one.where for one in findings if "import it into a folder" in one.text]
     assert told == [f"{source.name}: vibration_frequency_Hz", f"{source.name}: vibration_amplitude_m"]
-
-
-CSV = "Zeit;F\n" + "".join(f"{i * 0.5:.1f};{9.5 + 0.01 * (i % 7):.2f}\n" for i in range(4000)).replace(".", ",")
-GERMAN = MAP.replace('column = "time"', 'column = "Zeit"').replace(
-    'mass_accel_mps2 = { column = "acc", scale = 9.80665 }\n', ""
-)
-SOURCE = '[source]\ndelimiter = ";"\ndecimal = ","\n'
-
-
-@pytest.mark.parametrize(
-    ("text", "channel_map", "expected"),
-    [
-        (CSV.replace("9,56", "OVL", 1), SOURCE + GERMAN, "column F: row 7 = 'OVL': must be a number"),
-        (CSV, GERMAN, "line 1: the names are separated by ';', not by ','"),
-        (CSV.replace("F", "F/µm", 1), SOURCE + GERMAN, "line 1: is not utf-8"),
-        (CSV.replace("1,0;9,52", "1,0", 1), SOURCE + GERMAN, "line 4 = '1,0': has 1 cell: must have 2, "),
-        (
-            f"{CSV}End of test\n",
-            SOURCE + GERMAN,
-            "a.csv: line 4002 = 'End of test': has 1 cell: must have 2, as many as",
-        ),
-        (
-            f"My rig\n{CSV}",
-            SOURCE + GERMAN,
-            "line 2 = 'Zeit;F': has 2 cells: must have 1, as many as there are names; if",
-        ),
-    ],
-    ids=["text", "delimiter", "encoding", "ragged", "footer", "names further down"],
-)
-def test_a_csv_file_of_another_kind_names_place_and_remedy(tmp_path: Path, text: str, channel_map: str, expected: str):
-    (tmp_path / "a.csv").write_text(text, encoding="latin-1")
-    (tmp_path / "map.toml").write_text(channel_map)
-    with pytest.raises(Fault) as caught:
-        import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out")
-    assert expected in caught.value.line
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_cell_in_another_encoding_is_told_with_its_row(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(CSV + "0,1;ü\n", encoding="latin-1")
-    table = read_table(tmp_path / "a.csv", Dialect(";", ","))
-    with pytest.raises(Fault, match=r"a.csv: column F: row 4001 = b'\\xfc': must be a number, and is no UTF-8; remove"):
-        table.column("F")
-
-
-def test_a_name_with_a_control_character_stays_readable(tmp_path: Path) -> None:
-    source, channel_map = setup(tmp_path, ".csv")
-    import_file(source.rename(tmp_path / "odd\x7f.csv"), channel_map, tmp_path / "evidence")
-    assert load_evidence(tmp_path / "evidence").runs[0].file == "odd\x7f.parquet"
-
-
-@pytest.mark.parametrize("rate_Hz", ["1e-9", "1e300"])
-def test_a_sample_rate_that_no_recorder_has_is_refused(tmp_path: Path, rate_Hz: str) -> None:
-    source, channel_map = setup(tmp_path, ".csv")
-    channel_map.write_text(f"[source]\nsample_rate_Hz = {rate_Hz}\n" + MAP)
-    with pytest.raises(Fault, match=r"CONFIG: .*source.sample_rate_Hz = .*must be"):
-        import_file(source, channel_map, tmp_path / "made.mcap")
-
-
-def test_a_csv_file_in_another_encoding(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(CSV.replace("F", "F/µN", 1), encoding="latin-1")
-    source = SOURCE + 'encoding = "latin-1"\n'
-    (tmp_path / "map.toml").write_text(source + GERMAN.replace('column = "F"', 'column = "F/µN"'), encoding="utf-8")
-    assert import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out").rows == 4000
-
-
-@pytest.mark.parametrize("start", ["\ufeff", "\ufeffLog of the rig\n"])
-@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
-def test_a_csv_file_of_windows_says_itself_that_it_is_utf_16(tmp_path: Path, start: str, encoding: str) -> None:
-    (tmp_path / "a.csv").write_bytes((start + CSV).encode(encoding))
-    table = read_table(tmp_path / "a.csv", Dialect(";", ",", start.count("\n")))
-    assert list(table.columns) == ["Zeit", "F"]
-    assert table.column("F")[:2].tolist() == [9.5, 9.51]
-
-
-def test_a_csv_file_in_a_wide_encoding_that_does_not_say_so(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_bytes(CSV.encode("utf-16-le"))
-    with pytest.raises(Fault, match=r'a.csv: line 1: has zero bytes.* encoding = "utf-16-le"'):
-        read_table(tmp_path / "a.csv", Dialect(";", ","))
-    assert len(read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-16-le")).column("F")) == 4000
-
-
-def test_no_signal_is_lost_while_a_csv_file_is_read(tmp_path):
-    write_raw(tmp_path / "run.csv", raw())
-    got, sent = threading.Event(), 0
-    before = signal.signal(signal.SIGTERM, lambda *_: got.set())
-    try:
-        for _ in range(100):
-            got.clear()
-            sender = threading.Timer(0.001, os.kill, (os.getpid(), signal.SIGTERM))
-            sender.start()
-            while sender.is_alive():
-                read_table(tmp_path / "run.csv")
-            sender.join()
-            assert got.wait(5.0), f"signal {sent} was lost"
-            sent += 1
-    finally:
-        signal.signal(signal.SIGTERM, before)
