@@ -91,6 +91,8 @@ def compile_once(what: str, compiling: Callable[[], object]) -> None:
         except BlockingIOError:
             _say(f"another process compiles the kernels of {what}: waiting for it")
             fcntl.flock(lock, fcntl.LOCK_EX)
+        except OSError:  # a file system without locks: each process compiles
+            pass
         if not done.exists():
             _say(f"compiling the kernels of {what}, once for this version")
         compiling()

@@ -75,6 +75,7 @@ def run_onboard(
                     written.result()
                 written = writer.submit(_write, log, loop.block, loop.block_ns, made, loop.controller_state.copy())
                 if loop.block < min(ends):
+                    written.result()
                     raise no_number(scenario.rig, loop.block)
                 if progress is not None:
                     progress(loop.block * scenario.rig.solver.block_s)
