@@ -7,7 +7,7 @@ from collections.abc import Callable
 from bridge.faults import Fault
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import parsed
+from bridge.wire.payloads import parsed
 from bridge.wire.topics import COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, SNAPSHOT, STATE, TRACE
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig

@@ -9,7 +9,8 @@ from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
-from bridge.wire.messages import sensor_block, sequence_and_time
+from bridge.wire.messages import sensor_block
+from bridge.wire.payloads import sequence_and_time
 from bridge.wire.topics import COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
 from controller.codes import BLOCK, GAP, RESET, STALE, STOP
 from controller.config import ControllerConfig

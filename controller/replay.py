@@ -19,6 +19,8 @@ from controller.core import step
 from controller.records import LAYOUT_ID, STATE, build
 
 _NO_ROW = -1
+_OF_A_CLOCK = "lateness_ns"  # the field that is not compared
+_COMPARED_ROWS = 4096  # at once; with more the processor's cache does not hold them
 
 
 class Change(NamedTuple):
@@ -88,28 +90,25 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
     Raises Fault BAD_LOG where two controllers answered, as their steps cannot be told apart.
 
     """
-    trace = run.trace
-    order = np.argsort(trace["sequence"], kind="stable")
-    sequence = trace["sequence"][order].astype(np.int64)
-    block = trace["block"][order]
-    events = trace["events"][order].astype(np.int64)
-    t_ns = trace["t_ns"][order].astype(np.int64)
-    gaps = trace["gap_blocks"][order].astype(np.int64)
+    trace = _in_order(run.trace)
+    sequence, events, gaps, t_ns = (
+        trace[name].astype(np.int64) for name in ("sequence", "events", "gap_blocks", "t_ns")
+    )
     twice = np.flatnonzero(np.diff(sequence) == 0)
     if len(twice):
         at_s, again_s = 1e-9 * t_ns[twice[0]], 1e-9 * t_ns[twice[0] + 1]
         line = f"/trace: step {sequence[twice[0]]} is there at {at_s:.3f} s and again at {again_s:.3f} s"
         why = "the controller was started again, or two answered"
         raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a log of its own")
-    rows = _rows(run.sensors, block, events)
+    rows = _rows(run.sensors, trace["block"], events)
     sensors = _writable(run.sensors)
 
     _, memory = build(changes[0].config)
     scratch = np.empty(changes[0].config.samples_per_block)
     replayed: list[npt.NDArray[np.int64]] = []
-    commands, traces = COMMAND.blank(len(order)), TRACE.blank(len(order))
+    commands, traces = COMMAND.blank(len(trace)), TRACE.blank(len(trace))
     at = _start(run, sequence, round(from_s * 1e9), memory)
-    while at < len(order):
+    while at < len(trace):
         end = _until(sequence, rows, events, at)
         for start, stop, params in _spans(changes, t_ns, at, end):
             part = slice(start, stop)
@@ -120,14 +119,27 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
         replayed.append(np.arange(at, end))
         at = _resume(run, sequence, end, memory)
     done = np.concatenate(replayed) if replayed else np.empty(0, np.int64)
-    wanted = done[t_ns[done] >= from_s * 1e9]
+    wanted = _place(done[t_ns[done] >= from_s * 1e9])
     considered = int((t_ns >= from_s * 1e9).sum())
-    found = _first_difference(run, order[wanted], sequence[wanted], commands[wanted], traces[wanted])
-    return Replay(sequence[wanted], commands[wanted], traces[wanted], considered - len(wanted), len(wanted), found)
+    steps, command = sequence[wanted], commands[wanted]
+    found = _first_difference(trace[wanted], run.command, steps, command, traces[wanted])
+    return Replay(steps, command, traces[wanted], considered - len(steps), len(steps), found)
+
+
+def _in_order(records: Records) -> Records:
+    """Messages in order of their sequence; those that are in order already are not copied."""
+    sequence = records["sequence"]
+    return records if (sequence[1:] > sequence[:-1]).all() else records[np.argsort(sequence, kind="stable")]
+
+
+def _place(rows: npt.NDArray[np.int64]) -> Any:
+    """Ascending rows as an index; without a gap they are a slice, which copies nothing."""
+    whole = len(rows) > 0 and (np.diff(rows) == 1).all()
+    return slice(int(rows[0]), int(rows[-1]) + 1) if whole else rows
 
 
 def _writable(records: Records) -> Records:
-    return np.frombuffer(bytearray(records.tobytes()), records.dtype)
+    return records if records.flags.writeable else np.frombuffer(bytearray(records.tobytes()), records.dtype)
 
 
 def _rows(sensors: Records, block: Any, events: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -198,20 +210,28 @@ def _restore(sequence: Any, snapshot: Any, memory: Any) -> int | None:
     return after
 
 
-def _first_difference(run: RunData, rows: Any, steps: Any, command: Records, trace: Records) -> Difference | None:
-    """The earliest step with a bit that differs, trace before command."""
-    logged_trace = run.trace[rows]
-    place = np.searchsorted(run.command["sequence"], steps)
-    place = np.minimum(place, max(len(run.command) - 1, 0))
-    logged_command = run.command[place]
+def _first_difference(
+    logged_trace: Records, logged: Records, steps: npt.NDArray[np.int64], command: Records, trace: Records
+) -> Difference | None:
+    """The earliest step with a bit that differs, trace before command.
+
+    Args:
+        logged_trace: of the log, one row for each of the `steps`.
+        logged: all commands of the log.
+        steps, command, trace: numbers and messages of the replayed steps.
+
+    """
+    place = np.searchsorted(logged["sequence"], steps)
+    place = np.minimum(place, max(len(logged) - 1, 0))
+    logged_command = logged[_place(place)]
     there = logged_command["sequence"] == steps  # commands that the recorder lost cannot be compared
     tables = (
         ("trace", TRACE, logged_trace, trace, np.ones(len(steps), bool)),
         ("command", COMMAND, logged_command, command, there),
     )
     found: list[Difference] = []
-    for name, layout, logged, again, valid in tables:
-        row = _first_row(layout, logged, again, valid)
+    for name, layout, was, again, valid in tables:
+        row = _first_row(layout, was, again, valid)
         if row is not None:
             index, field = row
             found.append(
@@ -221,7 +241,7 @@ def _first_difference(run: RunData, rows: Any, steps: Any, command: Records, tra
                     block=int(trace["block"][index]),
                     t_s=float(trace["t_ns"][index]) * 1e-9,
                     field=field,
-                    logged=float(logged[field][index]),
+                    logged=float(was[field][index]),
                     replayed=float(again[field][index]),
                 )
             )
@@ -229,13 +249,29 @@ def _first_difference(run: RunData, rows: Any, steps: Any, command: Records, tra
 
 
 def _first_row(layout: Layout, logged: Records, again: Records, valid: Any) -> tuple[int, str] | None:
-    first: tuple[int, str] | None = None
-    for field in layout.message.DESCRIPTOR.fields:
-        if field.name == "lateness_ns":
+    """First row with a bit that differs, and the first field of this row with one."""
+    fields = [field.name for field in layout.message.DESCRIPTOR.fields if field.name != _OF_A_CLOCK]
+    for first in range(0, len(again), _COMPARED_ROWS):
+        part = slice(first, first + _COMPARED_ROWS)
+        if _same_bytes(logged[part], again[part]):  # the usual case, 10 times as fast as field by field
             continue
-        kind = f"u{logged[field.name].dtype.itemsize}"
-        bits, bits_again = (np.ascontiguousarray(table[field.name]).view(kind) for table in (logged, again))
-        differs = np.flatnonzero((bits != bits_again) & valid)
-        if len(differs) and (first is None or differs[0] < first[0]):
-            first = (int(differs[0]), field.name)
-    return first
+        differs = {name: _bits(logged[part], name) != _bits(again[part], name) for name in fields}
+        some = np.logical_or.reduce([*differs.values()]) & valid[part]
+        if some.any():
+            row = int(np.argmax(some))
+            return first + row, next(name for name in fields if differs[name][row])
+    return None
+
+
+def _same_bytes(logged: Records, again: Records) -> bool:
+    """Whether the messages are equal but for the field of a clock."""
+    bytes_again = bytearray(again.tobytes())
+    if _OF_A_CLOCK in (again.dtype.names or ()):
+        np.frombuffer(bytes_again, again.dtype)[_OF_A_CLOCK] = logged[_OF_A_CLOCK]
+    return bytes_again == logged.tobytes()
+
+
+def _bits(records: Records, field: str) -> npt.NDArray[Any]:
+    """A field as whole numbers, which are equal where all bits are; NaN too."""
+    values = records[field]
+    return values.view(f"u{values.dtype.itemsize}")

@@ -7,15 +7,17 @@ from typing import Any, NamedTuple
 
 from bridge.faults import Fault
 from bridge.files import check_file
+from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
-from bridge.log.log_reader import Damage
-from bridge.log.logfile import STREAMING, LogReader, Piece, block_period_ns, iter_pieces
+from bridge.log.log_reader import LogReader
+from bridge.log.logfile import STREAMING, Piece, block_period_ns, iter_pieces
 from bridge.log.metadata import configuration_of, is_number, number_of
 from bridge.log.signal_range import Signal, SignalLook
 from bridge.log.topic_watch import TopicWatch
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import CHANNELS, SCHEMA_VERSION, parsed
+from bridge.wire.messages import CHANNELS
+from bridge.wire.payloads import SCHEMA_VERSION, parsed
 from bridge.wire.topics import BY_NAME
 
 LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the next block is due
@@ -133,28 +135,6 @@ def _of_configurations(reader: LogReader) -> list[Finding]:
         except Fault as fault:
             text = fault.line.removeprefix(f"{reader.path}: ").partition("; ")[0]
             found.append(Finding("configuration", reader.path.name, text))
-    return found
-
-
-def damage_findings(damage: Damage, path: Path) -> list[Finding]:
-    """A finding for each kind of loss in a log."""
-    found: list[Finding] = []
-    remedy = f"`stickslip log recover {path}` saves the rest"
-    if not damage.closed:
-        text = f"has no end, {damage.cut_bytes} bytes of an open chunk were lost; {remedy}"
-        found.append(Finding("cut", path.name, text, max(damage.cut_bytes, 1)))
-    if damage.bad_chunks:
-        found.append(
-            Finding(
-                "damaged",
-                path.name,
-                f"{counted(damage.bad_chunks, 'chunk is', 'chunks are')} damaged; {remedy}",
-                damage.bad_chunks,
-            )
-        )
-    if damage.bad_records:
-        text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense; {remedy}"
-        found.append(Finding("damaged", path.name, text, damage.bad_records))
     return found
 
 

@@ -8,22 +8,22 @@ import contextlib
 import struct
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from io import BytesIO
 from pathlib import Path
 from typing import IO, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Metadata, Schema
-from mcap.writer import MCAP0_MAGIC
 
 from bridge.faults import Fault
-from bridge.kernel import kernel
-from bridge.log.runlog import LIBRARY
+from bridge.log.chunk_messages import Messages, messages_of
+from bridge.log.damage import Damage
+from bridge.log.library import LIBRARY, MAGIC
 from bridge.wire.topics import TOPICS
 
 _HEAD = struct.Struct("<BQ")
@@ -37,23 +37,13 @@ _SEARCH_BYTES = 1 << 20
 _UNREADABLE = (McapError, struct.error, UnicodeDecodeError, zstandard.ZstdError, MemoryError, OverflowError)
 _CHANNEL_TOPICS = {i + 1: topic.name for i, topic in enumerate(topic for topic in TOPICS if topic.logged)}
 
-Bytes = npt.NDArray[np.uint8]
-MessageRows = npt.NDArray[np.int64]  # [messages, 6]
-CHANNEL, SEQUENCE, LOG_TIME, PUBLISH_TIME, START, END = range(6)  # columns of MessageRows; START and END of the payload
 
+class _Packed(NamedTuple):
+    """A chunk as it is in the file."""
 
-class Damage(NamedTuple):
-    """The parts of a log that could not be read."""
-
-    cut_bytes: int  # from the first record that is not whole to the end of the file
-    bad_chunks: int  # number of whole chunks with a wrong checksum
-    closed: bool  # the file has its footer
-    bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
-
-    @property
-    def whole(self) -> bool:
-        """Whether the log was closed and everything in it could be read."""
-        return self.closed and not (self.cut_bytes or self.bad_chunks or self.bad_records)
+    records: Future[bytes | None]  # uncompressed; None when the chunk is damaged
+    indexes: list[bytes]  # contents of the index records after it
+    end_bytes: int  # place of its end in the file
 
 
 class LogReader:
@@ -80,32 +70,55 @@ class LogReader:
             return self.channels[channel_id].topic.removeprefix("/")
         return _CHANNEL_TOPICS.get(channel_id, f"channel {channel_id}")
 
-    def messages(self) -> Iterator[tuple[Bytes, MessageRows]]:
-        """For each chunk: its bytes, and the places of its messages in them. Raises Fault BAD_LOG."""
-        rows = np.empty((1 << 16, 6), np.int64)
-        for data in self.chunks():
-            if data.shape[0] // 31 > rows.shape[0]:  # no message is shorter than its head of 31 bytes
-                rows = np.empty((data.shape[0] // 31, 6), np.int64)
-            yield data, rows[: _walk(data, rows)]
+    def messages(self) -> Iterator[Messages]:
+        """The messages of each chunk. Raises Fault BAD_LOG when the file is not a run log."""
+        for data, indexes in self._unpacked():
+            yield messages_of(np.frombuffer(data, np.uint8), indexes)
 
-    def chunks(self) -> Iterator[Bytes]:
-        """For each chunk: its records, uncompressed. Raises Fault BAD_LOG when the file is not a run log."""
+    def _unpacked(self) -> Iterator[tuple[bytes, list[bytes]]]:
+        """For each chunk that is not damaged: its records, uncompressed, and its indexes."""
         try:
-            with self.path.open("rb") as file:
+            # the next chunk is uncompressed while the caller works on the present one
+            with self.path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as beside:
                 self.size_bytes = self.path.stat().st_size
-                yield from self._chunks(file)
+                ready: _Packed | None = None
+                for packed in self._packed(file, beside):
+                    if ready is not None:
+                        yield from self._learned(ready)
+                    ready = packed
+                if ready is not None:
+                    yield from self._learned(ready)
         except OSError as error:
             raise Fault(
                 "BAD_LOG", f"{self.path}: cannot be read: {error.strerror}; give the path of a .mcap file"
             ) from None
+        self.position_bytes = self.size_bytes
+        self._must_have_header()
 
-    def _chunks(self, file: IO[bytes]) -> Iterator[Bytes]:
-        if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+    def _learned(self, packed: _Packed) -> Iterator[tuple[bytes, list[bytes]]]:
+        """One chunk; nothing, but for the count, where it is damaged."""
+        data = packed.records.result()
+        if data is None:
+            self._count(bad_chunks=1)
+            return
+        self._must_have_header()
+        self._learn_channels(data)
+        self.position_bytes = packed.end_bytes
+        yield data, packed.indexes
+
+    def _packed(self, file: IO[bytes], beside: ThreadPoolExecutor) -> Iterator[_Packed]:
+        """Every chunk, once the record after its indexes was read."""
+        if file.read(len(MAGIC)) != MAGIC:
             line = f"{self.path}: {self.size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
             raise Fault("BAD_LOG", line)
-        whole_bytes = len(MCAP0_MAGIC)
+        whole_bytes = len(MAGIC)
+        chunk: _Packed | None = None
         while not self.damage.closed:
             record = _next(file, self.size_bytes)
+            is_chunk = record is not None and _is_chunk(*record)
+            if chunk is not None and (record is None or is_chunk or record[0] != Opcode.MESSAGE_INDEX):
+                yield chunk
+                chunk = None
             if record is None:
                 start = self._after_damage(file, whole_bytes)
                 if start is None:
@@ -113,24 +126,17 @@ class LogReader:
                 file.seek(start)
                 continue
             opcode, content = record
-            if opcode == Opcode.CHUNK or content[_MARK_AT : _MARK_AT + len(_CHUNK_MARK)] == _CHUNK_MARK:
-                data = _uncompressed(content)
-                if data is None:
-                    self._count(bad_chunks=1)
-                else:
-                    self._must_have_header()
-                    self._learn_channels(data)
-                    self.position_bytes = file.tell()
-                    yield np.frombuffer(data, np.uint8)
+            if is_chunk:
+                chunk = _Packed(beside.submit(_uncompressed, content), [], file.tell())
             elif opcode == Opcode.FOOTER and len(content) == _FOOTER_BYTES:
                 self.damage = self.damage._replace(closed=True)
+            elif chunk is not None:
+                chunk.indexes.append(content)
             else:
                 self._learn(opcode, content)
             whole_bytes = file.tell()
         if not self.damage.closed:
             self._count(cut_bytes=self.size_bytes - whole_bytes)
-        self.position_bytes = self.size_bytes
-        self._must_have_header()
 
     def _count(self, cut_bytes: int = 0, bad_chunks: int = 0, bad_records: int = 0) -> None:
         now = self.damage
@@ -151,9 +157,9 @@ class LogReader:
         if start is not None:
             self._count(bad_records=1)
             return start
-        if self.size_bytes - from_bytes > len(MCAP0_MAGIC):
-            file.seek(self.size_bytes - len(MCAP0_MAGIC))
-            if file.read() == MCAP0_MAGIC:  # only the index is damaged; everything before it was read
+        if self.size_bytes - from_bytes > len(MAGIC):
+            file.seek(self.size_bytes - len(MAGIC))
+            if file.read() == MAGIC:  # only the index is damaged; everything before it was read
                 self._count(bad_records=1)
                 self.damage = self.damage._replace(closed=True)
         return None
@@ -186,6 +192,11 @@ class LogReader:
             at += _HEAD.size
             self._learn(opcode, data[at : at + length])
             at += length
+
+
+def _is_chunk(opcode: int, content: bytes) -> bool:
+    """Whether a record is a chunk, by its opcode or, where that is damaged, by its content."""
+    return opcode == Opcode.CHUNK or content[_MARK_AT : _MARK_AT + len(_CHUNK_MARK)] == _CHUNK_MARK
 
 
 def _next(file: IO[bytes], size: int) -> tuple[int, bytes] | None:
@@ -234,33 +245,3 @@ def _uncompressed(content: bytes) -> bytes | None:
         if zlib.crc32(data) == chunk.uncompressed_crc:
             return data
     return None
-
-
-@kernel
-def _number(data: Bytes, at: int, width: int) -> np.int64:
-    value = np.int64(0)
-    for i in range(width):
-        value |= np.int64(data[at + i]) << np.int64(8 * i)
-    return value
-
-
-@kernel
-def _walk(data: Bytes, rows: MessageRows) -> int:
-    """Fill `rows` with the places of the messages of a chunk, and return their number."""
-    at = 0
-    count = 0
-    while at + 9 <= data.shape[0]:
-        length = int(_number(data, at + 1, 8))
-        start = at + 9
-        if length < 0 or length > data.shape[0] - start:
-            break
-        if data[at] == 5 and length >= 22:
-            rows[count, 0] = _number(data, start, 2)
-            rows[count, 1] = _number(data, start + 2, 4)
-            rows[count, 2] = _number(data, start + 6, 8)
-            rows[count, 3] = _number(data, start + 14, 8)
-            rows[count, 4] = start + 22
-            rows[count, 5] = start + length
-            count += 1
-        at = start + length
-    return count

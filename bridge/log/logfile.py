@@ -1,7 +1,6 @@
-"""A run log, whole or cut: its topics as arrays, at once or chunk by chunk; and recovery of a cut log."""
+"""A run log, whole or cut: its topics as arrays, at once or chunk by chunk."""
 
 import contextlib
-import fcntl
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,32 +10,19 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
-from bridge.files import LOG, check_file, refuse_to_replace
-from bridge.kernel import kernel
-from bridge.log.log_reader import CHANNEL, END, LOG_TIME, START, Bytes, Damage, LogReader, MessageRows
-from bridge.log.mcap_chunks import ChunkWriter
+from bridge.files import check_file
+from bridge.log.chunk_messages import Bytes, Messages
+from bridge.log.damage import Damage
+from bridge.log.log_reader import LogReader
 from bridge.log.metadata import configuration_of
-from bridge.log.runlog import LIBRARY
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import (
-    APPLIED,
-    COMMAND,
-    STATE,
-    TRACE,
-    Layout,
-    Records,
-    file_descriptor_set,
-    parsed,
-    sensor_block,
-)
+from bridge.wire.messages import APPLIED, COMMAND, STATE, TRACE, Layout, Records, sensor_block
+from bridge.wire.payloads import parsed
 from bridge.wire.topics import BY_NAME
-
-__all__ = ["Damage", "LogReader", "Piece", "RunData", "iter_pieces", "read_run", "recover"]
 
 STREAMING = ("sensors", "applied", "command", "trace", "state")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE}
 _DEFAULT_SAMPLES = 20
-_UINT64 = 2**64 - 1
 
 
 class Piece(NamedTuple):
@@ -55,65 +41,46 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
     file is not a run log of this project.
     """
     layouts: dict[str, Layout] = dict(_LAYOUTS)
-    for data, rows in reader.messages():
-        for channel_id in np.unique(rows[:, CHANNEL]):
+    for messages in reader.messages():
+        for channel_id in np.unique(messages.channel):
             topic = reader.topic(int(channel_id))
-            mine = rows[rows[:, CHANNEL] == channel_id]
-            log_time_ns = mine[:, LOG_TIME].copy()
+            mine = messages.of(int(channel_id))
             if topic in STREAMING:
                 if topic not in layouts:
-                    layouts[topic] = sensor_block(_samples(data, mine))
-                stacked, kept = _stacked(data, mine, layouts[topic], "/" + topic)
-                reader.count_bad_messages(len(mine) - len(kept))
-                yield Piece(topic, log_time_ns[kept], np.frombuffer(stacked, layouts[topic].dtype), [])
+                    layouts[topic] = sensor_block(_samples(mine))
+                layout = layouts[topic]
+                stacked, kept = _stacked(mine, layout, "/" + topic)
+                reader.count_bad_messages(len(mine.start) - len(kept))
+                yield Piece(topic, mine.log_ns[kept], stacked.view(layout.dtype).reshape(-1), [])
             else:
-                payloads = [data[row[START] : row[END]].tobytes() for row in mine]
+                payloads = mine.payloads()
                 kept = _readable(topic, payloads)
-                reader.count_bad_messages(len(mine) - len(kept))
-                yield Piece(topic, log_time_ns[kept], np.empty(0), [payloads[index] for index in kept])
+                reader.count_bad_messages(len(payloads) - len(kept))
+                yield Piece(topic, mine.log_ns[kept], np.empty(0), [payloads[index] for index in kept])
 
 
-def _samples(data: Bytes, rows: MessageRows) -> int:
+def _samples(messages: Messages) -> int:
     """Samples of a channel in a sensor block: the most frequent number in the first chunk, as single blocks may be wrong."""
     found: Counter[int] = Counter()
-    for row in rows:
+    for payload in messages.payloads():
         with contextlib.suppress(Fault):
-            block = parsed(wire.SensorBlock, data[row[START] : row[END]].tobytes(), "/sensors")
-            found[len(block.drive_force_N) or _DEFAULT_SAMPLES] += 1
+            found[len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES] += 1
     return found.most_common(1)[0][0] if found else _DEFAULT_SAMPLES
 
 
-@kernel
-def _gather(data: Bytes, starts: npt.NDArray[np.int64], template: Bytes, fixed: Bytes, out: Bytes) -> bool:
-    """Copy messages of the template's length into `out`; False when one does not have the template's tags."""
-    size = template.shape[0]
-    for row in range(starts.shape[0]):
-        start, to = starts[row], row * size
-        for i in range(size):
-            value = data[start + i]
-            if fixed[i] != 0 and value != template[i]:
-                return False
-            out[to + i] = value
-    return True
-
-
-def _stacked(data: Bytes, rows: MessageRows, layout: Layout, topic: str) -> tuple[bytes, npt.NDArray[np.int64]]:
-    """The readable payloads of one topic, joined, with every field written and in order; and the indices of their rows."""
-    if (rows[:, END] - rows[:, START] == layout.size).all():
-        template = np.frombuffer(layout.blank().tobytes(), np.uint8)
-        fixed = np.ones(layout.size, np.uint8)
-        for field in (layout.dtype.fields or {}).values():
-            fixed[field[1] : field[1] + field[0].itemsize] = 0
-        out = np.empty(len(rows) * layout.size, np.uint8)
-        if _gather(data, np.ascontiguousarray(rows[:, START]), template, fixed, out):
-            return out.tobytes(), np.arange(len(rows))
+def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt.NDArray[np.int64]]:
+    """The readable payloads with every field written and in order, [messages, size]; and which of the messages they are of."""
+    if (messages.end - messages.start == layout.size).all():
+        stacked = messages.stacked(layout.size)
+        if layout.all_canonical(stacked):
+            return stacked, np.arange(len(stacked))
     good: list[bytes] = []
     kept: list[int] = []
-    for index, row in enumerate(rows):
+    for index, payload in enumerate(messages.payloads()):
         with contextlib.suppress(Fault):
-            good.append(layout.canonical(data[row[START] : row[END]].tobytes(), topic))
+            good.append(layout.canonical(payload, topic))
             kept.append(index)
-    return b"".join(good), np.array(kept, np.int64)
+    return np.frombuffer(b"".join(good), np.uint8).reshape(-1, layout.size), np.array(kept, np.int64)
 
 
 def _readable(topic: str, payloads: list[bytes]) -> list[int]:
@@ -180,7 +147,7 @@ def read_run(path: Path) -> RunData:
             stored[piece.topic].append(piece.records.view(np.uint8).data)
         elif piece.topic in payloads:
             payloads[piece.topic].extend(piece.payloads)
-    tables = {name: np.frombuffer(b"".join(stored[name]), dtypes[name]) for name in STREAMING}
+    tables = {name: np.frombuffer(bytearray().join(stored[name]), dtypes[name]) for name in STREAMING}
     events = [
         parsed(wire.Event, payload, "/event/" + name)
         for name in ("plant", "controller", "recorder")
@@ -194,106 +161,3 @@ def read_run(path: Path) -> RunData:
         headers=reader.metadata,
         damage=reader.damage,
     )
-
-
-class Recovered(NamedTuple):
-    """The result of `recover`."""
-
-    messages: int
-    damage: Damage
-
-
-class _Copy:
-    """A new log that copies definitions, tables and messages of another log in the order in which they are read."""
-
-    def __init__(self, writer: ChunkWriter, reader: LogReader) -> None:
-        self.writer = writer
-        self.reader = reader
-        self.schema_ids: dict[str, int] = {}
-        self.channel_ids: dict[int, int] = {}
-        self.kept: set[str] = set()
-
-    def take_metadata(self) -> None:
-        for name, fields in self.reader.metadata.items():
-            if name not in self.kept:
-                self.writer.add_metadata(name, fields)
-                self.kept.add(name)
-
-    def take_channel(self, channel_id: int) -> int:
-        """Define the channel in the new log, and return its id there.
-
-        A damaged definition is replaced by the one that every log of this version has.
-        """
-        if channel_id not in self.channel_ids:
-            reader = self.reader
-            channel = reader.channels.get(channel_id)
-            topic = BY_NAME.get(reader.topic(channel_id))
-            schema = reader.schemas.get(channel.schema_id) if channel else None
-            name = schema.name if schema else topic.message.DESCRIPTOR.full_name if topic else "unknown"
-            if name not in self.schema_ids:
-                data = schema.data if schema else file_descriptor_set()
-                self.schema_ids[name] = self.writer.add_schema(name, schema.encoding if schema else "protobuf", data)
-            self.channel_ids[channel_id] = self.writer.add_channel(
-                channel.topic if channel else "/" + reader.topic(channel_id),
-                channel.message_encoding if channel else "protobuf",
-                self.schema_ids[name],
-                channel.metadata if channel else {"rate_Hz": f"{topic.rate_Hz if topic else 0.0:g}"},
-            )
-        return self.channel_ids[channel_id]
-
-    def take_messages(self, data: Bytes, rows: MessageRows) -> None:
-        raw = data.tobytes()
-        for channel, sequence, log_time_ns, publish_time_ns, start, end in rows.tolist():
-            self.writer.add_message(
-                self.take_channel(channel), log_time_ns & _UINT64, raw[start:end], publish_time_ns & _UINT64, sequence
-            )
-
-
-def refuse_a_live_log(path: Path, option: str) -> None:
-    """Raise Fault LOG_WRITE when `path` is a log that is being recorded; `option` is the option that names another file."""
-    if not path.is_file():
-        return
-    with path.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            line = f"{path}: is being recorded: must be closed before it is replaced, or what follows is lost"
-            raise Fault("LOG_WRITE", f"{line}; wait for the end of the run, or give another {option}") from None
-        except OSError:  # a file system without locks
-            return
-
-
-def recover(path: Path, out: Path) -> Recovered:
-    """Write every readable message of a cut or damaged log to `out`, with an index; `out` may be `path`.
-
-    Raises Fault BAD_LOG when nothing can be read, LOG_WRITE when `out` cannot be written or is being recorded.
-    """
-    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
-    if out.resolve() != path.resolve():
-        refuse_to_replace(out, LOG, f"--out {out}")
-    refuse_a_live_log(out, "--out")
-    reader = LogReader(path)
-    beside = out.with_name(out.name + ".part")
-    messages = 0
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        with beside.open("wb") as file:
-            copy = _Copy(ChunkWriter(file, LIBRARY), reader)
-            for data, rows in reader.messages():
-                copy.take_metadata()
-                for channel_id in reader.channels:
-                    copy.take_channel(channel_id)
-                copy.take_messages(data, rows)
-                messages += len(rows)
-                copy.writer.flush()
-            copy.take_metadata()
-            copy.writer.finish()
-        if not messages:
-            line = f"{path}: holds no message that can be read, so nothing can be saved; the file stays as it is"
-            raise Fault("BAD_LOG", line)
-        beside.replace(out)
-    except OSError as error:
-        raise Fault("LOG_WRITE", f"{out}: cannot be written: {error.strerror}; choose another --out") from None
-    finally:
-        beside.unlink(missing_ok=True)
-    return Recovered(messages, reader.damage)

@@ -26,9 +26,9 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from mcap.writer import MCAP0_MAGIC
 
 from bridge.log.block_rows import Rows
+from bridge.log.library import MAGIC
 
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MESSAGE_FIELDS_BYTES = 22
@@ -65,7 +65,7 @@ class ChunkWriter:
         self._chunk = _Open([], {})
         self._offset = 0
         self._chunk_first_ns, self._chunk_last_ns = 0, 0
-        stream.write(MCAP0_MAGIC + _encoded(Header(profile="", library=library)))
+        stream.write(MAGIC + _encoded(Header(profile="", library=library)))
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Define a schema, and return its id."""
@@ -221,11 +221,11 @@ class ChunkWriter:
             summary_offset_start=offset_start,
             summary_crc=zlib.crc32(head, zlib.crc32(summary)),
         )
-        self._stream.write(summary + _encoded(footer) + MCAP0_MAGIC)
+        self._stream.write(summary + _encoded(footer) + MAGIC)
         self._stream.flush()
 
 
 def ending_without_index() -> bytes:
     """The 50 bytes that close a file after its last whole record; readers then scan the file instead of seeking."""
     footer = Footer(summary_start=0, summary_offset_start=0, summary_crc=0)
-    return _encoded(DataEnd(data_section_crc=0), footer) + MCAP0_MAGIC
+    return _encoded(DataEnd(data_section_crc=0), footer) + MAGIC

@@ -10,7 +10,7 @@ from bridge.faults import Fault
 from bridge.log.runlog import RunLog
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import parsed
+from bridge.wire.payloads import parsed
 from bridge.wire.topics import TOPICS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 

@@ -1,38 +1,28 @@
 """Writing a run log: MCAP with schemas, in chunks of 0.1 s, so that a kill loses little."""
 
 import contextlib
-import fcntl
 import json
 import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from bridge.faults import Fault
 from bridge.files import LOG, refuse_to_replace
 from bridge.log.block_rows import rows
+from bridge.log.library import LIBRARY
+from bridge.log.live import locked
 from bridge.log.mcap_chunks import ChunkWriter, ending_without_index
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import SCHEMA_VERSION, Records, file_descriptor_set, sequence_and_time
+from bridge.wire.messages import Records
+from bridge.wire.payloads import file_descriptor_set, sequence_and_time
 from bridge.wire.topics import RECORDER_EVENT, TOPICS, Topic
 
 # Duration of a chunk. Longer: a kill loses more (it loses the open chunk, at most 0.25 s). Shorter: larger files.
 FLUSH_PERIOD_S = 0.1
 LARGEST_CHUNK_BYTES = 1 << 20  # ends a chunk earlier; lockstep may fill more than this in 0.1 s
 _LATEST_MESSAGES = 256  # largest lag of a delayed message, in numbers; a larger lag means that the sender restarted
-LIBRARY = f"stickslip schema {SCHEMA_VERSION}"
-
-
-def _locked(file: IO[bytes]) -> bool:
-    """Lock the file against writing and replacing by other processes; False when another process has the lock."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        pass
-    return True
 
 
 class RunLog:
@@ -58,7 +48,7 @@ class RunLog:
             path.parent.mkdir(parents=True, exist_ok=True)
             # not truncated when it is opened: the file may be the log of a run under way
             self._file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666), "wb")
-            if not _locked(self._file):
+            if not locked(self._file):
                 self._file.close()
                 line = f"{path}: is being recorded: must be another file than that of a run that goes on"
                 raise Fault("LOG_WRITE", f"{line}; wait for the end of that one, or choose another --log")

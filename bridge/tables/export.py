@@ -10,7 +10,9 @@ import pyarrow as pa
 
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose
-from bridge.log.logfile import STREAMING, Damage, LogReader, block_period_ns, iter_pieces, sample_times_s
+from bridge.log.damage import Damage
+from bridge.log.log_reader import LogReader
+from bridge.log.logfile import STREAMING, block_period_ns, iter_pieces, sample_times_s
 from bridge.tables.writers import ArrowTable, Columns, MatFile, MatTable, TableWriter
 from bridge.wire.messages import CHANNELS, Records
 

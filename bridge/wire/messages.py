@@ -5,11 +5,10 @@ record over these places: a filled record is an encoded message, and a topic of 
 or change the order of the fields; the protobuf library first brings such bytes into this form.
 """
 
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
-from google.protobuf import descriptor_pb2
 from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.internal.encoder import TagBytes  # pyright: ignore[reportPrivateImportUsage]
 from google.protobuf.message import DecodeError, Message
@@ -17,13 +16,11 @@ from google.protobuf.message import DecodeError, Message
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 
-SCHEMA_VERSION = 1
 NO_BLOCK = 2**64 - 1
 # the sensors of a rig, in the order of the wire
 CHANNELS = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
 
 Records = npt.NDArray[Any]
-M = TypeVar("M", bound=Message)
 
 _SCALARS = {
     FieldDescriptor.TYPE_DOUBLE: ("<f8", 1),
@@ -82,6 +79,8 @@ class Layout:
         self._template = bytes(template)
         self._tags = int.from_bytes(template, "little")
         self._mask = int.from_bytes(fixed, "little")
+        self._tag_places = np.flatnonzero(np.frombuffer(fixed, np.uint8))
+        self._tag_bytes = np.frombuffer(self._template, np.uint8)[self._tag_places]
 
     def blank(self, count: int = 1) -> Records:
         """`count` messages of zeros, [count]; their `tobytes()` is their protobuf encoding."""
@@ -91,6 +90,10 @@ class Layout:
     def is_canonical(self, payload: bytes) -> bool:
         """Whether every field is written, in the order of the field numbers."""
         return len(payload) == self.size and int.from_bytes(payload, "little") & self._mask == self._tags
+
+    def all_canonical(self, payloads: npt.NDArray[np.uint8]) -> bool:
+        """The same of many payloads of the message's size, [payloads, size]."""
+        return bool((payloads.take(self._tag_places, axis=1) == self._tag_bytes).all())
 
     def canonical(self, payload: bytes, topic: str) -> bytes:
         """The same message with every field written, in order. Raises Fault BAD_MESSAGE naming `topic`."""
@@ -133,29 +136,3 @@ def sensor_block(samples: int) -> Layout:
     if samples not in _sensor_layouts:
         _sensor_layouts[samples] = Layout(wire.SensorBlock, samples)
     return _sensor_layouts[samples]
-
-
-def parsed(message: type[M], payload: bytes, topic: str) -> M:
-    """A protobuf message from its bytes. Raises Fault BAD_MESSAGE naming `topic`."""
-    result = message()
-    try:
-        result.ParseFromString(payload)
-    except DecodeError:
-        line = f"{topic}: {len(payload)} bytes are no {message.DESCRIPTOR.name}; see bridge/wire/PROTOCOL.md for its fields"
-        raise Fault("BAD_MESSAGE", line) from None
-    return result
-
-
-def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]:
-    """Sequence and t_ns of a message that has both; read directly where the bytes are canonical. Raises Fault BAD_MESSAGE."""
-    if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:
-        return int.from_bytes(payload[1:9], "little"), int.from_bytes(payload[10:18], "little", signed=True)
-    whole: Any = parsed(message, payload, message.DESCRIPTOR.name)
-    return whole.sequence, whole.t_ns
-
-
-def file_descriptor_set() -> bytes:
-    """The schema for MCAP: a serialised FileDescriptorSet."""
-    files = descriptor_pb2.FileDescriptorSet()
-    wire.DESCRIPTOR.CopyToProto(files.file.add())
-    return files.SerializeToString()

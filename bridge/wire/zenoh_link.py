@@ -27,7 +27,7 @@ from pydantic import Field, field_validator
 from bridge.config import Strict
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import parsed
+from bridge.wire.payloads import parsed
 from bridge.wire.topics import Topic
 
 _CONNECT_S = 30.0  # time to wait for the plant; a first start compiles before it listens, which can take more than 10 s

@@ -12,7 +12,7 @@ from cockpit.commands.options import watched_share
 from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
 
 if TYPE_CHECKING:
-    from bridge.log.logfile import Damage
+    from bridge.log.damage import Damage
 
 log_app = typer.Typer(
     cls=JsonGroup, help="Look into a log, check it, make a cut one whole; tables out and in.", no_args_is_help=True
@@ -43,7 +43,7 @@ def log_recover(
     """Save every message that can be read from a cut or damaged log, with a new index."""
 
     def work() -> None:
-        from bridge.log.logfile import recover
+        from bridge.log.recover import recover
 
         if out is not None:
             check_output("--out", out, LOG)

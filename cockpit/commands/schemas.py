@@ -181,7 +181,7 @@ def _plot() -> dict[str, Any]:
 
 
 def _log_recover() -> dict[str, Any]:
-    from bridge.log.log_reader import Damage
+    from bridge.log.damage import Damage
     from cockpit.commands.json_types import schema_of, table
 
     return schema_of(table(Damage, {"messages": int, "out": str}))

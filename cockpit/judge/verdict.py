@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.log.log_check import damage_findings
+from bridge.log.damage import damage_findings
 from bridge.log.logfile import RunData, read_run
 from bridge.log.metadata import number_of
 from bridge.units import counted

@@ -6,7 +6,7 @@ import time
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import parsed
+from bridge.wire.payloads import parsed
 from bridge.wire.topics import CONTROLLER_EVENT, OPERATOR
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
-from bridge.log.log_check import damage_findings
+from bridge.log.damage import damage_findings
 from bridge.log.logfile import RunData, read_run
 from bridge.log.metadata import table_of, texts_of
 from bridge.units import counted

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
-from bridge.log.logfile import refuse_a_live_log
+from bridge.log.live import refuse_a_live_log
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
 from cockpit.run.scenario import Scenario, load_scenario
 from cockpit.run.writable import LOG, check_output

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from bridge.config import Strict, blamed, read_toml, validate, with_overrides
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import SCHEMA_VERSION
+from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
+from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
-from bridge.log.log_check import damage_findings
 from bridge.log.logfile import RunData, block_period_ns, read_run, sample_times_s
 from bridge.tables.export import CHANNELS
 

@@ -15,7 +15,9 @@ from mcap.reader import make_reader
 from bridge.faults import Fault
 from bridge.log import recorder
 from bridge.log.log_check import check_log
-from bridge.log.logfile import LogReader, read_run, recover
+from bridge.log.log_reader import LogReader
+from bridge.log.logfile import read_run
+from bridge.log.recover import recover
 from bridge.log.runlog import RunLog
 from bridge.tables.export import export
 from bridge.wire.messages import sensor_block
@@ -122,7 +124,7 @@ def test_noise_after_the_magic_is_a_fault(tmp_path: Path, noise: bytes) -> None:
     path = tmp_path / "noise.mcap"
     path.write_bytes(short_log()[:8] + noise)
     with pytest.raises(Fault, match="BAD_LOG"):
-        list(LogReader(path).chunks())
+        list(LogReader(path).messages())
 
 
 def test_recover_in_place_and_leaves_nothing_else(tmp_path: Path) -> None:

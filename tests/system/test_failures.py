@@ -12,7 +12,8 @@ import pytest
 from mcap.reader import make_reader
 
 from bridge.faults import FAULTS
-from bridge.log.logfile import RunData, read_run, recover
+from bridge.log.logfile import RunData, read_run
+from bridge.log.recover import recover
 from tests.system.ports import free_endpoint
 from tests.system.run_under_way import Run, call, gone
 from tests.system.told import told

@@ -12,7 +12,8 @@ import scipy.io
 from typer.testing import CliRunner
 
 from bridge.faults import Fault
-from bridge.log.logfile import STREAMING, LogReader, iter_pieces, read_run
+from bridge.log.log_reader import LogReader
+from bridge.log.logfile import STREAMING, iter_pieces, read_run
 from bridge.tables.export import export
 from bridge.wire.messages import CHANNELS
 from cockpit.commands.log import log_app

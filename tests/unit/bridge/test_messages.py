@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, STATE, TRACE, Layout, sensor_block, sequence_and_time
+from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, STATE, TRACE, Layout, sensor_block
+from bridge.wire.payloads import sequence_and_time
 
 
 @pytest.mark.parametrize("layout", [COMMAND, APPLIED, TRACE, STATE, sensor_block(20), sensor_block(50)])

@@ -1,0 +1,123 @@
+"""Column of the messages in the bytes of a chunk: from its index where that is right, else by a walk from message to message."""
+
+import struct
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from mcap.opcode import Opcode
+
+_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
+_HEAD = np.dtype(
+    [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_ns", "<u8"),
+        ("publish_ns", "<u8"),
+    ]
+)
+_FIELDS_BYTES = _HEAD.itemsize - _RECORD.size
+_INDEX_HEAD_BYTES = 6  # channel, length of the entries
+_INDEX_ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
+
+Bytes = npt.NDArray[np.uint8]
+Column = npt.NDArray[np.int64]
+
+
+class Messages(NamedTuple):
+    """The messages of a chunk in file order, [messages] each."""
+
+    data: Bytes  # of the chunk, uncompressed
+    channel: Column
+    sequence: Column
+    log_ns: Column
+    publish_ns: Column
+    start: Column  # of the payload in `data`
+    end: Column
+
+    def of(self, channel: int) -> "Messages":
+        """Those of one channel."""
+        mine = np.flatnonzero(self.channel == channel)
+        columns = (self.channel, self.sequence, self.log_ns, self.publish_ns, self.start, self.end)
+        return Messages(self.data, *(column[mine] for column in columns))
+
+    def payloads(self) -> list[bytes]:
+        """The payload of each."""
+        return [self.data[start:end].tobytes() for start, end in zip(self.start, self.end, strict=True)]
+
+    def stacked(self, size: int) -> Bytes:
+        """The payloads, all of this size, one below the other, [messages, size]."""
+        return _cut(self.data, self.start, size).view(np.uint8).reshape(-1, size)
+
+
+def messages_of(data: Bytes, indexes: Sequence[bytes]) -> Messages:
+    """The messages of a chunk.
+
+    Args:
+        data: of the chunk, uncompressed.
+        indexes: contents of the index records that followed it in the file; they may be missing, damaged or of another chunk.
+
+    """
+    offsets = _indexed(indexes)
+    heads = _heads(data, offsets)
+    if heads is None or not _tile(data, offsets, heads):
+        offsets = _walked(data)
+        heads = _cut(data, offsets, _HEAD.itemsize).view(_HEAD)
+    start = offsets + _HEAD.itemsize
+    return Messages(
+        data,
+        *(heads[name].astype(np.int64) for name in ("channel", "sequence", "log_ns", "publish_ns")),
+        start,
+        start + heads["length"].astype(np.int64) - _FIELDS_BYTES,
+    )
+
+
+def _indexed(indexes: Sequence[bytes]) -> Column:
+    """Offsets of the messages as the index tells them, in file order; nothing is checked."""
+    parts = [
+        np.frombuffer(content, _INDEX_ENTRY, offset=_INDEX_HEAD_BYTES)["offset"].astype(np.int64)
+        for content in indexes
+        if len(content) > _INDEX_HEAD_BYTES and len(content) % _INDEX_ENTRY.itemsize == _INDEX_HEAD_BYTES
+    ]
+    return np.sort(np.concatenate(parts)) if parts else np.empty(0, np.int64)
+
+
+def _heads(data: Bytes, offsets: Column) -> npt.NDArray[Any] | None:
+    """The bytes at the offsets, read as heads of messages, [messages]; None where one lies outside of the data."""
+    if not len(offsets) or offsets[0] < 0 or offsets[-1] > len(data) - _HEAD.itemsize:
+        return None
+    return _cut(data, offsets, _HEAD.itemsize).view(_HEAD)
+
+
+def _tile(data: Bytes, offsets: Column, heads: npt.NDArray[Any]) -> bool:
+    """Whether the chunk consists of messages at these offsets and of nothing else, so that a walk would find the same."""
+    ends = offsets + _RECORD.size + heads["length"].astype(np.int64)
+    messages = (heads["opcode"] == Opcode.MESSAGE) & (heads["length"] >= _FIELDS_BYTES)
+    return bool(offsets[0] == 0 and (ends[:-1] == offsets[1:]).all() and ends[-1] == len(data) and messages.all())
+
+
+def _walked(data: Bytes) -> Column:
+    """Offsets of the messages, found from record to record."""
+    raw = data.tobytes()
+    found: list[int] = []
+    at, end = 0, len(raw)
+    while at + _RECORD.size <= end:
+        opcode, length = _RECORD.unpack_from(raw, at)
+        if length > end - at - _RECORD.size:
+            break
+        if opcode == Opcode.MESSAGE and length >= _FIELDS_BYTES:
+            found.append(at)
+        at += _RECORD.size + length
+    return np.array(found, np.int64)
+
+
+def _cut(data: Bytes, starts: Column, size: int) -> npt.NDArray[Any]:
+    """`size` bytes of the data from each start on, [starts]."""
+    if not len(starts):
+        return np.empty(0, f"V{size}")
+    # every place of the data as the start of an element: numpy then copies whole elements, without an index for each byte
+    overlapping: npt.NDArray[Any] = np.ndarray((len(data) - size + 1,), f"V{size}", data, 0, (1,))
+    return overlapping[starts]
