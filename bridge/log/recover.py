@@ -14,8 +14,6 @@ from bridge.log.mcap_chunks import ChunkWriter
 from bridge.wire.payloads import file_descriptor_set
 from bridge.wire.topics import BY_NAME
 
-_UINT64 = 2**64 - 1
-
 
 class Recovered(NamedTuple):
     """The result of `recover`."""
@@ -63,12 +61,9 @@ class _Copy:
         return self.channel_ids[channel_id]
 
     def take_messages(self, messages: Messages) -> None:
-        columns = (messages.channel, messages.sequence, messages.log_ns, messages.publish_ns)
-        rows = zip(*(column.tolist() for column in columns), messages.payloads(), strict=True)
-        for channel, sequence, log_ns, publish_ns, payload in rows:
-            self.writer.add_message(
-                self.take_channel(channel), log_ns & _UINT64, payload, publish_ns & _UINT64, sequence
-            )
+        columns = (messages.heads[name].tolist() for name in ("channel", "sequence", "log_ns", "publish_ns"))
+        for channel, sequence, log_ns, publish_ns, payload in zip(*columns, messages.payloads(), strict=True):
+            self.writer.add_message(self.take_channel(channel), log_ns, payload, publish_ns, sequence)
 
 
 def recover(path: Path, out: Path) -> Recovered:

@@ -84,8 +84,10 @@ class Layout:
 
     def blank(self, count: int = 1) -> Records:
         """`count` messages of zeros, [count]; their `tobytes()` is their protobuf encoding."""
-        # over a bytearray, as numpy's copy of a record drops the bytes between the fields, which are the tags
-        return np.frombuffer(bytearray(self._template * count), self.dtype)
+        # filled as bytes, as numpy's copy of a record drops the bytes between the fields, which are the tags
+        messages = np.empty((count, self.size), np.uint8)
+        messages[:] = np.frombuffer(self._template, np.uint8)
+        return np.frombuffer(messages, self.dtype)
 
     def is_canonical(self, payload: bytes) -> bool:
         """Whether every field is written, in the order of the field numbers."""
