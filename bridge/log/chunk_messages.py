@@ -1,4 +1,4 @@
-"""Column of the messages in the bytes of a chunk: from its index where that is right, else by a walk from message to message."""
+"""Places of the messages in the bytes of chunks: from their indexes where these are right, else by a walk through the records."""
 
 import struct
 from collections.abc import Sequence
@@ -27,10 +27,19 @@ Bytes = npt.NDArray[np.uint8]
 Column = npt.NDArray[np.int64]
 
 
-class Messages(NamedTuple):
-    """Messages of a chunk in file order."""
+class Chunked(NamedTuple):
+    """A chunk, uncompressed."""
 
-    data: Bytes  # of the chunk, uncompressed
+    data: bytes
+    indexes: list[
+        bytes
+    ]  # contents of the index records that followed it; they may be missing, damaged or of another chunk
+
+
+class Messages(NamedTuple):
+    """Messages of some chunks in file order."""
+
+    data: Bytes  # of the chunks
     heads: npt.NDArray[Any]  # [messages], with the fields channel, sequence, log_ns and publish_ns
     start: Column  # of the payload in `data`, [messages]
 
@@ -57,27 +66,24 @@ class Messages(NamedTuple):
         return _cut(self.data, self.start, size).view(np.uint8).reshape(-1, size)
 
 
-def messages_of(data: Bytes, indexes: Sequence[bytes]) -> Messages:
-    """The messages of a chunk.
-
-    Args:
-        data: of the chunk, uncompressed.
-        indexes: contents of the index records that followed it in the file; they may be missing, damaged or of another chunk.
-
-    """
-    offsets = _indexed(indexes)
+def messages_of(chunks: Sequence[Chunked]) -> Messages:
+    """The messages of one chunk or several."""
+    data = np.frombuffer(b"".join([chunk.data for chunk in chunks]), np.uint8)
+    begins = np.cumsum([0, *(len(chunk.data) for chunk in chunks)])
+    offsets = _indexed(chunks, begins)
     heads = _heads(data, offsets)
-    if heads is None or not _tile(data, offsets, heads):
-        offsets = _walked(data)
+    if heads is None or not _tile(begins, offsets, heads):
+        offsets = np.concatenate([_walked(chunk.data) + begin for chunk, begin in zip(chunks, begins, strict=False)])
         heads = _cut(data, offsets, _HEAD.itemsize).view(_HEAD)
     return Messages(data, heads, offsets + _HEAD.itemsize)
 
 
-def _indexed(indexes: Sequence[bytes]) -> Column:
-    """Offsets of the messages as the index tells them, in file order; nothing is checked."""
+def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
+    """Offsets of the messages as the indexes tell them, in file order; nothing is checked."""
     parts = [
-        np.frombuffer(content, _INDEX_ENTRY, offset=_INDEX_HEAD_BYTES)["offset"].astype(np.int64)
-        for content in indexes
+        np.frombuffer(content, _INDEX_ENTRY, offset=_INDEX_HEAD_BYTES)["offset"].astype(np.int64) + begin
+        for chunk, begin in zip(chunks, begins, strict=False)
+        for content in chunk.indexes
         if len(content) > _INDEX_HEAD_BYTES and len(content) % _INDEX_ENTRY.itemsize == _INDEX_HEAD_BYTES
     ]
     # a few ascending parts, which a stable sort merges: 15 times as fast as the usual one
@@ -91,20 +97,23 @@ def _heads(data: Bytes, offsets: Column) -> npt.NDArray[Any] | None:
     return _cut(data, offsets, _HEAD.itemsize).view(_HEAD)
 
 
-def _tile(data: Bytes, offsets: Column, heads: npt.NDArray[Any]) -> bool:
-    """Whether the chunk consists of messages at these offsets and of nothing else, so that a walk would find the same."""
+def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
+    """Whether the chunks consist of messages at these offsets and of nothing else, so that a walk would find the same."""
     ends = offsets + _RECORD.size + heads["length"].astype(np.int64)
     messages = (heads["opcode"] == Opcode.MESSAGE) & (heads["length"] >= _FIELDS_BYTES)
-    return bool(offsets[0] == 0 and (ends[:-1] == offsets[1:]).all() and ends[-1] == len(data) and messages.all())
+    whole = offsets[0] == 0 and (ends[:-1] == offsets[1:]).all() and ends[-1] == begins[-1] and messages.all()
+    # no message goes on from one chunk into the next
+    return bool(
+        whole and (offsets[np.minimum(np.searchsorted(offsets, begins[:-1]), len(offsets) - 1)] == begins[:-1]).all()
+    )
 
 
-def _walked(data: Bytes) -> Column:
-    """Offsets of the messages, found from record to record."""
-    raw = data.tobytes()
+def _walked(data: bytes) -> Column:
+    """Offsets of the messages of a chunk, found from record to record."""
     found: list[int] = []
-    at, end = 0, len(raw)
+    at, end = 0, len(data)
     while at + _RECORD.size <= end:
-        opcode, length = _RECORD.unpack_from(raw, at)
+        opcode, length = _RECORD.unpack_from(data, at)
         if length > end - at - _RECORD.size:
             break
         if opcode == Opcode.MESSAGE and length >= _FIELDS_BYTES:

@@ -8,12 +8,10 @@ import contextlib
 import struct
 import zlib
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from io import BytesIO
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
-import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -21,7 +19,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Metadata, Schema
 
 from bridge.faults import Fault
-from bridge.log.chunk_messages import Messages, messages_of
+from bridge.log.chunk_messages import Chunked, Messages, messages_of
 from bridge.log.damage import Damage
 from bridge.log.library import LIBRARY, MAGIC
 from bridge.wire.topics import TOPICS
@@ -34,16 +32,10 @@ _FOOTER_BYTES = 20
 _CHUNK_MARK = struct.pack("<I4s", 4, b"zstd")
 _MARK_AT = 28
 _SEARCH_BYTES = 1 << 20
+# of chunks that are taken apart at once; with less the calls cost more than the work, as a chunk of 0.1 s holds 0.1 MB
+_AT_ONCE_BYTES = 1 << 19
 _UNREADABLE = (McapError, struct.error, UnicodeDecodeError, zstandard.ZstdError, MemoryError, OverflowError)
 _CHANNEL_TOPICS = {i + 1: topic.name for i, topic in enumerate(topic for topic in TOPICS if topic.logged)}
-
-
-class _Packed(NamedTuple):
-    """A chunk as it is in the file."""
-
-    records: Future[bytes | None]  # uncompressed; None when the chunk is damaged
-    indexes: list[bytes]  # contents of the index records after it
-    end_bytes: int  # place of its end in the file
 
 
 class LogReader:
@@ -71,23 +63,33 @@ class LogReader:
         return _CHANNEL_TOPICS.get(channel_id, f"channel {channel_id}")
 
     def messages(self) -> Iterator[Messages]:
-        """The messages of each chunk. Raises Fault BAD_LOG when the file is not a run log."""
-        for data, indexes in self._unpacked():
-            yield messages_of(np.frombuffer(data, np.uint8), indexes)
+        """The messages of one chunk after the other, of several small ones at once.
 
-    def _unpacked(self) -> Iterator[tuple[bytes, list[bytes]]]:
-        """For each chunk that is not damaged: its records, uncompressed, and its indexes."""
+        Raises Fault BAD_LOG when the file is not a run log.
+        """
+        some: list[Chunked] = []
+        for chunk in self._chunks():
+            some.append(chunk)
+            if sum(len(one.data) for one in some) >= _AT_ONCE_BYTES:
+                yield messages_of(some)
+                some = []
+        if some:
+            yield messages_of(some)
+
+    def _chunks(self) -> Iterator[Chunked]:
+        """Every chunk that is not damaged, uncompressed."""
         try:
-            # the next chunk is uncompressed while the caller works on the present one
-            with self.path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as beside:
+            with self.path.open("rb") as file:
                 self.size_bytes = self.path.stat().st_size
-                ready: _Packed | None = None
-                for packed in self._packed(file, beside):
-                    if ready is not None:
-                        yield from self._learned(ready)
-                    ready = packed
-                if ready is not None:
-                    yield from self._learned(ready)
+                for content, indexes, end_bytes in self._packed(file):
+                    data = _uncompressed(content)
+                    if data is None:
+                        self._count(bad_chunks=1)
+                        continue
+                    self._must_have_header()
+                    self._learn_channels(data)
+                    self.position_bytes = end_bytes
+                    yield Chunked(data, indexes)
         except OSError as error:
             raise Fault(
                 "BAD_LOG", f"{self.path}: cannot be read: {error.strerror}; give the path of a .mcap file"
@@ -95,29 +97,18 @@ class LogReader:
         self.position_bytes = self.size_bytes
         self._must_have_header()
 
-    def _learned(self, packed: _Packed) -> Iterator[tuple[bytes, list[bytes]]]:
-        """One chunk; nothing, but for the count, where it is damaged."""
-        data = packed.records.result()
-        if data is None:
-            self._count(bad_chunks=1)
-            return
-        self._must_have_header()
-        self._learn_channels(data)
-        self.position_bytes = packed.end_bytes
-        yield data, packed.indexes
-
-    def _packed(self, file: IO[bytes], beside: ThreadPoolExecutor) -> Iterator[_Packed]:
-        """Every chunk, once the record after its indexes was read."""
+    def _packed(self, file: IO[bytes]) -> Iterator[tuple[bytes, list[bytes], int]]:
+        """For each chunk: its content, the contents of its indexes, and the place of its end in the file."""
         if file.read(len(MAGIC)) != MAGIC:
             line = f"{self.path}: {self.size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
             raise Fault("BAD_LOG", line)
         whole_bytes = len(MAGIC)
-        chunk: _Packed | None = None
+        chunk: tuple[bytes, list[bytes], int] | None = None
         while not self.damage.closed:
             record = _next(file, self.size_bytes)
             is_chunk = record is not None and _is_chunk(*record)
             if chunk is not None and (record is None or is_chunk or record[0] != Opcode.MESSAGE_INDEX):
-                yield chunk
+                yield chunk  # now that all of its indexes were read
                 chunk = None
             if record is None:
                 start = self._after_damage(file, whole_bytes)
@@ -127,11 +118,11 @@ class LogReader:
                 continue
             opcode, content = record
             if is_chunk:
-                chunk = _Packed(beside.submit(_uncompressed, content), [], file.tell())
+                chunk = content, [], file.tell()
             elif opcode == Opcode.FOOTER and len(content) == _FOOTER_BYTES:
                 self.damage = self.damage._replace(closed=True)
             elif chunk is not None:
-                chunk.indexes.append(content)
+                chunk[1].append(content)
             else:
                 self._learn(opcode, content)
             whole_bytes = file.tell()
