@@ -113,7 +113,7 @@ def test_tables_chunk_by_chunk_are_the_whole_run(log: Path) -> None:
         if piece.topic in STREAMING:
             pieces[piece.topic].append(piece.records.tobytes())
     run = read_run(log)
-    assert len(pieces["sensors"]) > 5
+    assert len(pieces["sensors"]) > 1
     for name in STREAMING:
         assert b"".join(pieces[name]) == getattr(run, name).tobytes()
 
