@@ -33,7 +33,7 @@ _CHUNK_MARK = struct.pack("<I4s", 4, b"zstd")
 _MARK_AT = 28
 _SEARCH_BYTES = 1 << 20
 # of chunks that are taken apart at once; with less the calls cost more than the work, as a chunk of 0.1 s holds 0.1 MB
-_AT_ONCE_BYTES = 1 << 19
+AT_ONCE_BYTES = 1 << 19
 _UNREADABLE = (McapError, struct.error, UnicodeDecodeError, zstandard.ZstdError, MemoryError, OverflowError)
 _CHANNEL_TOPICS = {i + 1: topic.name for i, topic in enumerate(topic for topic in TOPICS if topic.logged)}
 
@@ -70,7 +70,7 @@ class LogReader:
         some: list[Chunked] = []
         for chunk in self._chunks():
             some.append(chunk)
-            if sum(len(one.data) for one in some) >= _AT_ONCE_BYTES:
+            if sum(len(one.data) for one in some) >= AT_ONCE_BYTES:
                 yield messages_of(some)
                 some = []
         if some:
