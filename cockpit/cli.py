@@ -4,7 +4,6 @@ import logging
 import os
 import platform
 import sys
-from importlib.metadata import version
 from typing import Annotated
 
 import typer
@@ -96,6 +95,8 @@ app.command("explain")(explain)
 
 def _say_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version
+
         print(f"stickslip {version('stickslip')}, Python {platform.python_version()}")
         raise typer.Exit
 

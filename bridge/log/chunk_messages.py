@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,7 +70,7 @@ class Messages(NamedTuple):
 def messages_of(chunks: Sequence[Chunked]) -> Messages:
     """The messages of one chunk or several."""
     data = np.frombuffer(b"".join([chunk.data for chunk in chunks]), np.uint8)
-    begins = np.cumsum([0, *(len(chunk.data) for chunk in chunks)])
+    begins = np.array([0, *accumulate(len(chunk.data) for chunk in chunks)])
     offsets = _indexed(chunks, begins)
     heads = _heads(data, offsets)
     if heads is None or not _tile(begins, offsets, heads):

@@ -153,10 +153,10 @@ def operator_stop(
     def work() -> None:
         from bridge.wire import stickslip_pb2 as wire
         from cockpit.run.operator import tell as say
-        from cockpit.run.scenario import load_scenario
+        from cockpit.run.scenario_file import load_bus
 
-        made = load_scenario(scenario, as_settings([], None, endpoint, prefix))
-        taken = say(made.bus, wire.Operator.RESET if reset else wire.Operator.STOP)
-        tell(as_json, Taken(made.bus.endpoint, taken), [f"taken    {taken}"])
+        bus = load_bus(scenario, as_settings([], None, endpoint, prefix))
+        taken = say(bus, wire.Operator.RESET if reset else wire.Operator.STOP)
+        tell(as_json, Taken(bus.endpoint, taken), [f"taken    {taken}"])
 
     carry_out(work, as_json)

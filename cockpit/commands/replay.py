@@ -76,9 +76,9 @@ def replay_command(
                     line = f"{option}: not with --to-bus, which plays the log as it is; leave one of them out"
                     raise Fault("CONFIG", line)
             from cockpit.run.log_to_bus import publish_log
-            from cockpit.run.scenario import load_scenario
+            from cockpit.run.scenario_file import load_bus
 
-            bus = load_scenario(DEFAULT_SCENARIO, as_settings([], None, endpoint, prefix)).bus
+            bus = load_bus(DEFAULT_SCENARIO, as_settings([], None, endpoint, prefix))
             roles = ["controller", "recorder"] if wait else []
             stop = stop_event()
             for path in logs:

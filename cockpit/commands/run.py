@@ -40,7 +40,7 @@ def run(
 
     def work() -> int:
         from cockpit.run.run import run_scenario
-        from cockpit.run.scenario import rig_setting
+        from cockpit.run.scenario_file import rig_setting
 
         other = [rig_setting(rig)] if rig is not None else []
         changed = [*other, *as_settings(settings, seed, endpoint, prefix)]

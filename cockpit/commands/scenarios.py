@@ -17,7 +17,7 @@ def scenarios(as_json: Json = None) -> None:
 
     def work() -> None:
         from bridge.config import read_toml
-        from cockpit.run.scenario import deploy_folder
+        from cockpit.run.scenario_file import deploy_folder
 
         found = {
             path.stem: str(read_toml(path).get("description", ""))

@@ -200,7 +200,7 @@ def _lost_blocks(run: RunData) -> tuple[int, bool]:
 
     A damaged chunk may hold the first blocks or the last ones: then the plant's END counts, which says how many there were.
     """
-    numbers = np.unique(run.sensors["sequence"].astype(np.int64))
+    numbers = _numbers(run.sensors)
     whole = run.damage.whole
     ends = [_BLOCKS.search(event.text) for event in run.events if (event.source, event.code) == ("plant", "END")]
     told = [int(found[1]) for found in ends if found]
@@ -215,8 +215,14 @@ def _lost(table: Any) -> int:
     """Messages that are missing between the first and the last number, whatever the order they came in."""
     if not len(table):
         return 0
-    sequence = table["sequence"].astype(np.int64)
-    return int(sequence.max() - sequence.min() + 1 - len(np.unique(sequence)))
+    numbers = _numbers(table)
+    return int(numbers[-1] - numbers[0] + 1 - len(numbers))
+
+
+def _numbers(table: Any) -> Any:
+    """The numbers of messages, ascending, each once."""
+    numbers = np.sort(table["sequence"].astype(np.int64), kind="stable")
+    return numbers[np.concatenate([[True], numbers[1:] > numbers[:-1]])[: len(numbers)]]
 
 
 def _phase(

@@ -1,4 +1,4 @@
-"""A scenario file: one rig, one controller, one duration. And where the files that come with the project are."""
+"""A scenario: one rig, one controller, one duration."""
 
 import json
 import platform
@@ -14,11 +14,10 @@ from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
+from cockpit.run.scenario_file import RIG_FILE, find, rig_table, with_rig
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 from plant.config_limits import refuse_what_no_rig_does
-
-_RIG_FILE = "rig={file="  # of the setting that names another rig
 
 
 def _plain(name: str) -> str:
@@ -72,38 +71,10 @@ class Scenario(Strict):
         return self
 
 
-def deploy_folder() -> Path:
-    """The folder of rigs and scenarios: inside an installed package, beside the packages in a checkout."""
-    installed = Path(__file__).parents[1] / "deploy"
-    return installed if installed.is_dir() else Path(__file__).parents[2] / "deploy"
-
-
-def _find(name: str, kind: str) -> Path:
-    """A file by path, or by the name of one that comes with the project."""
-    given = Path(name)
-    if given.suffix == ".toml":
-        return given
-    known = {path.stem: path for path in sorted((deploy_folder() / kind).glob("*.toml"))}
-    if name not in known:
-        raise Fault(
-            "CONFIG",
-            f"{name}: no such {kind.removesuffix('s')}; known: {', '.join(known)}; or give the path of a .toml file",
-        )
-    return known[name]
-
-
-def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    result = dict(below)
-    for key, value in above.items():
-        inner = result.get(key)
-        result[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
-    return result
-
-
 def load_rig(name: str, settings: list[str]) -> RigConfig:
     """A rig by name or path, with `key=value` settings applied. Raises Fault CONFIG."""
-    path = _find(name, "rigs")
-    table = _rig_table(path)
+    path = find(name, "rigs")
+    table = rig_table(path)
     try:
         return validate(RigConfig, with_overrides(table, settings), path.name)
     except Fault as fault:
@@ -111,49 +82,23 @@ def load_rig(name: str, settings: list[str]) -> RigConfig:
         raise blamed(fault, path.name, settings) from None
 
 
-def _rig_table(path: Path) -> dict[str, Any]:
-    table = read_toml(path)
-    if "rig" in table:
-        raise Fault(
-            "CONFIG", f"{path}: is a scenario, not a rig; give the rig that it names, or the whole with --scenario"
-        )
-    return table
-
-
-def rig_setting(name: str) -> str:
-    """The setting that puts another rig in the place of a scenario's. Raises Fault CONFIG when there is none of that name."""
-    return f"{_RIG_FILE}{json.dumps(str(_find(name, 'rigs').resolve()), ensure_ascii=False)}}}"
-
-
 def load_scenario(name: str, settings: list[str]) -> Scenario:
     """A scenario by name or path, with `key=value` settings applied. Raises Fault CONFIG.
 
     Its table `rig` names a rig file (`file`) and may override any of its keys.
     """
-    path = _find(name, "scenarios")
+    path = find(name, "scenarios")
     given = read_toml(path)
     if "contact" in given and "rig" not in given:
         raise Fault("CONFIG", f"{path}: is a rig, not a scenario; give it with --rig")
-    of_rig = [setting for setting in settings if setting.startswith(_RIG_FILE)]
-    table, source = _with_rig(path, with_overrides({"name": path.stem} | given, settings))
+    of_rig = [setting for setting in settings if setting.startswith(RIG_FILE)]
+    table, source = with_rig(path, with_overrides({"name": path.stem} | given, settings))
     try:
         return validate(Scenario, table, source)
     except Fault as fault:
-        table, source = _with_rig(path, with_overrides({"name": path.stem} | given, of_rig))
+        table, source = with_rig(path, with_overrides({"name": path.stem} | given, of_rig))
         validate(Scenario, table, source)  # the files by themselves
         raise blamed(fault, source, [setting for setting in settings if setting not in of_rig]) from None
-
-
-def _with_rig(path: Path, table: dict[str, Any]) -> tuple[dict[str, Any], str]:
-    """The table of a scenario with that of the rig file that it names, and which files these are."""
-    rig = table.get("rig")
-    if not isinstance(rig, dict) or "file" not in rig:
-        return table, path.name
-    overrides = {key: value for key, value in rig.items() if key != "file"}
-    rig_name = str(rig["file"])
-    beside = path.parent / rig_name
-    rig_path = beside if beside.suffix == ".toml" and beside.is_file() else _find(rig_name, "rigs")
-    return table | {"rig": _merged(_rig_table(rig_path), overrides)}, f"{path.name} with {rig_path.name}"
 
 
 def processor() -> str:

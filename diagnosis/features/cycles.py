@@ -1,15 +1,13 @@
 """Slips of a force record: breakaways, re-sticks, and their means over a run."""
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.kernel import kernel
+from diagnosis.features.turns import turns
 
 Floats = npt.NDArray[np.floating[Any]]
-Indices = npt.NDArray[np.int64]
 
 # Seconds over which samples are averaged first. Too small: noise; too large: the peaks of a slip are cut.
 # A slip of the paper's rig lasts pi sqrt(m / k_d) = 36 ms and its peaks are round: 1 ms cuts them by less than 3 mN and
@@ -102,8 +100,9 @@ def find_cycles(
     t_s, force_N = _binned(np.asarray(t_s, np.float64), np.asarray(drive_force_N, np.float64))
     if minimum_drop_N is None:
         minimum_drop_N = _minimum_drop_N(force_N)
-    tops, bottoms = turning_points(force_N, minimum_drop_N)
-    peaks, troughs = tops.tolist(), bottoms.tolist()
+    at = [0] * len(force_N)
+    count = turns(force_N.tolist(), minimum_drop_N, at)
+    peaks, troughs = at[:count:2], at[1:count:2]
     fast = [
         _fall_s(t_s[peak : trough + 1], force_N[peak : trough + 1]) <= slowest_fall_s
         for peak, trough in zip(peaks, [*troughs, len(force_N) - 1], strict=False)
@@ -129,49 +128,14 @@ def _minimum_drop_N(force_N: Floats) -> float:
         return 0.0
     # second differences remove the climb of a stick, and their median ignores the few bins of the slips
     bend_N = np.abs(np.diff(force_N, 2))
-    noise_N = 1.4826 * float(np.median(bend_N)) / 6.0**0.5
-    return max(0.03 * abs(float(np.median(force_N))), _NOISE_SPANS * noise_N)
+    noise_N = 1.4826 * _median(bend_N) / 6.0**0.5
+    return max(0.03 * abs(_median(force_N)), _NOISE_SPANS * noise_N)
 
 
-def turning_points(force_N: Floats, drop_N: float) -> tuple[Indices, Indices]:
-    """Indices of maxima and of minima that alternate and differ by at least `drop_N`; the first is a maximum.
-
-    Two arrays; the second is one shorter when the record ends in a fall.
-    """
-    at = np.empty(len(force_N), np.int64)
-    turns = _turns(force_N, drop_N, at)
-    return at[:turns:2], at[1:turns:2]
-
-
-@kernel
-def _turns(force_N: Floats, drop_N: float, at: Indices) -> int:
-    turns = 0
-    sign = 1.0  # while it rises
-    extreme_N, here = -math.inf, 0
-    for i in range(len(force_N)):
-        value_N = sign * force_N[i]
-        if value_N > extreme_N:
-            extreme_N, here = value_N, i
-        elif value_N < extreme_N - drop_N:
-            at[turns] = here
-            turns += 1
-            sign = -sign
-            extreme_N, here = -value_N, i
-    return turns
-
-
-@kernel
-def half_fallen(falling: Floats, tops: Indices, bottoms: Indices) -> Floats:
-    """Instant, in samples, at which half of each fall is done, [falls]; interpolated between two samples."""
-    found = np.empty(len(tops))
-    for fall in range(len(tops)):
-        half = 0.5 * (falling[tops[fall]] + falling[bottoms[fall]])
-        under = tops[fall]
-        while falling[under] > half:
-            under += 1
-        step = falling[under - 1] - falling[under]
-        found[fall] = under - (half - falling[under]) / step if step > 0.0 else under
-    return found
+def _median(values: Floats) -> float:
+    """As `numpy.median` of finite numbers, whose first call imports the masked arrays, which takes 30 ms."""
+    middle = np.partition(values, ((len(values) - 1) // 2, len(values) // 2))
+    return float(middle[(len(values) - 1) // 2] + middle[len(values) // 2]) / 2.0
 
 
 def _fall_s(t_s: Floats, force_N: Floats) -> float:

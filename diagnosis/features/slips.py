@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from diagnosis.features.cycles import half_fallen, turning_points
+from diagnosis.features.falls import half_fallen, turning_points
 from diagnosis.features.feature import Scales, Signals
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import Segment

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.features.cycles import turning_points
+from diagnosis.features.falls import turning_points
 from diagnosis.features.feature import Scales
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.gap.prepare import Prepared

@@ -9,7 +9,8 @@ import pytest
 
 from bridge.config import Strict, read_toml, validate, with_overrides
 from bridge.faults import Fault
-from cockpit.run.scenario import load_rig, load_scenario, rig_setting
+from cockpit.run.scenario import load_rig, load_scenario
+from cockpit.run.scenario_file import rig_setting
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 
@@ -231,7 +232,7 @@ def test_a_controller_within_the_frequencies_of_its_rig_is_taken() -> None:
 
 
 def test_every_rig_and_scenario_that_comes_along_is_valid() -> None:
-    from cockpit.run.scenario import deploy_folder
+    from cockpit.run.scenario_file import deploy_folder
 
     for path in deploy_folder().glob("rigs/*.toml"):
         assert load_rig(path.stem, []).name == path.stem

@@ -13,7 +13,7 @@ from bridge.files import strict_json
 from cockpit.cli import app
 from cockpit.commands import diagnose_output
 from cockpit.commands.schemas import FORMATS, JSON, TOML
-from cockpit.run.scenario import deploy_folder
+from cockpit.run.scenario_file import deploy_folder
 from diagnosis import diagnose_many as many
 from diagnosis.result import to_json
 from plant.effects.library import EFFECTS

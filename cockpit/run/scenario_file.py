@@ -1,0 +1,91 @@
+"""Scenario and rig files as tables: where they are, how one names the other, and which bus they name.
+
+Without the model of the rig, whose kernels take half a second to load: a person who stops a rig does not wait for it, nor for a
+mistake in another table of the scenario to be mended.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from bridge.config import Strict, blamed, read_toml, validate, with_overrides
+from bridge.faults import Fault
+from bridge.wire.zenoh_link import BusConfig
+
+RIG_FILE = "rig={file="  # of the setting that names another rig
+
+
+class _OfBus(Strict):
+    """The part of a scenario that says where its processes meet."""
+
+    bus: BusConfig = BusConfig()
+
+
+def deploy_folder() -> Path:
+    """The folder of rigs and scenarios: inside an installed package, beside the packages in a checkout."""
+    installed = Path(__file__).parents[1] / "deploy"
+    return installed if installed.is_dir() else Path(__file__).parents[2] / "deploy"
+
+
+def find(name: str, kind: str) -> Path:
+    """A file by path, or by the name of one that comes with the project."""
+    given = Path(name)
+    if given.suffix == ".toml":
+        return given
+    known = {path.stem: path for path in sorted((deploy_folder() / kind).glob("*.toml"))}
+    if name not in known:
+        raise Fault(
+            "CONFIG",
+            f"{name}: no such {kind.removesuffix('s')}; known: {', '.join(known)}; or give the path of a .toml file",
+        )
+    return known[name]
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    result = dict(below)
+    for key, value in above.items():
+        inner = result.get(key)
+        result[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
+    return result
+
+
+def rig_table(path: Path) -> dict[str, Any]:
+    """The table of a rig file. Raises Fault CONFIG."""
+    table = read_toml(path)
+    if "rig" in table:
+        raise Fault(
+            "CONFIG", f"{path}: is a scenario, not a rig; give the rig that it names, or the whole with --scenario"
+        )
+    return table
+
+
+def rig_setting(name: str) -> str:
+    """The setting that puts another rig in the place of a scenario's. Raises Fault CONFIG when there is none of that name."""
+    return f"{RIG_FILE}{json.dumps(str(find(name, 'rigs').resolve()), ensure_ascii=False)}}}"
+
+
+def with_rig(path: Path, table: dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """The table of a scenario with that of the rig file that it names, and which files these are."""
+    rig = table.get("rig")
+    if not isinstance(rig, dict) or "file" not in rig:
+        return table, path.name
+    overrides = {key: value for key, value in rig.items() if key != "file"}
+    rig_name = str(rig["file"])
+    beside = path.parent / rig_name
+    rig_path = beside if beside.suffix == ".toml" and beside.is_file() else find(rig_name, "rigs")
+    return table | {"rig": _merged(rig_table(rig_path), overrides)}, f"{path.name} with {rig_path.name}"
+
+
+def load_bus(name: str, settings: list[str]) -> BusConfig:
+    """The bus of a scenario by name or path, with `bus.key=value` settings applied. Raises Fault CONFIG."""
+    path = find(name, "scenarios")
+    given = read_toml(path)
+
+    def bus(table: dict[str, Any]) -> BusConfig:
+        return validate(_OfBus, {key: table[key] for key in ("bus",) if key in table}, path.name).bus
+
+    try:
+        return bus(with_overrides(given, settings))
+    except Fault as fault:
+        bus(given)  # the file by itself
+        raise blamed(fault, path.name, settings) from None

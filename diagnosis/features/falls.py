@@ -1,0 +1,38 @@
+"""Falls of a record, compiled: where each begins, where it ends, and when half of it is done."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.kernel import kernel
+from diagnosis.features.turns import turns
+
+Floats = npt.NDArray[np.floating[Any]]
+Indices = npt.NDArray[np.int64]
+
+_turns = kernel(turns)
+
+
+def turning_points(force_N: Floats, drop_N: float) -> tuple[Indices, Indices]:
+    """Indices of maxima and of minima that alternate and differ by at least `drop_N`; the first is a maximum.
+
+    Two arrays; the second is one shorter when the record ends in a fall.
+    """
+    at = np.empty(len(force_N), np.int64)
+    count = _turns(force_N, drop_N, at)
+    return at[:count:2], at[1:count:2]
+
+
+@kernel
+def half_fallen(falling: Floats, tops: Indices, bottoms: Indices) -> Floats:
+    """Instant, in samples, at which half of each fall is done, [falls]; interpolated between two samples."""
+    found = np.empty(len(tops))
+    for fall in range(len(tops)):
+        half = 0.5 * (falling[tops[fall]] + falling[bottoms[fall]])
+        under = tops[fall]
+        while falling[under] > half:
+            under += 1
+        step = falling[under - 1] - falling[under]
+        found[fall] = under - (half - falling[under]) / step if step > 0.0 else under
+    return found
