@@ -15,7 +15,7 @@ from cockpit.commands.explain import explain
 from cockpit.commands.json_option import JsonGroup
 from cockpit.commands.log import log_app
 from cockpit.commands.pictures import plot, reproduce, stability
-from cockpit.commands.processes import controller, operator_stop, plant, record
+from cockpit.commands.processes import controller, operator_stop, plant, record, status
 from cockpit.commands.replay import replay_command
 from cockpit.commands.run import run
 from cockpit.commands.scenarios import scenarios
@@ -51,6 +51,7 @@ app.command("controller")(controller)
 app.command("record")(record)
 app.command("recorder", hidden=True)(record)  # a child is named by its role
 app.command("stop")(operator_stop)
+app.command("status")(status)
 app.command(
     "replay",
     epilog=_examples(

@@ -31,7 +31,7 @@ from bridge.wire.payloads import parsed
 from bridge.wire.topics import Topic
 
 _CONNECT_S = 30.0  # time to wait for the plant; a first start compiles before it listens, which can take more than 10 s
-_DIAL_S = 2.0  # duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
+_DIAL_S = 2.0  # largest duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
 
 
 class BusConfig(Strict):
@@ -114,13 +114,13 @@ class Inbox:
             return None
 
 
-def session_config(config: BusConfig, hub: bool, lockstep: bool) -> zenoh.Config:
-    """The settings of a session; `hub` is the session that listens."""
+def session_config(config: BusConfig, hub: bool, lockstep: bool, dial_s: float = _DIAL_S) -> zenoh.Config:
+    """The settings of a session; `hub` is the session that listens, any other dials for `dial_s`."""
     settings: dict[str, Any] = {
         "mode": "peer" if hub else "client",
         "listen/endpoints": [config.endpoint] if hub else [],
         "connect/endpoints": [] if hub else [config.endpoint],
-        "connect/timeout_ms": 0 if hub else round(_DIAL_S * 1e3),
+        "connect/timeout_ms": 0 if hub else round(dial_s * 1e3),
         "connect/exit_on_failure": not hub,
         "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
         "scouting/multicast/enabled": False,
@@ -152,7 +152,7 @@ def _dialled(config: BusConfig, lockstep: bool, stop: threading.Event, patience_
     until_s = time.monotonic() + patience_s
     while not stop.is_set():
         try:
-            return zenoh.open(session_config(config, hub=False, lockstep=lockstep))
+            return zenoh.open(session_config(config, False, lockstep, min(_DIAL_S, patience_s)))
         except zenoh.ZError:
             if time.monotonic() > until_s:
                 line = f"{config.endpoint}: no plant answers there after {patience_s:g} s"

@@ -1,4 +1,4 @@
-"""`stickslip plant`, `controller`, `record` and `stop`: one process of a run, and a person's word to it."""
+"""`stickslip plant`, `controller`, `record`, `stop` and `status`: one process of a run; a person's word to it and look at it."""
 
 from typing import Annotated, NamedTuple
 
@@ -158,5 +158,24 @@ def operator_stop(
         bus = load_bus(scenario, as_settings([], None, endpoint, prefix))
         taken = say(bus, wire.Operator.RESET if reset else wire.Operator.STOP)
         tell(as_json, Taken(bus.endpoint, taken), [f"taken    {taken}"])
+
+    carry_out(work, as_json)
+
+
+def status(
+    scenario: ScenarioName = DEFAULT_SCENARIO,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    as_json: Json = None,
+) -> None:
+    """Say what goes on at a rig now, within a second; exit status 1: nobody controls it, 4: no rig answers."""
+
+    def work() -> int:
+        from cockpit.run.scenario_file import load_bus
+        from cockpit.run.status import look
+
+        seen = look(load_bus(scenario, as_settings([], None, endpoint, prefix)))
+        tell(as_json, seen, seen.in_words())
+        return 0 if seen.controlled else 1
 
     carry_out(work, as_json)

@@ -232,6 +232,7 @@ JSON = (
     Format("plant-result", "`stickslip plant --json`.", _result_of("cockpit.commands.processes", "Served")),
     Format("controller-result", "`stickslip controller --json`.", _result_of("cockpit.commands.processes", "Served")),
     Format("record-result", "`stickslip record --json`.", _result_of("cockpit.commands.processes", "Recorded")),
+    Format("status-result", "`stickslip status --json`.", _result_of("cockpit.run.status", "Status")),
     Format("stop-result", "`stickslip stop --json`.", _result_of("cockpit.commands.processes", "Taken")),
     Format("replay-result", "`stickslip replay --json`.", _result_of("cockpit.run.replay", "Replayed", many=True)),
     Format(
