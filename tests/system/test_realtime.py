@@ -1,5 +1,6 @@
 """A short run in real time over the bus, and an operator's word during it."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -110,6 +111,12 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
         refused = subprocess.run(second, timeout=60, check=False, capture_output=True, text=True)
         assert refused.returncode == FAULTS["ENDPOINT_BUSY"].exit_status
         assert f"{endpoint}: another controller is on this bus: must be one" in refused.stderr
+        told = subprocess.run(
+            [*COMMAND, "status", "--json", "--endpoint", endpoint], timeout=30, check=True, capture_output=True
+        )
+        status = json.loads(told.stdout)
+        assert (status["rig"], status["mode"]) == ("paper-c45-c45", "STOPPED")
+        assert status["roles"] == ["plant", "controller", "recorder"]
         again = [*COMMAND, "stop", "--reset", "--endpoint", endpoint]
         assert subprocess.run(again, timeout=30, check=False).returncode == 0
         await_size(log, log.stat().st_size + 150_000)
