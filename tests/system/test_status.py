@@ -116,7 +116,7 @@ def test_a_rig_alone_ends_with_status_1(config: BusConfig) -> None:
 
 def test_nobody_is_told_soon(config: BusConfig) -> None:
     began_s = time.monotonic()
-    with pytest.raises(Fault, match="no rig answers there within 0.4 s") as raised:
+    with pytest.raises(Fault, match=r"no rig answers there within 0\.4 s") as raised:
         look(config)
     assert raised.value.kind is FAULTS["NO_PEER"]
     assert time.monotonic() - began_s < 5.0  # 0.4 s, on a busy machine
