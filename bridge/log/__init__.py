@@ -1,9 +1,12 @@
 """Run logs: every message of a run in one MCAP file.
 
+library, live            what every log begins with; whether one is being recorded
 mcap_chunks, runlog      writing in small chunks, so that a kill costs at most one chunk
 block_rows               the messages of many blocks as the bytes of a chunk
 recorder                 the process that writes every message on the bus
-log_reader, logfile      reading without seeking, whole or cut; recovery
+log_reader, logfile      reading without seeking, whole or cut; its topics as arrays
+chunk_messages           where the messages are in the bytes of chunks
+damage, recover          what could not be read; a cut log made whole
 log_check, topic_watch   faults of a log: all of them; those in the numbers and times of one topic
 signal_range             range, clipping and dead stretches of one signal, for logs and evidence
 finding                  one fault of a log or of evidence, and its place

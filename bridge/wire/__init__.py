@@ -1,7 +1,7 @@
 """The bus: messages, topics and transport. PROTOCOL.md describes it for clients in other languages.
 
 stickslip.proto, stickslip_pb2   the messages, and the module that `make proto` generates from them
-messages                         the messages as NumPy records, equal to the byte
+payloads, messages               the messages from and to bytes; as NumPy records, equal to the byte
 words                            modes, states, reasons and limits explained
 topics                           sender, rate and message of every topic
 zenoh_link                       publishers, inboxes and presence over Zenoh
