@@ -32,35 +32,35 @@ class Chunked(NamedTuple):
     """A chunk, uncompressed."""
 
     data: bytes
-    indexes: list[
-        bytes
-    ]  # contents of the index records that followed it; they may be missing, damaged or of another chunk
+    indexes: list[bytes]  # contents of the index records after it, which may be missing, damaged or of another chunk
 
 
 class Messages(NamedTuple):
     """Messages of some chunks in file order."""
 
     data: Bytes  # of the chunks
-    heads: npt.NDArray[Any]  # [messages], with the fields channel, sequence, log_ns and publish_ns
+    heads: npt.NDArray[Any]  # [messages], with the fields length, channel, sequence, log_ns and publish_ns
+    channel: Column  # of each, [messages]
     start: Column  # of the payload in `data`, [messages]
 
     def channels(self) -> list[int]:
         """The channels that have messages."""
-        return np.flatnonzero(np.bincount(self.heads["channel"])).tolist()
+        return np.flatnonzero(np.bincount(self.channel)).tolist()
 
     def of(self, channel: int) -> "Messages":
         """The messages of one channel."""
-        mine = np.flatnonzero(self.heads["channel"] == channel)
-        return Messages(self.data, _as_bytes(self.heads)[mine].view(_HEAD), self.start[mine])
+        mine = np.flatnonzero(self.channel == channel)
+        return Messages(self.data, _as_bytes(self.heads)[mine].view(_HEAD), self.channel[mine], self.start[mine])
 
     def payload_bytes(self) -> Column:
         """The size of each payload."""
         return self.heads["length"].astype(np.int64) - _FIELDS_BYTES
 
-    def payloads(self) -> list[bytes]:
-        """The payload of each."""
-        ends = self.start + self.payload_bytes()
-        return [self.data[start:end].tobytes() for start, end in zip(self.start, ends, strict=True)]
+    def payloads(self, most: int | None = None) -> list[bytes]:
+        """The payload of each, or of the first `most`."""
+        starts = self.start[:most]
+        ends = starts + self.payload_bytes()[:most]
+        return [self.data[start:end].tobytes() for start, end in zip(starts, ends, strict=True)]
 
     def stacked(self, size: int) -> Bytes:
         """The payloads, all of this size, one below the other, [messages, size]."""
@@ -76,7 +76,7 @@ def messages_of(chunks: Sequence[Chunked]) -> Messages:
     if heads is None or not _tile(begins, offsets, heads):
         offsets = np.concatenate([_walked(chunk.data) + begin for chunk, begin in zip(chunks, begins, strict=False)])
         heads = _cut(data, offsets, _HEAD.itemsize).view(_HEAD)
-    return Messages(data, heads, offsets + _HEAD.itemsize)
+    return Messages(data, heads, heads["channel"].astype(np.int64), offsets + _HEAD.itemsize)
 
 
 def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:

@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -105,7 +105,7 @@ class LogReader:
         whole_bytes = len(MAGIC)
         chunk: tuple[bytes, list[bytes], int] | None = None
         while not self.damage.closed:
-            record = _next(file, self.size_bytes)
+            record = _next(file, self.size_bytes - whole_bytes)
             is_chunk = record is not None and _is_chunk(*record)
             if chunk is not None and (record is None or is_chunk or record[0] != Opcode.MESSAGE_INDEX):
                 yield chunk  # now that all of its indexes were read
@@ -114,18 +114,18 @@ class LogReader:
                 start = self._after_damage(file, whole_bytes)
                 if start is None:
                     break
-                file.seek(start)
+                whole_bytes = file.seek(start)
                 continue
             opcode, content = record
+            whole_bytes += _HEAD.size + len(content)
             if is_chunk:
-                chunk = content, [], file.tell()
+                chunk = content, [], whole_bytes
             elif opcode == Opcode.FOOTER and len(content) == _FOOTER_BYTES:
                 self.damage = self.damage._replace(closed=True)
             elif chunk is not None:
                 chunk[1].append(content)
             else:
                 self._learn(opcode, content)
-            whole_bytes = file.tell()
         if not self.damage.closed:
             self._count(cut_bytes=self.size_bytes - whole_bytes)
 
@@ -185,18 +185,35 @@ class LogReader:
             at += length
 
 
+class _InPlace:
+    """A stream that hands out its bytes without a copy; a chunk has half a megabyte of them."""
+
+    def __init__(self, content: bytes) -> None:
+        self._left = memoryview(content)
+
+    def read(self, size: int) -> memoryview:
+        """The next `size` bytes, or as many as are left."""
+        part, self._left = self._left[:size], self._left[size:]
+        return part
+
+
 def _is_chunk(opcode: int, content: bytes) -> bool:
     """Whether a record is a chunk, by its opcode or, where that is damaged, by its content."""
     return opcode == Opcode.CHUNK or content[_MARK_AT : _MARK_AT + len(_CHUNK_MARK)] == _CHUNK_MARK
 
 
-def _next(file: IO[bytes], size: int) -> tuple[int, bytes] | None:
-    """Opcode and content of the next whole record; None where the file is cut or the bytes are not a record."""
+def _next(file: IO[bytes], left_bytes: int) -> tuple[int, bytes] | None:
+    """Opcode and content of the next whole record; None where the file is cut or the bytes are not a record.
+
+    Args:
+        left_bytes: from the present place in the file to its end.
+
+    """
     head = file.read(_HEAD.size)
     if len(head) < _HEAD.size:
         return None
     opcode, length = _HEAD.unpack(head)
-    if opcode == 0 or opcode > Opcode.DATA_END or length > min(size - file.tell(), _LARGEST_RECORD_BYTES):
+    if opcode == 0 or opcode > Opcode.DATA_END or length > min(left_bytes - _HEAD.size, _LARGEST_RECORD_BYTES):
         return None
     return opcode, file.read(length)
 
@@ -213,7 +230,7 @@ def _next_chunk(file: IO[bytes], from_bytes: int, size: int) -> int | None:
             start = at + found - mark_offset
             if start >= from_bytes:
                 file.seek(start)
-                record = _next(file, size)
+                record = _next(file, size - start)
                 if record is not None and record[0] == Opcode.CHUNK and _uncompressed(record[1]) is not None:
                     return start
             found = window.find(_CHUNK_MARK, found + 1)
@@ -224,15 +241,17 @@ def _next_chunk(file: IO[bytes], from_bytes: int, size: int) -> int | None:
 def _uncompressed(content: bytes) -> bytes | None:
     """The records of a chunk; None when its checksum or its size is wrong."""
     with contextlib.suppress(*_UNREADABLE):
-        chunk = Chunk.read(ReadDataStream(BytesIO(content)))
-        data = chunk.data
+        stream: Any = _InPlace(content)
+        chunk = Chunk.read(ReadDataStream(stream))
         if chunk.compression == "zstd":
             # checked first: with a damaged size the library would reserve that much memory
-            if zstandard.frame_content_size(data) != chunk.uncompressed_size:
+            if zstandard.frame_content_size(chunk.data) != chunk.uncompressed_size:
                 return None
             if chunk.uncompressed_size > _LARGEST_RECORD_BYTES:
                 return None
-            data = zstandard.ZstdDecompressor().decompress(data)
+            data = zstandard.ZstdDecompressor().decompress(chunk.data)
+        else:
+            data = bytes(chunk.data)
         if zlib.crc32(data) == chunk.uncompressed_crc:
             return data
     return None

@@ -23,6 +23,7 @@ from bridge.wire.topics import BY_NAME
 STREAMING = ("sensors", "applied", "command", "trace", "state")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE}
 _DEFAULT_SAMPLES = 20
+_COUNTED_BLOCKS = 100  # for their number of samples; a chunk of a run in real time holds as many
 _ROOM = 1.1  # of the memory for a topic over what the part that was read lets expect
 _LARGEST_GUESS_BYTES = 1 << 28  # a damaged log may let expect anything
 
@@ -54,7 +55,7 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
                 layout = layouts[topic]
                 stacked, kept = _stacked(mine, layout, "/" + topic)
                 reader.count_bad_messages(len(log_ns) - len(kept))
-                yield Piece(topic, log_ns[kept], stacked.view(layout.dtype).reshape(-1), [])
+                yield Piece(topic, log_ns[kept], np.frombuffer(stacked, layout.dtype), [])
             else:
                 payloads = mine.payloads()
                 kept = _readable(topic, payloads)
@@ -63,9 +64,9 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
 
 
 def _samples(messages: Messages) -> int:
-    """Samples of a channel in a sensor block: the most frequent number in the first chunk, as single blocks may be wrong."""
+    """Samples of a channel in a sensor block: the most frequent number at the beginning, as single blocks may be wrong."""
     found: Counter[int] = Counter()
-    for payload in messages.payloads():
+    for payload in messages.payloads(_COUNTED_BLOCKS):
         with contextlib.suppress(Fault):
             found[len(parsed(wire.SensorBlock, payload, "/sensors").drive_force_N) or _DEFAULT_SAMPLES] += 1
     return found.most_common(1)[0][0] if found else _DEFAULT_SAMPLES
@@ -173,7 +174,7 @@ def read_run(path: Path) -> RunData:
     for piece in iter_pieces(reader):
         if piece.topic in stored:
             dtypes[piece.topic] = piece.records.dtype
-            stored[piece.topic].add(piece.records.view(np.uint8), reader.position_bytes / reader.size_bytes)
+            stored[piece.topic].add(np.frombuffer(piece.records, np.uint8), reader.position_bytes / reader.size_bytes)
         elif piece.topic in payloads:
             payloads[piece.topic].extend(piece.payloads)
     tables = {name: stored[name].records(dtypes[name]) for name in STREAMING}
