@@ -7,10 +7,11 @@ cannot be read the pass goes on with the next whole chunk.
 import contextlib
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -36,6 +37,15 @@ _SEARCH_BYTES = 1 << 20
 AT_ONCE_BYTES = 1 << 19
 _UNREADABLE = (McapError, struct.error, UnicodeDecodeError, zstandard.ZstdError, MemoryError, OverflowError)
 _CHANNEL_TOPICS = {i + 1: topic.name for i, topic in enumerate(topic for topic in TOPICS if topic.logged)}
+
+
+class _Packed(NamedTuple):
+    """A chunk on its way out of the file."""
+
+    chunk: Chunk | None  # None where it cannot be read
+    unpacked: Future[bytes]
+    indexes: list[bytes]  # contents of the index records after it
+    end_bytes: int  # place of its end in the file
 
 
 class LogReader:
@@ -79,17 +89,16 @@ class LogReader:
     def _chunks(self) -> Iterator[Chunked]:
         """Every chunk that is not damaged, uncompressed."""
         try:
-            with self.path.open("rb") as file:
+            # the next chunk is uncompressed while the caller works on the present one
+            with self.path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as beside:
                 self.size_bytes = self.path.stat().st_size
-                for content, indexes, end_bytes in self._packed(file):
-                    data = _uncompressed(content)
-                    if data is None:
-                        self._count(bad_chunks=1)
-                        continue
-                    self._must_have_header()
-                    self._learn_channels(data)
-                    self.position_bytes = end_bytes
-                    yield Chunked(data, indexes)
+                ready: _Packed | None = None
+                for packed in self._packed(file, beside):
+                    if ready is not None:
+                        yield from self._taken_out(ready)
+                    ready = packed
+                if ready is not None:
+                    yield from self._taken_out(ready)
         except OSError as error:
             raise Fault(
                 "BAD_LOG", f"{self.path}: cannot be read: {error.strerror}; give the path of a .mcap file"
@@ -97,19 +106,30 @@ class LogReader:
         self.position_bytes = self.size_bytes
         self._must_have_header()
 
-    def _packed(self, file: IO[bytes]) -> Iterator[tuple[bytes, list[bytes], int]]:
-        """For each chunk: its content, the contents of its indexes, and the place of its end in the file."""
+    def _taken_out(self, packed: _Packed) -> Iterator[Chunked]:
+        """A chunk; nothing, but for the count, where it is damaged."""
+        data = _checked(packed.chunk, packed.unpacked.result)
+        if data is None:
+            self._count(bad_chunks=1)
+            return
+        self._must_have_header()
+        self._learn_channels(data)
+        self.position_bytes = packed.end_bytes
+        yield Chunked(data, packed.indexes)
+
+    def _packed(self, file: IO[bytes], beside: ThreadPoolExecutor) -> Iterator[_Packed]:
+        """Every chunk, while it is uncompressed."""
         if file.read(len(MAGIC)) != MAGIC:
             line = f"{self.path}: {self.size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
             raise Fault("BAD_LOG", line)
         whole_bytes = len(MAGIC)
-        chunk: tuple[bytes, list[bytes], int] | None = None
+        packed: _Packed | None = None
         while not self.damage.closed:
             record = _next(file, self.size_bytes - whole_bytes)
             is_chunk = record is not None and _is_chunk(*record)
-            if chunk is not None and (record is None or is_chunk or record[0] != Opcode.MESSAGE_INDEX):
-                yield chunk  # now that all of its indexes were read
-                chunk = None
+            if packed is not None and (record is None or is_chunk or record[0] != Opcode.MESSAGE_INDEX):
+                yield packed  # now that all of its indexes were read
+                packed = None
             if record is None:
                 start = self._after_damage(file, whole_bytes)
                 if start is None:
@@ -119,11 +139,12 @@ class LogReader:
             opcode, content = record
             whole_bytes += _HEAD.size + len(content)
             if is_chunk:
-                chunk = content, [], whole_bytes
+                chunk = _opened(content)
+                packed = _Packed(chunk, beside.submit(_unpacked, chunk), [], whole_bytes)
             elif opcode == Opcode.FOOTER and len(content) == _FOOTER_BYTES:
                 self.damage = self.damage._replace(closed=True)
-            elif chunk is not None:
-                chunk[1].append(content)
+            elif packed is not None:
+                packed.indexes.append(content)
             else:
                 self._learn(opcode, content)
         if not self.damage.closed:
@@ -240,18 +261,36 @@ def _next_chunk(file: IO[bytes], from_bytes: int, size: int) -> int | None:
 
 def _uncompressed(content: bytes) -> bytes | None:
     """The records of a chunk; None when its checksum or its size is wrong."""
+    chunk = _opened(content)
+    return _checked(chunk, lambda: _unpacked(chunk))
+
+
+def _opened(content: bytes) -> Chunk | None:
+    """A chunk as it is in the file; None where it cannot be read, or where its size is wrong."""
     with contextlib.suppress(*_UNREADABLE):
         stream: Any = _InPlace(content)
         chunk = Chunk.read(ReadDataStream(stream))
-        if chunk.compression == "zstd":
-            # checked first: with a damaged size the library would reserve that much memory
-            if zstandard.frame_content_size(chunk.data) != chunk.uncompressed_size:
-                return None
-            if chunk.uncompressed_size > _LARGEST_RECORD_BYTES:
-                return None
-            data = zstandard.ZstdDecompressor().decompress(chunk.data)
-        else:
-            data = bytes(chunk.data)
-        if zlib.crc32(data) == chunk.uncompressed_crc:
+        # checked before: with a damaged size the library would reserve that much memory
+        size_bytes = chunk.uncompressed_size
+        if (
+            chunk.compression != "zstd"
+            or zstandard.frame_content_size(chunk.data) == size_bytes <= _LARGEST_RECORD_BYTES
+        ):
+            return chunk
+    return None
+
+
+def _unpacked(chunk: Chunk | None) -> bytes:
+    """The records of a chunk; nothing of one that cannot be read. Raises ZstdError, MemoryError."""
+    if chunk is None:
+        return b""
+    return zstandard.ZstdDecompressor().decompress(chunk.data) if chunk.compression == "zstd" else bytes(chunk.data)
+
+
+def _checked(chunk: Chunk | None, unpacked: Callable[[], bytes]) -> bytes | None:
+    """What `unpacked` returns, where the chunk's checksum is that of it; else None."""
+    with contextlib.suppress(*_UNREADABLE):
+        data = unpacked()
+        if chunk is not None and zlib.crc32(data) == chunk.uncompressed_crc:
             return data
     return None
