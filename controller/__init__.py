@@ -2,6 +2,7 @@
 
 config         the controller file, checked
 records        the derived numbers (`PARAMS`) and all memory (`STATE`)
+announced      what the rig has announced of v_d
 vibration      the measured v_a; the slide's burst without the exciter's lines
 onset          the estimate: stick, slip or smooth sliding, and the time to the next slip
 policy         the wanted vibration

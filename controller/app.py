@@ -8,7 +8,17 @@ from bridge.faults import Fault
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
-from bridge.wire.topics import COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, SNAPSHOT, STATE, TRACE
+from bridge.wire.topics import (
+    ANNOUNCE,
+    COMMAND,
+    CONTROLLER_EVENT,
+    OPERATOR,
+    PLANT_EVENT,
+    SENSORS,
+    SNAPSHOT,
+    STATE,
+    TRACE,
+)
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
@@ -90,6 +100,7 @@ class _Process:
         for topic in (COMMAND, TRACE, STATE, SNAPSHOT, CONTROLLER_EVENT):
             self._send[topic.name] = self._bus.publisher(topic)
         self._bus.listen(SENSORS, self._inbox.push)
+        self._bus.listen(ANNOUNCE, self._inbox.keep)
         for topic in (PLANT_EVENT, OPERATOR):
             self._bus.listen(topic, self._inbox.keep)
 
@@ -168,7 +179,9 @@ class _Process:
                         "DRIVE_UNSEEN", f"block {node.last_block}: a slip, while the drive position stands: {_UNSEEN}"
                     )
             return command is not None
-        if received.topic is OPERATOR:
+        if received.topic is ANNOUNCE:
+            node.announcement(received.payload)
+        elif received.topic is OPERATOR:
             self._obey(received.payload)
         else:
             self._mind(parsed(wire.Event, received.payload, PLANT_EVENT.name))

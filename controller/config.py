@@ -97,7 +97,7 @@ class ControllerConfig(Strict):
     """One controller."""
 
     block_s: Positive = 1e-3
-    samples_per_block: Annotated[int, Field(ge=4, le=200)] = 20
+    samples_per_block: Annotated[int, Field(ge=4, le=400)] = 20
     drive_stiffness_N_per_m: Positive = 11700.0
     contact_resonance_Hz: NotNegative = Field(
         default=1144.0, description="sqrt(k_t / m) / 2 pi of the contact; the vibration keeps above 2.2 times this."

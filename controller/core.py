@@ -30,7 +30,7 @@ def step(
     Args:
         params, state: one record each of `controller.records.PARAMS` and `STATE`.
         sensors: one sensor block; not read when `events` has no BLOCK.
-        events: bits of `controller.codes`: BLOCK, GAP, STALE, STOP, RESET.
+        events: bits of `controller.codes`: BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED.
         gap_blocks: number of lost blocks just before this block.
         t_ns: time of the frame.
         command, trace: one message record each; all is filled except the trace's lateness.
@@ -99,4 +99,5 @@ def step(
     t.wanted_amplitude_m = s.wanted_m
     t.wanted_frequency_Hz = s.wanted_Hz
     t.time_to_slip_s = s.time_to_slip_s
+    t.announcements = s.announced_count
     s.steps += 1

@@ -7,12 +7,14 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.messages import sensor_block
 from bridge.wire.payloads import sequence_and_time
-from bridge.wire.topics import COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
-from controller.codes import BLOCK, GAP, RESET, STALE, STOP
+from bridge.wire.topics import ANNOUNCE, COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
+from controller.announced import take_announcement
+from controller.codes import ANNOUNCED, BLOCK, GAP, RESET, STALE, STOP
 from controller.config import ControllerConfig
 from controller.core import step
 from controller.records import build
@@ -44,6 +46,7 @@ class ControllerNode:
         self._block_t_ns = 0  # of the last block
         self._length_checked = False
         self._operator_events = 0
+        self._announced = 0  # the bit ANNOUNCED where announcements came since the last frame
         self.slipped_unmoved = False  # in the last step a slip began while the drive position stood
 
     @property
@@ -62,12 +65,14 @@ class ControllerNode:
         return self._expected - 1
 
     def warm_up(self) -> None:
-        """Compile or load the kernel on copies, so that the first answer is not late."""
+        """Compile or load the kernels on copies, so that the first answer is not late."""
         compile_once("the controller", self._step_copies)
 
     def _step_copies(self) -> None:
+        state = self._state.copy()
+        take_announcement(state[0], 0, 0.0)
         step(
-            self._params, self._state.copy(), self._no_sensors, BLOCK, 0, 0,
+            self._params, state, self._no_sensors, BLOCK, 0, 0,
             COMMAND_LAYOUT.blank(), TRACE_LAYOUT.blank(), self._scratch,
         )  # fmt: skip
 
@@ -78,6 +83,12 @@ class ControllerNode:
     def operator(self, action: int) -> None:
         """Take an operator's action (`wire.Operator.Action`); it acts with the next frame, where the log shows it."""
         self._operator_events = obeyed(self._operator_events, action)
+
+    def announcement(self, payload: bytes) -> None:
+        """Take what the rig announces of its drive; it is part of the next frame. Raises Fault BAD_MESSAGE."""
+        said = ANNOUNCE_LAYOUT.read(payload, ANNOUNCE.name)[0]
+        take_announcement(self._state[0], said.holds_from_ns, said.drive_velocity_mps)
+        self._announced = ANNOUNCED
 
     def block(self, payload: bytes) -> Outgoing | None:
         """Consume a sensor block; return the command that answers it, or None for a block that is late or repeated.
@@ -114,7 +125,8 @@ class ControllerNode:
         return self._step(self._no_sensors, STALE | self._operator_events, 0)
 
     def _step(self, sensors: Any, events: int, gap_blocks: int) -> Outgoing:
-        self._operator_events = 0
+        events |= self._announced
+        self._operator_events = self._announced = 0
         state: Any = self._state[0]
         slips_before = int(state.slips)
         step(

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import record
+from controller.announced import MOST_ANNOUNCED
 from controller.config import (
     LONGEST_WINDOW_BLOCKS,
     MOST_BANDS,
@@ -90,6 +91,10 @@ STATE = np.dtype(
         ("free_steps", "i8"),  # steps since a limit last changed the command
         ("stopped", "i8"),
         ("stale", "i8"),
+        # what the rig has announced of the drive: `controller.announced`
+        ("announced_from_ns", "i8", (MOST_ANNOUNCED,)),
+        ("announced_mps", "f8", (MOST_ANNOUNCED,)),
+        ("announced_count", "i8"),
         # bookkeeping
         ("steps", "i8"),
         ("block", "i8"),

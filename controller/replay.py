@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
-from bridge.kernel import kernel
+from bridge.kernel import Record, kernel
 from bridge.log.logfile import RunData
 from bridge.wire.messages import COMMAND, TRACE, Layout, Records
+from controller.announced import take_announcement
 from controller.codes import BLOCK
 from controller.config import ControllerConfig
 from controller.core import step
@@ -67,11 +68,17 @@ def _steps(
     events: npt.NDArray[np.int64],
     gap_blocks: npt.NDArray[np.int64],
     t_ns: npt.NDArray[np.int64],
+    announced: npt.NDArray[np.int64],
+    announce: npt.NDArray[Any],
     command: npt.NDArray[Any],
     trace: npt.NDArray[Any],
     scratch: npt.NDArray[np.float64],
 ) -> None:
+    s: Record = state[0]
     for i in range(rows.shape[0]):
+        while s.announced_count < min(announced[i], announce.shape[0]):
+            said: Record = announce[s.announced_count]
+            take_announcement(s, said.holds_from_ns, said.drive_velocity_mps)
         row = max(rows[i], 0)  # a step without a block does not read its row
         step(
             params, state, sensors[row : row + 1], events[i], gap_blocks[i], t_ns[i],
@@ -91,9 +98,10 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
 
     """
     trace = _in_order(run.trace)
-    sequence, events, gaps, t_ns = (
-        trace[name].astype(np.int64) for name in ("sequence", "events", "gap_blocks", "t_ns")
+    sequence, events, gaps, t_ns, announced = (
+        trace[name].astype(np.int64) for name in ("sequence", "events", "gap_blocks", "t_ns", "announcements")
     )
+    announce = _writable(_in_order(run.announce))
     twice = np.flatnonzero(np.diff(sequence) == 0)
     if len(twice):
         at_s, again_s = 1e-9 * t_ns[twice[0]], 1e-9 * t_ns[twice[0] + 1]
@@ -114,7 +122,7 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
             part = slice(start, stop)
             _steps(
                 params, memory, sensors, rows[part], events[part], gaps[part], t_ns[part],
-                commands[part], traces[part], scratch,
+                announced[part], announce, commands[part], traces[part], scratch,
             )  # fmt: skip
         replayed.append(np.arange(at, end))
         at = _resume(run, sequence, end, memory)

@@ -18,15 +18,18 @@ and, for the effects of a real rig:
     s_e    position of the drive without ripple, `even_m` [m]
 
 config, config_limits   a rig file, checked; rigs that a rig file may describe and no real rig can be
+drive_config            how the drive moves, in a rig file
+drive_motion            where it is then: profiles, jerk-limited moves, cycles
 pairs, effects          the friction pairs; the effects that a real rig has and the nominal rig lacks
 records                 the derived numbers (`PARAMS`) and all memory (`STATE`)
 contact, piezo          one step of friction and slide; the motion of the base
 core                    one block of contact, drive, piezo and analogue filters: `advance`, `advance_disturbed` with effects
 four_rigs*              the same for four rigs at once, in vector registers; one step of them
 sensors                 the digital half of the channels
+loop_delay              commands on their way to the exciter
 step                    one whole block with its messages
 simulate                a run without bus and sensors
 stability               the slider linearised around steady sliding
-inputs                  the drive's velocity and the sensors' noise, block by block
+inputs                  the drive's velocity, what is announced of it, noise and delays, block by block
 node, app               the rig as a participant of the bus; the process
 """

@@ -9,7 +9,7 @@ from bridge.faults import Fault
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
-from bridge.wire.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS
+from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, PLANT_EVENT, SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from plant.config import RigConfig
 from plant.node import PlantNode
@@ -76,6 +76,7 @@ class _Process:
         self._events = 0
         self._send_sensors = bus.publisher(SENSORS)
         self._send_applied = bus.publisher(APPLIED)
+        self._send_announce = bus.publisher(ANNOUNCE)
         self._send_event = bus.publisher(PLANT_EVENT)
         bus.listen(COMMAND, self._receive)
 
@@ -89,6 +90,10 @@ class _Process:
         event = wire.Event(sequence=self._events, t_ns=t_ns, source="plant", code=code, text=text)
         self._events += 1
         self._send_event(event.SerializeToString())
+
+    def _announce(self) -> None:
+        for message in self._node.announcements:
+            self._send_announce(message.payload)
 
     def realtime(self, blocks: int, stop: threading.Event) -> None:
         """Advance one block a period under the newest command; after `stop`, until the vibration has faded."""
@@ -115,6 +120,7 @@ class _Process:
                 fading += 1
             sensors, applied = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
+            self._announce()
             self._send_sensors(sensors.payload)
             self._send_applied(applied.payload)
             if fading and (node.at_rest or fading > 1000):
@@ -126,6 +132,7 @@ class _Process:
         commands: list[bytes] = []
         while node.block < blocks and not stop.is_set():
             sensors, applied = node.advance(commands)
+            self._announce()
             self._send_sensors(sensors.payload)
             self._send_applied(applied.payload)
             commands = [self._answer(node.block - 1, stop)]

@@ -1,22 +1,23 @@
 """The rig file, in units of people; the paper's rig is the default of everything but the contact."""
 
 import math
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from bridge.config import Strict, Two, in_short, read_toml, validate
+from bridge.config import Strict, in_short, read_toml, validate
+from plant.drive_config import DriveConfig, NotNegative, Positive
 from plant.effects.library import checked
 from plant.effects.sensors import LONGEST_DELAY
+from plant.loop_delay import LONGEST_DELAY_S, LONGEST_JITTER_S, whole_blocks
 from plant.pairs import PAIRS
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+NotPositive = Annotated[float, Field(le=0)]
 # Steps of the solver in a period of the vibration, and of the slide on its spring. Fewer: slips that are not real, and peaks of
 # force that are off. More: sound rigs are refused. Counted: docs/method/plant.md.
 _FEWEST_STEPS_A_PERIOD = 20
+MOST_BLOCKS_AHEAD = 63  # of an announcement: one a block, and that of now, fill the controller's ring of 64
 # Steps of the solver in a block. A step takes 0.04 to 0.06 us (measured with steps of 0.1 us, two rigs): this many take 50 ms,
 # 50 times real time with blocks of 1 ms. More: a run seems to hang, in a kernel that Ctrl-C does not reach.
 _MOST_STEPS_A_BLOCK = 1_000_000
@@ -73,25 +74,6 @@ class SlideConfig(Strict):
     mass_kg: Positive = 1.5
 
 
-class DriveConfig(Strict):
-    """The drive that pulls the slide through a spring. `profile` is [[time_s, velocity_mps], ...], linear in between."""
-
-    stiffness_N_per_m: Positive = 11700.0
-    damping_Ns_per_m: NotNegative = 0.0
-    profile: Annotated[list[Two], Field(min_length=1)] = Field(
-        default=[(0.0, 0.0005)], description="[[time_s, velocity_mps], ...], linear in between."
-    )
-
-    @model_validator(mode="after")
-    def _time_goes_forward(self) -> "DriveConfig":
-        times_s = [time_s for time_s, _ in self.profile]
-        if any(later <= earlier for earlier, later in pairwise(times_s)):
-            raise ValueError(f"profile: the times {times_s} must increase; use 8.0 and 8.001 for a step at 8 s")
-        if any(velocity_mps < 0 for _, velocity_mps in self.profile):
-            raise ValueError("profile: velocities must not be negative; the rig drags in one direction")
-        return self
-
-
 class PiezoConfig(Strict):
     """The exciter: its limits, the rate at which its amplitude may change, and its mount."""
 
@@ -111,7 +93,10 @@ class PiezoConfig(Strict):
 class SensorsConfig(Strict):
     """The measuring chain of the paper's stand; noise is rms, a resolution of 0 means no quantisation."""
 
-    force_range_N: Positive = 50.0
+    force_range_N: Positive = Field(default=50.0, description="Highest force that is measured.")
+    force_lowest_N: NotPositive = Field(
+        default=0.0, description="Lowest force that is measured; a drive that goes back needs one below 0."
+    )
     force_noise_N: NotNegative = 0.02
     force_bandwidth_Hz: Positive = 2000.0
     force_gain: Positive = 1.0
@@ -121,7 +106,10 @@ class SensorsConfig(Strict):
     accel_lowest_Hz: Positive = 0.5
     accel_bandwidth_Hz: Positive = 10000.0
     accel_resolution_mps2: NotNegative = 2 * 490.3325 / 2**20
-    position_range_m: Positive = 0.05
+    position_range_m: Positive = Field(
+        default=0.05, description="Highest position that is measured; slide and drive begin at 0."
+    )
+    position_lowest_m: NotPositive = Field(default=0.0, description="Lowest position that is measured.")
     position_noise_m: NotNegative = 5e-7
     position_bandwidth_Hz: Positive = 800.0  # HBM WA on a carrier amplifier: below 1 kHz
     position_linearity: NotNegative = 0.002
@@ -132,8 +120,29 @@ class SolverConfig(Strict):
     """Time steps. `block_s` of physics make one message of `samples_per_block` samples a channel."""
 
     step_s: Positive = 1e-5
-    block_s: Positive = 1e-3
-    samples_per_block: Annotated[int, Field(ge=4, le=200)] = 20
+    # Shorter: a block of 20 kHz has fewer samples than its message has fields. Longer: a slip of the paper's rig, 36 ms, is over
+    # within two blocks.
+    block_s: Annotated[float, Field(ge=0.25e-3, le=20e-3)] = Field(
+        default=1e-3, description="In real time 0.001 or more; shorter ones run in lockstep and in one process."
+    )
+    samples_per_block: Annotated[int, Field(ge=4, le=400)] = 20
+
+
+class LoopConfig(Strict):
+    """What lies between sensors and exciter besides the controller: converters, drivers, a slow bus."""
+
+    delay_s: Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)] = Field(
+        default=0.0,
+        description="Time that a command takes besides, in whole blocks, rounded up; 0: it acts in the next block.",
+    )
+    jitter_s: Annotated[float, Field(ge=0, le=LONGEST_JITTER_S)] = Field(
+        default=0.0,
+        description="Up to so much more, drawn evenly for each command; commands do not overtake each other.",
+    )
+
+    def longest_s(self, block_s: float) -> float:
+        """Longest time from a block of samples to the block in which its command acts [s]."""
+        return block_s * (1 + whole_blocks(self.delay_s + self.jitter_s, block_s))
 
 
 class RigConfig(Strict):
@@ -146,6 +155,7 @@ class RigConfig(Strict):
     piezo: PiezoConfig = PiezoConfig()
     sensors: SensorsConfig = SensorsConfig()
     solver: SolverConfig = SolverConfig()
+    loop: LoopConfig = LoopConfig()
     effects: dict[str, dict[str, float | str]] = Field(default={}, description="[effects.NAME]; none: the ideal rig.")
 
     # before pydantic, which gives two errors for a value that is neither a number nor a word
@@ -187,6 +197,14 @@ class RigConfig(Strict):
                 f"piezo.command_timeout_s = {piezo.command_timeout_s:g}: must hold 2 blocks of solver.block_s = "
                 f"{solver.block_s:g}, or no command is ever fresh; raise it"
             )
+        least_s = self.loop.longest_s(solver.block_s) + solver.block_s
+        if self.loop != LoopConfig() and piezo.command_timeout_s < least_s * (1.0 - 1e-9):
+            raise ValueError(
+                f"piezo.command_timeout_s = {piezo.command_timeout_s:g}: must be longer than the loop's delay: with "
+                f"loop.delay_s = {self.loop.delay_s:g} and loop.jitter_s = {self.loop.jitter_s:g} a command is up to "
+                f"{self.loop.longest_s(solver.block_s):g} s old when it acts, and would count as lost; raise it to "
+                f"{least_s:g} or more"
+            )
         # k_t dt^2 / m must be at most 1: at 1.9 friction oscillates by itself (docs/method/plant.md)
         lightest_kg = self.contact.stiffness_N_per_m * solver.step_s**2
         if self.slide.mass_kg < lightest_kg:
@@ -194,6 +212,17 @@ class RigConfig(Strict):
             raise ValueError(
                 f"slide.mass_kg = {self.slide.mass_kg:g}: must be at least contact.stiffness_N_per_m x solver.step_s^2, here "
                 f"{lightest_kg:.2g} kg; shorten solver.step_s to {longest_s:.2g} or less"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _announcements_are_kept(self) -> "RigConfig":
+        ahead_s, block_s = self.drive.announce_ahead_s, self.solver.block_s
+        if whole_blocks(ahead_s, block_s) > MOST_BLOCKS_AHEAD:
+            raise ValueError(
+                f"drive.announce_ahead_s = {ahead_s:g}: must be at most {MOST_BLOCKS_AHEAD} blocks of solver.block_s = "
+                f"{block_s:g}, as a controller keeps the {MOST_BLOCKS_AHEAD + 1} newest announcements; shorten it to "
+                f"{MOST_BLOCKS_AHEAD * block_s:g}"
             )
         return self
 

@@ -1,32 +1,88 @@
-"""What comes into a rig block by block besides the command: the drive's velocity and the noise of the sensors."""
+"""What comes into a rig block by block besides the command: the drive's velocity, noise, and how late commands are."""
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.wire.messages import CHANNELS
+from bridge.wire.messages import ANNOUNCE, CHANNELS, Records
 from plant.config import RigConfig
-from plant.simulate import drive_velocity_mps
+from plant.loop_delay import whole_blocks
+from plant.simulate import held_velocity
+
+_SAME_MPS = 1e-12  # difference of two velocities that are one: rounding of places, 1e-17 m over a block
+_JITTER = 1  # the second stream of the seed: a jitter leaves the noise as it is
+
+
+class Inputs(NamedTuple):
+    """Of some blocks."""
+
+    velocity_mps: npt.NDArray[Any]  # of the drive, [blocks]
+    noise: npt.NDArray[np.float64]  # standard normal numbers, [blocks, 5, samples]
+    delay_blocks: npt.NDArray[np.int64]  # that a command takes which comes before the block, [blocks]
+    announcements: npt.NDArray[np.int64]  # that go out before the block's samples, [blocks]
+    announce: Records  # these announcements, in order
 
 
 class RigInputs:
-    """The drive's velocity and the sensors' noise, in order.
+    """The drive's velocity, the sensors' noise and the delay of the commands, in order.
 
     Args:
         config: the rig file.
-        seed: of the noise; the same seed gives the same numbers, however many blocks are drawn at once.
+        seed: of noise and jitter; the same seed gives the same numbers, however many blocks are drawn at once.
 
     """
 
     def __init__(self, config: RigConfig, seed: int) -> None:
         self._config = config
+        self._velocity_mps = held_velocity(config)
         self._random = np.random.Generator(np.random.PCG64(seed))
+        self._jitter = np.random.Generator(np.random.PCG64([seed, _JITTER]))
         self._block = 0
+        self._ahead_blocks = whole_blocks(config.drive.announce_ahead_s, config.solver.block_s)
+        self._announcements = 0
+        self._announced_mps = math.nan
 
-    def draw(self, blocks: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """Of the next blocks: velocity [m/s], [blocks]; standard normal numbers, [blocks, 5, samples]."""
+    def draw(self, blocks: int) -> Inputs:
+        """The inputs of the next blocks."""
         noise = self._random.standard_normal((blocks, len(CHANNELS), self._config.solver.samples_per_block))
         t_s = (self._block + np.arange(blocks)) * self._config.solver.block_s
         self._block += blocks
-        return drive_velocity_mps(self._config, t_s), noise
+        return Inputs(self._velocity_mps(t_s), noise, self._delay_blocks(blocks), *self._announce(blocks))
+
+    def _announce(self, blocks: int) -> tuple[npt.NDArray[np.int64], Records]:
+        """Of the blocks up to now: how many announcements each makes, and the announcements.
+
+        The samples of block n leave when block n + 1 begins: before them the rig announces the velocity of block n + 1 + ahead
+        where it is another than the one announced last; before those of block 0 that of each block up to there.
+        """
+        counts = np.zeros(blocks, np.int64)
+        if not (self._ahead_blocks and blocks):
+            return counts, ANNOUNCE.blank(0)
+        solver = self._config.solver
+        said: list[tuple[int, int, float]] = []
+        first = self._block - blocks
+        ahead = np.arange(1 if first == 0 else first + 1 + self._ahead_blocks, self._block + 1 + self._ahead_blocks)
+        for block, velocity_mps in zip(
+            ahead.tolist(), self._velocity_mps(ahead * solver.block_s).tolist(), strict=True
+        ):
+            if not abs(velocity_mps - self._announced_mps) <= _SAME_MPS:
+                at = max(block - 1 - self._ahead_blocks, 0)
+                counts[at - first] += 1
+                said.append((at, block, velocity_mps))
+                self._announced_mps = velocity_mps
+        block_ns = round(solver.block_s * 1e9)
+        announce = ANNOUNCE.blank(len(said))
+        for record, (at, block, velocity_mps) in zip(announce, said, strict=True):
+            record.sequence, record.t_ns = self._announcements, (at + 1) * block_ns
+            record.holds_from_ns, record.drive_velocity_mps = block * block_ns, velocity_mps
+            self._announcements += 1
+        return counts, announce
+
+    def _delay_blocks(self, blocks: int) -> npt.NDArray[Any]:
+        loop, block_s = self._config.loop, self._config.solver.block_s
+        if loop.jitter_s == 0.0:
+            return np.full(blocks, whole_blocks(loop.delay_s, block_s))
+        late_s = loop.delay_s + loop.jitter_s * self._jitter.random(blocks)
+        return np.array([whole_blocks(one_s, block_s) for one_s in late_s], np.int64)

@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import record
-from plant.config import RigConfig
+from plant.config import RigConfig, SensorsConfig
 from plant.effects.library import EFFECTS
+from plant.loop_delay import LINE
 
 # Rows of the array that a block fills beside the sensors, one column a sample: what no sensor sees.
 TRUTH = (
@@ -30,9 +31,15 @@ PARAMS = np.dtype(
             *("force_keep", "accel_keep", "accel_highpass_keep", "position_keep"),
             # the same over the longer steps of a slide that sticks
             *("stick_dt_s", "force_keep_stick", "accel_keep_stick", "accel_highpass_keep_stick", "position_keep_stick"),
-            *("force_gain", "force_range_N", "force_noise_N", "force_resolution_N"),
+            *("force_gain", "force_range_N", "force_lowest_N", "force_noise_N", "force_resolution_N"),
             *("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"),
-            *("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"),
+            *(
+                "position_range_m",
+                "position_lowest_m",
+                "position_noise_m",
+                "position_linearity",
+                "position_resolution_m",
+            ),
             # the effects of `plant.effects`, then those of the contact, of no size in the nominal rig
             *(name for effect in EFFECTS.values() for name in effect.numbers),
             *("age_length_m", "roughness_ratio", "roughness_length_m", "roughness_seed"),
@@ -61,7 +68,10 @@ STATE = np.dtype(
             *("mass_position_f", "drive_position_f"),
         )
     ]
-    + [field for effect in EFFECTS.values() for field in effect.memory],
+    + [field for effect in EFFECTS.values() for field in effect.memory]
+    # the commands on their way: `plant.loop_delay`
+    + [("line_first", "i8"), ("line_count", "i8"), ("line_due", "i8", (LINE,)), ("line_block", "i8", (LINE,))]
+    + [("line_Hz", "f8", (LINE,)), ("line_m", "f8", (LINE,))],
     align=True,
 )
 
@@ -116,12 +126,9 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         ("position_keep", sensors.position_bandwidth_Hz),
     ):
         p[name], p[f"{name}_stick"] = _keep(bandwidth_Hz, solver.step_s), _keep(bandwidth_Hz, p.stick_dt_s)
-    for name in ("force_gain", "force_range_N", "force_noise_N", "force_resolution_N"):
-        p[name] = getattr(sensors, name)
-    for name in ("accel_range_mps2", "accel_noise_mps2", "accel_resolution_mps2"):
-        p[name] = getattr(sensors, name)
-    for name in ("position_range_m", "position_noise_m", "position_linearity", "position_resolution_m"):
-        p[name] = getattr(sensors, name)
+    for name in PARAMS.names or ():
+        if name in SensorsConfig.model_fields:
+            p[name] = getattr(sensors, name)
     _add_effects(p, config)
     state = record(STATE)
     state[0].g = p.F_s

@@ -18,10 +18,11 @@ def _digital(value: float, low: float, high: float, resolution: float) -> float:
 @kernel
 def _position(p: Record, true_m: float, noise: float) -> float:
     # a bow over the whole range, its largest deviation the stated linearity
-    share = true_m / p.position_range_m
-    bow_m = 4.0 * p.position_linearity * p.position_range_m * share * (1.0 - share)
+    lowest_m, highest_m = p.position_lowest_m, p.position_range_m
+    share = (true_m - lowest_m) / (highest_m - lowest_m)
+    bow_m = 4.0 * p.position_linearity * (highest_m - lowest_m) * share * (1.0 - share)
     measured_m = true_m + bow_m + p.position_noise_m * noise
-    return _digital(measured_m, 0.0, p.position_range_m, p.position_resolution_m)
+    return _digital(measured_m, lowest_m, highest_m, p.position_resolution_m)
 
 
 @kernel
@@ -38,7 +39,7 @@ def digitise(p: Record, analogue: npt.NDArray[Any], noise: npt.NDArray[Any], blo
     low_mps2, high_mps2 = -p.accel_range_mps2, p.accel_range_mps2
     for i in range(analogue.shape[1]):
         force_N = p.force_gain * analogue[0, i] + p.force_noise_N * noise[0, i]
-        block.drive_force_N[i] = _digital(force_N, 0.0, p.force_range_N, p.force_resolution_N)
+        block.drive_force_N[i] = _digital(force_N, p.force_lowest_N, p.force_range_N, p.force_resolution_N)
         mass_mps2 = analogue[1, i] + p.accel_noise_mps2 * noise[1, i]
         block.mass_accel_mps2[i] = _digital(mass_mps2, low_mps2, high_mps2, p.accel_resolution_mps2)
         base_mps2 = analogue[2, i] + p.accel_noise_mps2 * noise[2, i]

@@ -1,5 +1,6 @@
 """A run of the rig without bus, sensors or controller: for the paper's figures, for tests, for benches."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from bridge.kernel import kernel
 from bridge.wire.messages import CHANNELS
 from plant.config import RigConfig
 from plant.core import advance, advance_disturbed
+from plant.drive_motion import mean_velocity_mps
 from plant.records import TRUTH, build
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -84,6 +86,19 @@ def simulate(
 
 
 def drive_velocity_mps(config: RigConfig, t_s: Floats) -> Floats:
-    """Drive velocity [m/s] at the times `t_s` [s], linear between the points of the profile, constant outside them."""
-    profile = np.array(config.drive.profile)
-    return np.interp(t_s, profile[:, 0], profile[:, 1])
+    """Drive velocity [m/s] held over the blocks that begin at the times `t_s` [s], 0 or later.
+
+    Of a profile that comes once, the velocity when the block begins: linear between the points of the profile, constant
+    outside them. Of moves and of what repeats, the mean over the block, so that a cycle ends where it began.
+    """
+    return held_velocity(config)(t_s)
+
+
+def held_velocity(config: RigConfig) -> Callable[[Floats], Floats]:
+    """`drive_velocity_mps` of a rig, for many calls."""
+    drive, block_s = config.drive, config.solver.block_s
+    if drive.moves or drive.repeat_every_s > 0.0:
+        motion = drive.motion()
+        return lambda t_s: mean_velocity_mps(motion, t_s, block_s)
+    profile = np.array(drive.profile)
+    return lambda t_s: np.interp(t_s, profile[:, 0], profile[:, 1])

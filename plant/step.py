@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from plant.core import advance, advance_disturbed
+from plant.loop_delay import receive, send
 from plant.records import NO_COMMAND
 from plant.sensors import digitise
 
@@ -18,6 +19,7 @@ def step(
     drive_velocity_mps: float,
     command: npt.NDArray[Any],
     commands: int,
+    delay_blocks: int,
     noise: npt.NDArray[Any],
     commands_late: int,
     round_trip_ns: int,
@@ -33,6 +35,7 @@ def step(
         params, state: one record each of `plant.records.PARAMS` and `STATE`.
         drive_velocity_mps: held over the block.
         command, commands: the newest command, and the number of commands since the last block; at 0 `command` is not read.
+        delay_blocks: blocks that this command takes to the exciter besides.
         noise: standard normal numbers, float64 [5, samples].
         commands_late, round_trip_ns, late_ns: copied to `applied`.
         analogue, truth: filled, as `plant.core.advance` says.
@@ -42,10 +45,8 @@ def step(
     p: Record = params[0]
     s: Record = state[0]
     if commands > 0:
-        c: Record = command[0]
-        s.commanded_Hz = c.frequency_Hz
-        s.commanded_m = c.amplitude_m
-        s.command_block = c.block
+        send(s, command[0], delay_blocks)
+    receive(s)
     fresh = s.command_block != NO_COMMAND and 0 <= s.block - s.command_block <= p.command_timeout_blocks
     usable = fresh and math.isfinite(s.commanded_Hz) and math.isfinite(s.commanded_m)
     frequency_Hz, amplitude_m = (s.commanded_Hz, s.commanded_m) if usable else (s.frequency_Hz, 0.0)

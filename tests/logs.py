@@ -10,7 +10,7 @@ import numpy as np
 
 from bridge.log.logfile import STREAMING, RunData, read_run
 from bridge.log.runlog import RunLog
-from bridge.wire.messages import APPLIED, COMMAND, STATE, TRACE, sensor_block
+from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, sensor_block
 from bridge.wire.topics import BY_NAME
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
@@ -20,10 +20,10 @@ Tables = dict[str, Any]
 
 @cache
 def short_log() -> bytes:
-    """A run of 0.4 s, 400 blocks, in several chunks."""
+    """A run of 0.4 s, 400 blocks and one announcement, in several chunks."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "short.mcap"
-        scenario = load_scenario("paper-c45-c45", ["duration_s=0.4"])
+        scenario = load_scenario("paper-c45-c45", ["duration_s=0.4", "rig.drive.announce_ahead_s=0.02"])
         run_onboard(scenario, path, {"scenario": scenario.name})
         return in_chunks(path, 40)
 
@@ -48,7 +48,7 @@ def with_tags(name: str, table: Any) -> Any:
     layout = (
         sensor_block(20)
         if name == "sensors"
-        else {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE}[name]
+        else {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE, "announce": ANNOUNCE}[name]
     )
     messages = np.frombuffer(bytearray(layout.blank().tobytes() * len(table)), layout.dtype)
     for field in layout.dtype.names or ():

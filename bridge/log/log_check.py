@@ -1,5 +1,6 @@
 """Check of a run log in one pass; the memory does not grow with the log."""
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,7 @@ from bridge.log.topic_watch import TopicWatch
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import CHANNELS
-from bridge.wire.payloads import SCHEMA_VERSION, parsed
+from bridge.wire.payloads import READABLE_VERSIONS, parsed
 from bridge.wire.topics import BY_NAME
 
 LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the next block is due
@@ -25,12 +26,13 @@ LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the nex
 # passes.
 LATE_SHARE = 0.01
 _DEAD_S = 1.0  # a longer stretch of equal values is a dead sensor, as a live one has noise
+# the ends of a sensor's range in the rig's configuration; an acceleration's is the same both ways
 _RANGES = {
-    "drive_force_N": "force_range_N",
-    "mass_accel_mps2": "accel_range_mps2",
-    "base_accel_mps2": "accel_range_mps2",
-    "mass_position_m": "position_range_m",
-    "drive_position_m": "position_range_m",
+    "drive_force_N": ("force_lowest_N", "force_range_N"),
+    "mass_accel_mps2": (None, "accel_range_mps2"),
+    "base_accel_mps2": (None, "accel_range_mps2"),
+    "mass_position_m": ("position_lowest_m", "position_range_m"),
+    "drive_position_m": ("position_lowest_m", "position_range_m"),
 }
 
 
@@ -98,7 +100,7 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
     absent = reader.metadata.get("import", {}).get("missing", "")
     for name, signal in seen.signals.items():
         if seen.topics["sensors"].messages and name not in absent:
-            findings += _of_signal("/sensors " + name, signal.result(), _sample_s(seen), _limit(reader, _RANGES[name]))
+            findings += _of_signal("/sensors " + name, signal.result(), _sample_s(seen), _ends(reader, *_RANGES[name]))
     shares = {f"/{name}": late / max(seen.topics[name].messages, 1) for name, late in seen.late.items()}
     for where, share in shares.items():
         if share > LATE_SHARE:
@@ -113,13 +115,18 @@ def _sample_s(seen: _Pass) -> float:
     return seen.period_ns / 1e9 / max(seen.samples_per_block, 1)
 
 
-def _limit(reader: LogReader, name: str) -> float | None:
-    """The range of a sensor; None where the plant does not tell."""
+def _ends(reader: LogReader, lowest: str | None, highest: str) -> tuple[float, float]:
+    """The ends of a sensor's range; infinite where the plant does not tell, and at 0, where noise alone clips."""
     try:
-        limit = configuration_of(reader.metadata, "plant", reader.path)["rig"]["sensors"][name]
-    except (Fault, KeyError, TypeError, IndexError):
-        return None
-    return float(limit) if is_number(limit) else None
+        sensors = configuration_of(reader.metadata, "plant", reader.path)["rig"]["sensors"]
+        high = sensors[highest]
+        low = sensors.get(lowest, 0.0) if lowest else -high
+    except (Fault, KeyError, TypeError, IndexError, AttributeError):
+        return -math.inf, math.inf
+    return (
+        float(low) if is_number(low) and low < 0.0 else -math.inf,
+        float(high) if is_number(high) else math.inf,
+    )
 
 
 def _of_configurations(reader: LogReader) -> list[Finding]:
@@ -142,8 +149,8 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
     found = damage_findings(reader.damage, path)
     for role, table in reader.metadata.items():
         version = table.get("schema_version")
-        if version is not None and version != str(SCHEMA_VERSION):
-            text = f"the {role} speaks schema version {version}: must be {SCHEMA_VERSION}"
+        if version is not None and version not in map(str, READABLE_VERSIONS):
+            text = f"the {role} speaks schema version {version}: must be {' or '.join(map(str, READABLE_VERSIONS))}"
             found.append(Finding("schema-version", path.name, text))
     found += [
         Finding(
@@ -169,7 +176,7 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
     return found
 
 
-def _of_signal(where: str, seen: SignalLook, sample_s: float, limit: float | None) -> list[Finding]:
+def _of_signal(where: str, seen: SignalLook, sample_s: float, ends: tuple[float, float]) -> list[Finding]:
     found: list[Finding] = []
     if seen.not_finite:
         at_s = seen.first_not_finite * sample_s
@@ -183,11 +190,12 @@ def _of_signal(where: str, seen: SignalLook, sample_s: float, limit: float | Non
         text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s of samples on"
         found.append(Finding("dead", where, text, seen.longest_run))
     # a limit that float32 cannot hold exactly is missed by rounding
-    at_limit = limit is not None and max(seen.highest, -seen.lowest) >= limit * (1.0 - 1e-6)
-    if seen.clipped_high or seen.clipped_low or at_limit:
-        ends = [f"{counted(seen.clipped_high, 'sample')} at {seen.highest:g}"] if seen.clipped_high else []
-        ends += [f"{counted(seen.clipped_low, 'sample')} at {seen.lowest:g}"] if seen.clipped_low else []
-        text = " and ".join(ends) or f"reaches the end of its range, {limit:g}"
+    low, high = (end * (1.0 - 1e-6) for end in ends)
+    if seen.clipped_high or seen.clipped_low or seen.highest >= high or seen.lowest <= low:
+        clipped = [f"{counted(seen.clipped_high, 'sample')} at {seen.highest:g}"] if seen.clipped_high else []
+        clipped += [f"{counted(seen.clipped_low, 'sample')} at {seen.lowest:g}"] if seen.clipped_low else []
+        end = ends[1] if seen.highest >= high else ends[0]
+        text = " and ".join(clipped) or f"reaches the end of its range, {end:g}"
         found.append(
             Finding(
                 "clipped",

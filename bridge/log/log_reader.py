@@ -22,7 +22,7 @@ from mcap.records import Channel, Chunk, Header, Metadata, Schema
 from bridge.faults import Fault
 from bridge.log.chunk_messages import Chunked, Messages, messages_of
 from bridge.log.damage import Damage
-from bridge.log.library import LIBRARY, MAGIC
+from bridge.log.library import MAGIC, READABLE
 from bridge.wire.topics import TOPICS
 
 _HEAD = struct.Struct("<BQ")
@@ -192,10 +192,12 @@ class LogReader:
                 self.metadata[metadata.name] = dict(metadata.metadata)
         except _UNREADABLE:
             self._count(bad_records=1)
-        if opcode == Opcode.HEADER and self.header is not None and self.header.library != LIBRARY:
+        if opcode == Opcode.HEADER and self.header is not None and self.header.library not in READABLE:
             by = self.header.library
-            line = f"{self.path}: written by {by!r}: must be {LIBRARY!r}; another program's or version's log"
-            raise Fault("BAD_LOG", line)
+            known = " or ".join(map(repr, READABLE))
+            raise Fault(
+                "BAD_LOG", f"{self.path}: written by {by!r}: must be {known}; another program's or version's log"
+            )
 
     def _learn_channels(self, data: bytes) -> None:
         at = 0

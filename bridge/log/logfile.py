@@ -16,12 +16,12 @@ from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
 from bridge.log.metadata import configuration_of
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import APPLIED, COMMAND, STATE, TRACE, Layout, Records, sensor_block
+from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, Layout, Records, sensor_block
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import BY_NAME
 
-STREAMING = ("sensors", "applied", "command", "trace", "state")
-_LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE}
+STREAMING = ("sensors", "applied", "command", "trace", "state", "announce")
+_LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE, "announce": ANNOUNCE}
 _DEFAULT_SAMPLES = 20
 _COUNTED_BLOCKS = 100  # for their number of samples; a chunk of a run in real time holds as many
 _ROOM = 1.1  # of the memory for a topic over what the part that was read lets expect
@@ -74,8 +74,14 @@ def _samples(messages: Messages) -> int:
 
 def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt.NDArray[np.int64]]:
     """The readable payloads with every field written and in order, [messages, size]; and which of the messages they are of."""
-    if (messages.payload_bytes() == layout.size).all():
-        stacked = messages.stacked(layout.size)
+    lengths = messages.payload_bytes()
+    length = int(lengths[0]) if len(lengths) else 0
+    if length in layout.whole_sizes and (lengths == length).all():
+        stacked = messages.stacked(length)
+        if length < layout.size:  # of an older schema, without the last fields
+            whole = np.frombuffer(layout.blank(len(stacked)).tobytes(), np.uint8).reshape(-1, layout.size).copy()
+            whole[:, :length] = stacked
+            stacked = whole
         if layout.all_canonical(stacked):
             return stacked, np.arange(len(stacked))
     good: list[bytes] = []
@@ -126,6 +132,7 @@ class RunData(NamedTuple):
     command: Records
     trace: Records
     state: Records
+    announce: Records  # empty for a rig that announces nothing, and in a log of schema 1
     snapshots: list[wire.Snapshot]
     events: list[wire.Event]
     headers: dict[str, dict[str, str]]  # by role: schema_version, configuration, versions

@@ -57,6 +57,7 @@ class Layout:
         offsets: list[int] = []
         template = bytearray()
         fixed = bytearray()
+        ends: list[int] = []
         for field in sorted(message.DESCRIPTOR.fields, key=lambda field: field.number):
             code, wire_type = _SCALARS[field.type]
             if field.is_repeated:
@@ -73,7 +74,9 @@ class Layout:
             width = np.dtype(value).itemsize
             template += bytes(width)
             fixed += bytes(width)
+            ends.append(len(template))
         self.size = len(template)
+        self.whole_sizes = frozenset(ends)  # of the message as it is, and as it was when it had fewer fields
         fields = np.dtype(cast(Any, {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}))
         self.dtype: np.dtype[Any] = np.dtype((np.record, fields))
         self._template = bytes(template)
@@ -129,6 +132,7 @@ COMMAND = Layout(wire.Command)
 APPLIED = Layout(wire.Applied)
 TRACE = Layout(wire.Trace)
 STATE = Layout(wire.State)
+ANNOUNCE = Layout(wire.Announce)
 
 _sensor_layouts: dict[int, Layout] = {}
 

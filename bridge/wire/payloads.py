@@ -8,7 +8,8 @@ from google.protobuf.message import DecodeError, Message
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+READABLE_VERSIONS = (1, 2)  # fields are only appended, so an older log lacks what came later and no more
 
 M = TypeVar("M", bound=Message)
 

@@ -140,7 +140,7 @@ class Applied(_message.Message):
     def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ...) -> None: ...
 
 class Trace(_message.Message):
-    __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns")
+    __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns", "announcements")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     BLOCK_FIELD_NUMBER: _ClassVar[int]
@@ -162,6 +162,7 @@ class Trace(_message.Message):
     WANTED_FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
     TIME_TO_SLIP_S_FIELD_NUMBER: _ClassVar[int]
     LATENESS_NS_FIELD_NUMBER: _ClassVar[int]
+    ANNOUNCEMENTS_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     block: int
@@ -183,7 +184,20 @@ class Trace(_message.Message):
     wanted_frequency_Hz: float
     time_to_slip_s: float
     lateness_ns: int
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., events: _Optional[int] = ..., gap_blocks: _Optional[int] = ..., state: _Optional[int] = ..., mode: _Optional[int] = ..., reason: _Optional[int] = ..., limit: _Optional[int] = ..., slips: _Optional[int] = ..., score: _Optional[float] = ..., force_rate: _Optional[float] = ..., drive_force_N: _Optional[float] = ..., burst_mps2: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., wanted_velocity_mps: _Optional[float] = ..., wanted_amplitude_m: _Optional[float] = ..., wanted_frequency_Hz: _Optional[float] = ..., time_to_slip_s: _Optional[float] = ..., lateness_ns: _Optional[int] = ...) -> None: ...
+    announcements: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., events: _Optional[int] = ..., gap_blocks: _Optional[int] = ..., state: _Optional[int] = ..., mode: _Optional[int] = ..., reason: _Optional[int] = ..., limit: _Optional[int] = ..., slips: _Optional[int] = ..., score: _Optional[float] = ..., force_rate: _Optional[float] = ..., drive_force_N: _Optional[float] = ..., burst_mps2: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., wanted_velocity_mps: _Optional[float] = ..., wanted_amplitude_m: _Optional[float] = ..., wanted_frequency_Hz: _Optional[float] = ..., time_to_slip_s: _Optional[float] = ..., lateness_ns: _Optional[int] = ..., announcements: _Optional[int] = ...) -> None: ...
+
+class Announce(_message.Message):
+    __slots__ = ("sequence", "t_ns", "holds_from_ns", "drive_velocity_mps")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    HOLDS_FROM_NS_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    holds_from_ns: int
+    drive_velocity_mps: float
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., holds_from_ns: _Optional[int] = ..., drive_velocity_mps: _Optional[float] = ...) -> None: ...
 
 class State(_message.Message):
     __slots__ = ("sequence", "t_ns", "drive_force_N", "vibration_velocity_mps", "drive_velocity_mps", "velocity_ratio", "force_rate", "score", "mode", "state", "slips")

@@ -28,6 +28,7 @@ PLANT_EVENT = Topic("event/plant", wire.Event, "plant", 0.0, 0.0, logged=True)
 CONTROLLER_EVENT = Topic("event/controller", wire.Event, "controller", 0.0, 0.0, logged=True)
 RECORDER_EVENT = Topic("event/recorder", wire.Event, "recorder", 0.0, 0.0, logged=True)
 OPERATOR = Topic("operator", wire.Operator, "cockpit", 0.0, 0.0, logged=False)
+ANNOUNCE = Topic("announce", wire.Announce, "plant", 0.0, 0.0, logged=True)
 
 TOPICS = (
     SENSORS,
@@ -40,6 +41,7 @@ TOPICS = (
     CONTROLLER_EVENT,
     RECORDER_EVENT,
     OPERATOR,
+    ANNOUNCE,  # last: a log's channels are numbered in this order
 )
 BY_NAME = {topic.name: topic for topic in TOPICS}
 

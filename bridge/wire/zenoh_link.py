@@ -225,9 +225,10 @@ class Bus:
     def publisher(self, topic: Topic) -> Callable[[bytes], None]:
         """A function that sends bytes on `topic`.
 
-        Sensors and commands have priority. In real time a message that cannot be sent is dropped; in lockstep the call waits.
+        Sensors, announcements and commands have priority; what one role sends of them comes in the order of sending. In real
+        time a message that cannot be sent is dropped; in lockstep the call waits.
         """
-        control = topic.name in {"sensors", "command"}
+        control = topic.name in {"sensors", "command", "announce"}
         block = zenoh.CongestionControl.BLOCK
         declared = self._session.declare_publisher(
             self._key(topic.name),

@@ -70,7 +70,10 @@ def log_export(
     path: LogArgument,
     to: Annotated[Path, typer.Option("--to", help="FILE.parquet, FILE.csv or FILE.mat.")],
     topic: Annotated[
-        str, typer.Option("--topic", help="Comma-separated: sensors, applied, command, trace, state; all if not given.")
+        str,
+        typer.Option(
+            "--topic", help="Comma-separated: sensors, applied, command, trace, state, announce; all if not given."
+        ),
     ] = "",
     start: Annotated[str, typer.Option("--from", help="From this time of the run on, e.g. 12.5s.")] = "",
     end: Annotated[str, typer.Option("--until", help="Up to this time of the run, e.g. 20s.")] = "",
@@ -134,10 +137,13 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
 
     def work() -> int:
         from bridge.log.log_check import check_log
+        from bridge.wire.topics import BY_NAME
 
         with watched_share(f"checking {path.name}", quiet=as_json == STDOUT) as progress:
             check = check_log(path, progress)
-        counts = ", ".join(f"{name} {count}" for name, count in check.messages.items())
+        counts = ", ".join(
+            f"{name} {count}" for name, count in check.messages.items() if count or BY_NAME[name].rate_Hz
+        )
         late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())
         words = f"{path}: {counted(len(check.findings), 'finding')}; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
         tell(as_json, check, [*(finding.in_words() for finding in check.findings), words])

@@ -62,7 +62,7 @@ def plant(
     """Serve the stand-in rig of a scenario on the bus."""
 
     def work() -> None:
-        from cockpit.run.scenario import header, load_scenario
+        from cockpit.run.scenario import header, load_scenario, refuse_what_takes_no_clock
         from plant.app import run as serve
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
@@ -71,6 +71,8 @@ def plant(
             raise Fault(
                 "CONFIG", f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder or both, by comma"
             )
+        if not lockstep:
+            refuse_what_takes_no_clock(made)
         if not (lockstep or child):
             warn_without_priority()
         described = header(made, "plant", lockstep)
@@ -94,10 +96,12 @@ def controller(
     """Control the rig that is on the bus, with the controller of a scenario."""
 
     def work() -> None:
-        from cockpit.run.scenario import header, load_scenario
+        from cockpit.run.scenario import header, load_scenario, refuse_what_takes_no_clock
         from controller.app import run as control
 
         made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
+        if not lockstep:
+            refuse_what_takes_no_clock(made)
         if not (lockstep or child):
             warn_without_priority()
         steps = control(made.controller, made.bus, header(made, "controller", lockstep), lockstep, stop_event(child))

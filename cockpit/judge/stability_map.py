@@ -56,9 +56,9 @@ def stability_map(rig: RigConfig, out: Path) -> MapResult:
     effects, nominal = rig.effects, rig.model_copy(update={"effects": {}})
     alone = {name: with_constant_effects(rig.model_copy(update={"effects": {name: effects[name]}})) for name in effects}
     rig = with_constant_effects(rig)
-    velocities_mps = sorted({velocity_mps for _, velocity_mps in rig.drive.profile if velocity_mps > 0.0})
+    velocities_mps = rig.drive.speeds_mps()
     if not velocities_mps:
-        raise Fault("CONFIG", f"{rig.name}: drive.profile: the drive never moves; give it a velocity above 0")
+        raise Fault("CONFIG", f"{rig.name}: drive: it never moves; give it a velocity other than 0")
     sustained_mps = float(self_sustained_velocity_mps(rig))
 
     def needs_mps(velocity_mps: float) -> tuple[float, float]:

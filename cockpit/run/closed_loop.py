@@ -9,7 +9,8 @@ import numpy.typing as npt
 from bridge.kernel import unlocked_kernel
 from bridge.kernel_cache import compile_once
 from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, TRACE, Records, sensor_block
-from controller.codes import BLOCK
+from controller.announced import take_announcement
+from controller.codes import ANNOUNCED, BLOCK
 from controller.config import ControllerConfig
 from controller.core import step as controller_step
 from controller.records import build as controller_records
@@ -27,10 +28,13 @@ def advance_both(
     plant_params: npt.NDArray[Any],
     plant_state: npt.NDArray[Any],
     velocity_mps: npt.NDArray[np.float64],
+    delay_blocks: npt.NDArray[np.int64],
     noise: npt.NDArray[np.float64],
     controller_params: npt.NDArray[Any],
     controller_state: npt.NDArray[Any],
     operator_events: int,
+    announcements: npt.NDArray[np.int64],
+    announce: npt.NDArray[Any],
     answered: int,
     analogue: npt.NDArray[np.float64],
     truth: npt.NDArray[np.float64],
@@ -45,8 +49,11 @@ def advance_both(
     Args:
         plant_params, plant_state, controller_params, controller_state: one record each.
         velocity_mps: of the drive, [blocks].
+        delay_blocks: that the command takes to the exciter besides, [blocks].
         noise: standard normal numbers, [blocks, 5, samples].
         operator_events: bits STOP and RESET of `controller.codes`, for the first block.
+        announcements: that the rig makes before it sends its samples, [blocks].
+        announce: these announcements in order, message records.
         answered: 1 where `commands[0]` answers the block before the first, 0 at the start of a run.
         analogue, truth: [5, samples] and [6, samples], overwritten by every block.
         scratch: [samples], overwritten.
@@ -56,15 +63,19 @@ def advance_both(
     Fewer blocks than asked are done where the slide's velocity becomes NaN or infinite.
 
     """
-    last = truth.shape[1] - 1
+    last, said = truth.shape[1] - 1, 0
     for i in range(velocity_mps.shape[0]):
         plant_step(
-            plant_params, plant_state, velocity_mps[i], commands[i : i + 1], answered if i == 0 else 1, noise[i],
-            0, 0, 0, analogue, truth, sensors[i : i + 1], applied[i : i + 1],
+            plant_params, plant_state, velocity_mps[i], commands[i : i + 1], answered if i == 0 else 1, delay_blocks[i],
+            noise[i], 0, 0, 0, analogue, truth, sensors[i : i + 1], applied[i : i + 1],
         )  # fmt: skip
         if not math.isfinite(truth[_VELOCITY, last]):
             return i
         events = BLOCK | operator_events if i == 0 else BLOCK
+        for _ in range(announcements[i]):
+            take_announcement(controller_state[0], announce[said].holds_from_ns, announce[said].drive_velocity_mps)
+            said += 1
+            events |= ANNOUNCED
         controller_step(
             controller_params, controller_state, sensors[i : i + 1], events, 0, sensors[i].t_ns,
             commands[i + 1 : i + 2], traces[i : i + 1], scratch,
@@ -79,6 +90,7 @@ class Blocks(NamedTuple):
     applied: Records
     command: Records
     trace: Records
+    announce: Records  # as many as were made
 
 
 class ClosedLoop:
@@ -118,15 +130,16 @@ class ClosedLoop:
 
         Fewer blocks come back where the rig's state became NaN or infinite in the one after them.
         """
-        velocity_mps, noise = self._inputs.draw(blocks)
+        velocity_mps, noise, delay_blocks, announcements, announce = self._inputs.draw(blocks)
         commands = COMMAND.blank(blocks + 1)
         commands[:1] = self._last_command
         sensors, applied, trace = self._sensors.blank(blocks), APPLIED.blank(blocks), TRACE.blank(blocks)
         done = advance_both(
-            self._plant_params, self._plant_state, velocity_mps, noise,
-            self._controller_params, self.controller_state, operator_events, min(self.block, 1),
+            self._plant_params, self._plant_state, velocity_mps, delay_blocks, noise,
+            self._controller_params, self.controller_state, operator_events, announcements, announce, min(self.block, 1),
             self._analogue, self._truth, self._scratch, sensors, applied, commands, trace,
         )  # fmt: skip
         self.block += done
         self._last_command = commands[done : done + 1]
-        return Blocks(sensors[:done], applied[:done], commands[1 : done + 1], trace[:done])
+        said = announce[: int(announcements[:done].sum())]
+        return Blocks(sensors[:done], applied[:done], commands[1 : done + 1], trace[:done], said)

@@ -10,7 +10,17 @@ import numpy.typing as npt
 
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, SENSORS, SNAPSHOT, STATE, TRACE
+from bridge.wire.topics import (
+    ANNOUNCE,
+    APPLIED,
+    COMMAND,
+    CONTROLLER_EVENT,
+    PLANT_EVENT,
+    SENSORS,
+    SNAPSHOT,
+    STATE,
+    TRACE,
+)
 from cockpit.run.closed_loop import Blocks, ClosedLoop
 from cockpit.run.scenario import Scenario, header
 from controller.node import obeyed
@@ -97,6 +107,8 @@ def _first_step(loop: ClosedLoop, t_ns: int) -> int:
 def _write(log: RunLog, end: int, block_ns: int, made: Blocks, memory: npt.NDArray[Any]) -> None:
     """Write the messages of a stretch that ends before block `end`, with the state and the snapshot where they are due."""
     begin = end - len(made.trace)
+    for row in range(len(made.announce)):
+        log.write(ANNOUNCE, made.announce[row : row + 1].tobytes())
     tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
     # a stretch that was cut short begins and ends with blocks that have no whole period of the state message
     whole = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)

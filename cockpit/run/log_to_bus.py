@@ -20,7 +20,7 @@ from rich.text import Text
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, read_run
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.topics import APPLIED, COMMAND, PLANT_EVENT, SENSORS, STATE, TRACE, Topic
+from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, PLANT_EVENT, SENSORS, STATE, TRACE, Topic
 from bridge.wire.zenoh_link import Bus, BusConfig
 from plant.app import wait_for_peers
 
@@ -51,7 +51,7 @@ def publish_log(
 
     """
     run = read_run(path)
-    tables = [(SENSORS, run.sensors), (APPLIED, run.applied)]
+    tables = [(ANNOUNCE, run.announce), (SENSORS, run.sensors), (APPLIED, run.applied)]
     if everything:
         tables += [(COMMAND, run.command), (TRACE, run.trace), (STATE, run.state)]
     schedule = _schedule(tables, round(from_s * 1e9))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from bridge.faults import Fault
 from bridge.log.live import refuse_a_live_log
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
-from cockpit.run.scenario import Scenario, load_scenario
+from cockpit.run.scenario import Scenario, load_scenario, refuse_what_takes_no_clock
 from cockpit.run.writable import LOG, check_output
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
     before = _stamp(path)
     endless = scenario.duration_s == 0.0
     if not (lockstep or in_process):
+        refuse_what_takes_no_clock(scenario)
         warn_without_priority()
     if endless:
         print(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}", file=sys.stderr, flush=True)

@@ -1,12 +1,12 @@
 """A scenario: one rig, one controller, one duration."""
 
 import json
+import math
 import platform
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from bridge.config import Strict, blamed, read_toml, validate, with_overrides
@@ -18,6 +18,10 @@ from cockpit.run.scenario_file import RIG_FILE, find, rig_table, with_rig
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 from plant.config_limits import refuse_what_no_rig_does
+from plant.drive_motion import lowest_mps, reach_m
+
+# Shorter: the answer to a block comes after the next block is due.
+_SHORTEST_IN_REAL_TIME_S = 1e-3
 
 
 def _plain(name: str) -> str:
@@ -59,16 +63,53 @@ class Scenario(Strict):
                     f"controller.limits.{name} = {ours_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
                     f"rig.piezo.{name} = {theirs_Hz:g}; set it to {theirs_Hz:g} as well"
                 )
-        profile = np.array(self.rig.drive.profile)
-        corners_s = np.unique(np.clip([0.0, *profile[:, 0], self.duration_s], 0.0, self.duration_s))
-        travel_m = float(np.trapezoid(np.interp(corners_s, profile[:, 0], profile[:, 1]), corners_s))
-        range_m = self.rig.sensors.position_range_m
-        if travel_m > range_m:
-            raise ValueError(
-                f"duration_s = {self.duration_s:g}: the drive would travel {travel_m * 1e3:.1f} mm, beyond the transducers' "
-                f"{range_m * 1e3:g} mm; shorten the run or slow the drive"
-            )
+        _stays_in_range(self.rig, self.duration_s)
         return self
+
+
+def _stays_in_range(rig: RigConfig, duration_s: float) -> None:
+    """Raise ValueError for a drive that leaves the ranges of the sensors within the run."""
+    sensors = rig.sensors
+    motion = rig.drive.motion()
+    # of a run without an end, what is sure to come: moves to their last, and one cycle
+    until_s = duration_s or (float(motion.start_s[-1]) if rig.drive.moves else 0.0)
+    if motion.drift_m != 0.0 and not duration_s:
+        raise ValueError(
+            f"rig.drive.repeat_every_s = {rig.drive.repeat_every_s:g}: each cycle ends {motion.drift_m * 1e3:.3g} mm from where "
+            "it began, and a run without an end leaves every range: must end where it began; change the way back, or give "
+            "duration_s"
+        )
+    if math.isfinite(motion.period_s):
+        until_s = duration_s or motion.period_s
+    lowest_m, highest_m = reach_m(motion, until_s)
+    if highest_m > sensors.position_range_m:
+        raise ValueError(
+            f"duration_s = {duration_s:g}: the drive would travel to {highest_m * 1e3:.1f} mm, beyond the transducers' "
+            f"{sensors.position_range_m * 1e3:g} mm; shorten the run, slow the drive or raise "
+            "rig.sensors.position_range_m"
+        )
+    if lowest_m < sensors.position_lowest_m:
+        raise ValueError(
+            f"duration_s = {duration_s:g}: the drive would travel to {lowest_m * 1e3:.4g} mm, below the transducers' "
+            f"{sensors.position_lowest_m * 1e3:g} mm; shorten the run, let the drive go forward first or lower "
+            f"rig.sensors.position_lowest_m to {lowest_m:.3g}"
+        )
+    if lowest_mps(motion, until_s) < 0.0 and sensors.force_lowest_N == 0.0:
+        raise ValueError(
+            "rig.sensors.force_lowest_N = 0: the drive goes back within the run, and pushes with a force that this sensor "
+            f"shows as 0; set it to {-sensors.force_range_N:g}"
+        )
+
+
+def refuse_what_takes_no_clock(scenario: Scenario) -> None:
+    """Raise Fault CONFIG for blocks that the bus does not carry in time."""
+    block_s = scenario.rig.solver.block_s
+    if block_s < _SHORTEST_IN_REAL_TIME_S * (1.0 - 1e-9):
+        line = (
+            f"{scenario.name}: rig.solver.block_s = {block_s:g}: must be {_SHORTEST_IN_REAL_TIME_S:g} or more in real time, as "
+            "every block is a message there and back between processes; lengthen it, or use --lockstep or --in-process"
+        )
+        raise Fault("CONFIG", line)
 
 
 def load_rig(name: str, settings: list[str]) -> RigConfig:

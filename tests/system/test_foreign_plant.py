@@ -126,7 +126,7 @@ def test_the_page_has_the_schema() -> None:
 
 def test_the_page_has_the_lengths_of_canonical_messages() -> None:
     layouts = (
-        *(messages.COMMAND, messages.APPLIED, messages.TRACE, messages.STATE),
+        *(messages.COMMAND, messages.APPLIED, messages.TRACE, messages.STATE, messages.ANNOUNCE),
         messages.sensor_block(20),
     )
     for layout in layouts:

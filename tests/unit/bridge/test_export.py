@@ -32,7 +32,7 @@ def log(tmp_path: Path) -> Path:
 def columns_of(suffix: str, to: Path, topic: str) -> dict[str, Any]:
     if suffix == ".mat":
         struct = scipy.io.loadmat(to, squeeze_me=True, struct_as_record=False)[topic]
-        return {name: getattr(struct, name) for name in struct._fieldnames}
+        return {name: np.atleast_1d(getattr(struct, name)) for name in struct._fieldnames}
     path = to.with_name(f"{to.stem}.{topic}{suffix}")
     # numbers of blocks go up to 2^64 - 1, which a reader that guesses takes for floating point
     types = pyarrow.csv.ConvertOptions(column_types={"command_block": pyarrow.uint64()})

@@ -15,6 +15,8 @@ from bridge.log.log_check import check_log
 from bridge.log.logfile import read_run
 from cockpit.commands.log import log_app
 from cockpit.judge.verdict import in_words, judge
+from cockpit.run.in_process import run_onboard
+from cockpit.run.scenario import load_scenario
 from tests.logs import Tables, doctored, short_log
 
 
@@ -111,6 +113,17 @@ def test_what_was_done_is_found(tmp_path: Path, change: Callable[[Tables], None]
     assert kind in {finding["kind"] for finding in json.loads(result.stdout)["findings"]}
 
 
+def test_the_lower_end_of_a_range_is_known(tmp_path: Path) -> None:
+    """A sensor that ends at -8 N, on a stroke back that pushes harder, and one that measures the whole of it."""
+    back = ["duration_s=0.4", "rig.drive.profile=[[0.0, -0.01]]", "rig.sensors.position_lowest_m=-0.01"]
+    for lowest_N, found in ((-8.0, "clipped"), (-50.0, None)):
+        scenario = load_scenario("from-the-start", [*back, f"rig.sensors.force_lowest_N={lowest_N}"])
+        path = tmp_path / f"{-lowest_N:g}.mcap"
+        run_onboard(scenario, path, {})
+        assert kinds(path).get("clipped", "").startswith("/sensors drive_force_N" if found else "")
+        assert ("clipped" in kinds(path)) == (found is not None)
+
+
 def test_a_late_message_closes_its_gap(tmp_path: Path) -> None:
     def change(tables: Tables) -> None:
         tables["sensors"] = tables["sensors"][[*range(2), 3, 2, 4, *range(6, 400)]]
@@ -143,14 +156,14 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
         channel = writer.register_channel("/chatter", "cdr", schema)
         writer.add_message(channel, 1, b"hello", 1)
         writer.finish()
-    version = (tmp_path / "version.mcap", short_log().replace(b"stickslip schema 1", b"stickslip schema 2"))
+    version = (tmp_path / "version.mcap", short_log().replace(b"stickslip schema 2", b"stickslip schema 3"))
     version[0].write_bytes(version[1])
     (tmp_path / "text.mcap").write_text("t_s,drive_force_N\n" * 100)
     (tmp_path / "folder.mcap").mkdir()
     expected = {
         "empty": "0 bytes, no MCAP file",
-        "foreign": "must be 'stickslip schema 1'",
-        "version": "written by 'stickslip schema 2'",
+        "foreign": "must be 'stickslip schema 1' or 'stickslip schema 2'",
+        "version": "written by 'stickslip schema 3'",
         "text": "no MCAP file",
         "folder": "is a folder, must be a file; ",
         "absent": "no such file; ",
