@@ -8,7 +8,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo quick test test-realtime test-others nightly warm check docs reference bench blind real bless lock proto schemas clean
+.PHONY: demo quick test test-realtime test-others nightly warm check docs reference bench bench-quick blind real bless lock proto schemas clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -52,8 +52,11 @@ docs: $(READY) ## the pages as a site in site/, which works from a disk; a dead 
 reference: $(READY) ## after a change of commands, effects, faults or file formats
 	@$(BIN)/python -m docs.generate
 
-bench: $(VENV)/.ready-bench
+bench: $(VENV)/.ready-bench ## a quarter of an hour, with the machine to itself
 	@$(BIN)/python -m tests.bench
+
+bench-quick: $(READY) ## three minutes: no vibrated rig, Radau, MuJoCo, effects; one diagnosis
+	@$(BIN)/python -m tests.bench --quick
 
 blind: $(READY) ## hours; what has a result is not done again: make blind CASES=20 SEED=1 OUT=runs/blind GENERATOR=plant
 	@test -e $(BLIND) || $(BIN)/python -m tests.blind make --cases $(CASES) --seed $(SEED) --out $(BLIND) \

@@ -1,5 +1,6 @@
 """The recorder process: writes every message on the bus to one log."""
 
+import contextlib
 import math
 import threading
 import time
@@ -7,11 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bridge.faults import Fault
+from bridge.log.pause_writer import PauseWriter
 from bridge.log.runlog import RunLog
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.pauses import PauseWatch
 from bridge.wire.payloads import parsed
-from bridge.wire.topics import TOPICS
+from bridge.wire.topics import RECORDER_EVENT, TOPICS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 
 _INBOX_LIMIT = 1 << 16  # messages, 15 s of a run at 4100 messages/s; smaller loses messages while the disk is busy
@@ -56,12 +59,18 @@ def run(
         log.add_metadata("run", about)
         for role in sorted(headers):
             log.add_header(headers[role])
-        if lockstep:  # beside plant and controller
-            realtime.claim(realtime.core(bus_config.port + 1), realtime.LOCKSTEP_PRIORITY)
-        else:
-            realtime.claim(None, realtime.RECORDER_PRIORITY)
-        bus.announce()
-        lost_plant = _record(log, bus, inbox, stop)
+        with contextlib.ExitStack() as ending:
+            pauses = None
+            if lockstep:  # beside plant and controller
+                realtime.claim(realtime.core(bus_config.port + 1), realtime.LOCKSTEP_PRIORITY)
+            else:
+                realtime.claim(None, realtime.RECORDER_PRIORITY)
+                watch = ending.enter_context(contextlib.closing(PauseWatch()))
+                pauses = PauseWriter(log, bus.publisher(RECORDER_EVENT), watch)
+            bus.announce()
+            lost_plant = _record(log, bus, inbox, stop, pauses)
+            if pauses is not None:
+                pauses.finish()
         if inbox.dropped:
             log.add_event("DROPPED", f"{inbox.dropped} messages: the recorder was too slow")
         log.close()
@@ -69,7 +78,7 @@ def run(
         raise Fault("PEER_DIED", f"the plant left the bus before its end; {path} was closed with all that came")
 
 
-def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
+def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event, pauses: PauseWriter | None) -> bool:
     """Write until plant and controller have ended. Returns whether the plant left the bus without an END."""
     ended: set[str] = set()
     heard_s = time.monotonic()
@@ -87,6 +96,8 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
         if received is not None:
             try:
                 log.write(received.topic, received.payload)
+                if pauses is not None:
+                    pauses.note(received)
                 if received.topic.name.startswith("event/"):
                     event = parsed(wire.Event, received.payload, received.topic.name)
                     if event.code == "END":
@@ -97,6 +108,8 @@ def _record(log: RunLog, bus: Bus, inbox: Inbox, stop: threading.Event) -> bool:
                 log.add_event("BAD_MESSAGE", fault.line)  # a wrong message of one client must not end the recording
             continue
         log.flush_when_due()
+        if pauses is not None:
+            pauses.tell_when_due()
         quiet_s = time.monotonic() - heard_s
         if stop.is_set() and quiet_s > _QUIET_S:
             return False

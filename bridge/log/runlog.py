@@ -127,12 +127,13 @@ class RunLog:
             self._due_s = time.monotonic() + FLUSH_PERIOD_S
             self.flush()
 
-    def add_event(self, code: str, text: str, t_ns: int | None = None) -> None:
-        """Write an event of the recorder; its time is `t_ns`, or that of the latest message."""
+    def add_event(self, code: str, text: str, t_ns: int | None = None) -> wire.Event:
+        """Write an event of the recorder, and return it; its time is `t_ns`, or that of the latest message."""
         at_ns = self._last_t_ns if t_ns is None else t_ns
         event = wire.Event(sequence=self._events, t_ns=at_ns, source="recorder", code=code, text=text)
         self._add(RECORDER_EVENT, event.SerializeToString(), self._events, at_ns)
         self._events += 1
+        return event
 
     def _add(self, topic: Topic, payload: bytes, sequence: int, t_ns: int) -> None:
         log_time_ns = t_ns if self._lockstep else time.time_ns()

@@ -13,6 +13,7 @@ from bridge.log.metadata import number_of
 from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
+from cockpit.judge.pauses import Pauses, pauses_in, pauses_in_words
 from diagnosis.features.cycles import Cycles, find_cycles
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
@@ -60,6 +61,8 @@ class RunVerdict(NamedTuple):
     velocity_ratio_min: float
     velocity_ratio_max: float
     latency: Latency | None
+    pauses: Pauses | None  # of the whole machine; None in lockstep, and where they were not watched
+    not_watched: str  # why the machine's pauses are not known; empty where they are, and in lockstep
     faults: list[str]
     normal_scheduling: list[str]  # processes without a real-time priority; in lockstep none needs it
     untested: str  # why nothing was tested; empty where the drive moved with the controller in charge
@@ -76,7 +79,7 @@ class RunVerdict(NamedTuple):
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
         table: dict[str, Any] = self._asdict() | {"good": self.good}
-        for name in ("before", "after", "latency"):
+        for name in ("before", "after", "latency", "pauses"):
             table[name] = table[name] and table[name]._asdict()
         return table
 
@@ -126,6 +129,8 @@ def judge_run(run: RunData) -> RunVerdict:
         )
     lost_blocks, all_losses_known = _lost_blocks(run)
     stopped_s = sum(min(until_s - _SETTLING_S, seconds) - from_s for from_s, until_s in stops)
+    latency = _latency(run)
+    pauses, why_not = pauses_in(run, block_s * 1e9) if latency is not None else (None, "")
     after = _phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, stops)
     return RunVerdict(
         log=str(run.path),
@@ -141,7 +146,9 @@ def judge_run(run: RunData) -> RunVerdict:
         drive_velocity_max_mps=float(trace["drive_velocity_mps"].max(initial=0.0)),
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
-        latency=_latency(run),
+        latency=latency,
+        pauses=pauses,
+        not_watched=why_not,
         faults=faults + [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, run.path)],
         normal_scheduling=[
             event.source for event in run.events if event.code == "START" and event.text.startswith(realtime.NORMAL)
@@ -278,6 +285,7 @@ def in_words(verdict: RunVerdict) -> list[str]:
             f"latency  block to command p50 {latency.p50_us:.0f} us, p99 {latency.p99_us:.0f} us, p99.9 "
             f"{latency.p999_us:.0f} us; {100 * latency.within_1_ms:.2f} % within 1 ms"
         )
+    lines.extend(pauses_in_words(v.pauses, v.not_watched))
     lost = "none lost" if v.lost_blocks == 0 else f"{v.lost_blocks} LOST"
     if not v.all_losses_known:
         lost = f"at least {lost}" if v.lost_blocks else "how many are lost is not known"

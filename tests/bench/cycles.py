@@ -11,7 +11,7 @@ RATE_HZ = 20000
 REPETITIONS = 15
 
 
-def bench() -> bool:
+def bench(quick: bool = False) -> bool:
     """Print the figure; whether the bar is kept."""
     t_s, force_N = sawtooth(RATE_HZ, 17.4, 11.6, duration_s=SECONDS)
     taken_s: list[float] = []

@@ -203,5 +203,7 @@ def test_a_priority_that_is_missing_is_told_at_the_start_and_in_the_verdict(tmp_
         return
     assert result.stderr == warning
     assert sorted(verdict["normal_scheduling"]) == ["controller", "plant"]
+    assert (verdict["pauses"], verdict["not_watched"]) == (None, "no real-time priority")
     said = call("log", "info", str(log)).stdout
     assert "under normal scheduling: real time is not guaranteed" in said
+    assert "pauses   of the machine not watched: no real-time priority" in said

@@ -35,10 +35,12 @@ def start() -> Iterator[Start]:
     started: list[subprocess.Popen[str]] = []
 
     def start_one(*arguments: str) -> subprocess.Popen[str]:
+        # a stranger's Zenoh has its own threads: with our single one, which this process may have asked for, the rig stalls
+        without_ours = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
         process = subprocess.Popen(
             [sys.executable, *arguments],
             cwd=ROOT,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            env={**without_ours, "PYTHONPATH": str(ROOT)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

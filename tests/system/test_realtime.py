@@ -44,6 +44,10 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     assert np.array_equal(np.unique(data.command["block"]), data.sensors["sequence"])
     assert int(data.applied["commands"].sum()) > 5700  # a pause of a busy machine at the end leaves some under way
     assert set(data.headers) == {"run", "plant", "controller"}
+    verdict = json.loads(result.stdout)
+    told = [event.text for event in data.events if event.code == "WATCH"]
+    assert len(told) == 1
+    assert (verdict["pauses"] is None) == ("not watched: " in told[0]) == bool(verdict["not_watched"])
 
 
 def test_a_recorder_that_comes_last_misses_nothing(tmp_path: Path) -> None:

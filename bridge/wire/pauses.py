@@ -1,0 +1,154 @@
+"""When the whole machine stood still: what the timers on all cores tell alike."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from bridge.wire import core_timer, realtime
+
+_PRIORITY = realtime.LOOP_PRIORITY + 1  # a loop that takes long must not look like a core that stands still
+_MOST_CORES = 8  # that are watched. More: a process of 10 MB each, and what eight share is the machine's already
+# From when on no timer has more to say of a pause. Shorter: a line of a timer that starts to run later would be missed.
+_SETTLED_NS = 50_000_000
+NO_PRIORITY = "no real-time priority"
+
+
+class Pause(NamedTuple):
+    """A stretch in which nothing ran [ns of time.perf_counter_ns]."""
+
+    from_ns: int
+    until_ns: int
+    core: int | None = None  # that stood still alone; None: every core did, which is a pause of the machine
+
+
+def shared(still: Sequence[Sequence[Pause]]) -> list[Pause]:
+    """Where all cores stood still at the same time, in order of time.
+
+    Args:
+        still: of every core the stretches in which it stood still, in order of time and without overlap.
+
+    """
+    if not still:
+        return []
+    common = list(still[0])
+    for core in still[1:]:
+        both: list[Pause] = []
+        first = second = 0
+        while first < len(common) and second < len(core):
+            from_ns = max(common[first].from_ns, core[second].from_ns)
+            until_ns = min(common[first].until_ns, core[second].until_ns)
+            if until_ns > from_ns:
+                both.append(Pause(from_ns, until_ns))
+            if common[first].until_ns < core[second].until_ns:
+                first += 1
+            else:
+                second += 1
+        common = both
+    return common
+
+
+class PauseWatch:
+    """Timers on the cores that this process may use. They end with `close`, or when this process does.
+
+    `refused` says why nothing is watched, or from when on nothing is; empty while the timers run.
+    """
+
+    def __init__(self) -> None:
+        self.cores = _cores()
+        self.refused = _refusal()
+        self._timers: list[subprocess.Popen[bytes]] = []
+        self._lines = b""
+        self._still: dict[int, list[Pause]] = {core: [] for core in self.cores}
+        if not self.refused:
+            self._start()
+
+    def _start(self) -> None:
+        self._pipe, other = os.pipe()
+        os.set_blocking(self._pipe, False)
+        for place, core in enumerate(self.cores):
+            phase_ns = core_timer.PERIOD_NS * place // len(self.cores)  # not all at once: a pause is seen sooner
+            words = (core, _PRIORITY, os.getpid(), phase_ns)
+            self._timers.append(
+                subprocess.Popen(
+                    # -I -S: neither folders of the person who calls nor installed packages are looked at
+                    [sys.executable, "-I", "-S", core_timer.__file__, *map(str, words)],
+                    stdin=subprocess.DEVNULL,
+                    stdout=other,
+                    stderr=subprocess.DEVNULL,
+                    start_new_session=True,  # Ctrl-C is for the recorder
+                )
+            )
+        os.close(other)
+
+    def poll(self, all_of_them: bool = False) -> list[Pause]:
+        """Pauses since the last call, of the machine and of one core alone; with `all_of_them` also such of the last 50 ms."""
+        if self.refused:
+            return []
+        with contextlib.suppress(BlockingIOError):
+            while part := os.read(self._pipe, 1 << 16):
+                self._lines += part
+        *whole, self._lines = self._lines.split(b"\n")
+        for line in whole:
+            core, from_ns, until_ns = map(int, line.split())
+            self._still[core].append(Pause(from_ns, until_ns))
+        if not all_of_them and any(timer.poll() is not None for timer in self._timers):
+            self.refused = "a timer ended"
+        return self._settled(time.perf_counter_ns() - (0 if all_of_them else _SETTLED_NS))
+
+    def _settled(self, until_ns: int) -> list[Pause]:
+        found, self._still = settled(self._still, until_ns)
+        return found
+
+    def close(self) -> None:
+        """End the timers."""
+        for timer in self._timers:
+            timer.kill()
+        for timer in self._timers:
+            timer.wait()
+        if self._timers:
+            os.close(self._pipe)
+        self._timers.clear()
+
+
+def settled(still: Mapping[int, list[Pause]], until_ns: int) -> tuple[list[Pause], dict[int, list[Pause]]]:
+    """The pauses that ended before `until_ns`, of the machine and of one core alone, and what belongs to later ones."""
+    together = shared(list(still.values()))
+    found = [pause for pause in together if pause.until_ns <= until_ns]
+    told_ns = max((pause.until_ns for pause in found), default=0)
+    for core, pauses in still.items():
+        ended = [pause for pause in pauses if pause.until_ns <= until_ns]
+        found += [piece._replace(core=core) for pause in ended for piece in _without(pause, together)]
+    later = {
+        core: [Pause(max(pause.from_ns, told_ns), pause.until_ns) for pause in pauses if pause.until_ns > until_ns]
+        for core, pauses in still.items()
+    }
+    return sorted(found, key=lambda pause: pause.from_ns), later
+
+
+def _without(pause: Pause, others: Sequence[Pause]) -> list[Pause]:
+    """What the others leave of a pause; they are in order of time."""
+    pieces: list[Pause] = []
+    from_ns = pause.from_ns
+    for other in others:
+        if other.from_ns < pause.until_ns and other.until_ns > from_ns:
+            pieces.append(Pause(from_ns, other.from_ns))
+            from_ns = other.until_ns
+    pieces.append(Pause(from_ns, pause.until_ns))
+    return [piece for piece in pieces if piece.until_ns - piece.from_ns > core_timer.LEAST_NS]
+
+
+def _cores() -> list[int]:
+    if not hasattr(os, "sched_getaffinity"):
+        return []
+    return sorted(os.sched_getaffinity(0))[:_MOST_CORES]
+
+
+def _refusal() -> str:
+    """Why nothing can be watched here; empty where it can."""
+    if not realtime.may_claim(_PRIORITY):
+        return NO_PRIORITY
+    return "" if core_timer.waiting_is_told() else "this system does not tell how long a thread waits"
