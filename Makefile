@@ -8,7 +8,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo quick test test-realtime test-others nightly warm check docs reference bench bench-quick blind real bless lock proto schemas clean
+.PHONY: demo quick test test-realtime test-others nightly control warm check docs reference bench bench-quick blind real bless lock proto schemas clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -35,6 +35,10 @@ test-others:
 nightly: check warm bench ## everything: an hour or so
 	@$(BIN)/pytest -m realtime
 	@$(PARALLEL) -m "not realtime"
+	@$(MAKE) --no-print-directory control
+
+control: $(READY) ## the controller on the whole bank, beside its rivals; fails where a bar is missed
+	@$(BIN)/stickslip bench control --report runs/control.html --json runs/control.json
 
 warm: $(READY)
 	@$(BIN)/python -m tests.warm_up

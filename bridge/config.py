@@ -2,22 +2,38 @@
 
 import re
 import reprlib
+import sys
 import tomllib
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from bridge.faults import Fault
 from bridge.files import check_file
+
+_TOLD: set[str] = set()  # lines about keys that are gone, each told once by a process
 
 
 class Strict(BaseModel):
     """Base of every configuration table: no unknown keys, no conversion between types, immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    gone: ClassVar[dict[str, str]] = {}  # keys of older files, and what replaces them: read, told, and left out
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_gone_keys(cls, table: Any) -> Any:
+        if not isinstance(table, dict):
+            return table
+        for key in cls.gone.keys() & table.keys():
+            line = f"stickslip: {key}: is not used any more; {cls.gone[key]}"
+            if line not in _TOLD:
+                _TOLD.add(line)
+                print(line, file=sys.stderr)
+        return {key: value for key, value in table.items() if key not in cls.gone}
 
 
 # two numbers; not strict, as TOML has only arrays and pydantic's strict mode refuses an array for a tuple

@@ -2,6 +2,7 @@
 
 cli         all commands            commands/   one file a group of commands
 run/        a run, on the bus or in one process; a log replayed
+bank/       the bench of the controller: many made rigs, judged by what truly happens on them
 judge/      what came of a run, in figures, words and pictures
 paper/      the paper redone
 """

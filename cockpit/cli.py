@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from cockpit.commands.bench import bench_app
 from cockpit.commands.blind import blind_app
 from cockpit.commands.diagnose import diagnose
 from cockpit.commands.example import example
@@ -88,6 +89,11 @@ app.add_typer(
     ),
 )
 app.add_typer(blind_app, name="blind")
+app.add_typer(
+    bench_app,
+    name="bench",
+    epilog=_examples("stickslip bench control --small", "stickslip bench control --jobs 2 --report control.html"),
+)
 app.command("reproduce")(reproduce)
 app.command("scenarios")(scenarios)
 app.command("schema")(schema)

@@ -1,19 +1,25 @@
-"""The supervisory controller: listens to a rig, estimates the onset of stick-slip, keeps v_a at or above v_d.
+"""The supervisory controller: listens to a rig, tells stick, slip and smooth sliding apart, keeps v_a at or above v_d.
 
 config         the controller file, checked
 records        the derived numbers (`PARAMS`) and all memory (`STATE`)
 announced      what the rig has announced of v_d
-vibration      the measured v_a; the slide's burst without the exciter's lines
-onset          the estimate: stick, slip or smooth sliding, and the time to the next slip
-policy         the wanted vibration
+estimate/      windows, motion, contact, learning: what drive and slide do
+vibration      the measured v_a; the slide's acceleration without it
+need           at which speeds vibration is needed, and how much
+frequency      the cheapest allowed frequency
+modes          going from one mode to another
+probe          fading out, to see whether vibration is needed at all
+policy         the wanted v_a
+amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
 limits         the allowed vibration
 core           one step of all of these
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 replay         the controller on the frames of a log
 codes          modes, states, reasons and limits as numbers
-loop_design    gain and margins of the amplitude loop
+loop_design    margins of the amplitude loop where its delay is off
 
-    v_d  drive velocity [m/s]          s    (dF_d/dt) / (k_d v_d), the force rate [-]
+    v_d  drive velocity [m/s]          s    1 - v_s / v_d, the force rate (dF_d/dt) / (k_d v_d) [-]
+    v_s  velocity of the slide [m/s]   k_d  stiffness of the drive [N/m]
     v_a  vibration velocity amplitude  f    vibration frequency [Hz]
 """

@@ -1,5 +1,6 @@
 """What the rig has announced of the drive's velocity: a ring of the newest in the controller's memory."""
 
+import math
 from typing import Final
 
 from bridge.kernel import Record, kernel
@@ -19,3 +20,19 @@ def take_announcement(s: Record, holds_from_ns: int, drive_velocity_mps: float) 
     s.announced_from_ns[at] = holds_from_ns
     s.announced_mps[at] = drive_velocity_mps
     s.announced_count += 1
+
+
+@kernel
+def announced_ahead(s: Record, t_ns: int, until_ns: int) -> float:
+    """The fastest announced velocity of the drive between two times [m/s], backwards below 0; 0 where none is announced."""
+    holding_ns, holding_mps, fastest_mps = -1, 0.0, 0.0
+    for i in range(min(s.announced_count, MOST_ANNOUNCED)):
+        from_ns, velocity_mps = s.announced_from_ns[i], s.announced_mps[i]
+        if not math.isfinite(velocity_mps):
+            continue
+        if from_ns <= t_ns:
+            if from_ns > holding_ns:
+                holding_ns, holding_mps = from_ns, velocity_mps
+        elif from_ns <= until_ns and math.fabs(velocity_mps) > math.fabs(fastest_mps):
+            fastest_mps = velocity_mps
+    return holding_mps if math.fabs(holding_mps) > math.fabs(fastest_mps) else fastest_mps

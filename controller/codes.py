@@ -2,8 +2,8 @@
 
 from bridge.wire import stickslip_pb2 as wire
 
-DISABLED, WATCH, EXCITE, WAIT, PROBE, STOPPED = (
-    int(mode) for mode in (wire.DISABLED, wire.WATCH, wire.EXCITE, wire.WAIT, wire.PROBE, wire.STOPPED)
+DISABLED, WATCH, EXCITE, PROBE, STOPPED = (
+    int(mode) for mode in (wire.DISABLED, wire.WATCH, wire.EXCITE, wire.PROBE, wire.STOPPED)
 )
 UNKNOWN, STANDSTILL, STICK, SLIP, SMOOTH = (
     int(state) for state in (wire.UNKNOWN, wire.STANDSTILL, wire.STICK, wire.SLIP, wire.SMOOTH)
@@ -15,15 +15,18 @@ NO_LIMIT, RANGE, SLEW, FREQUENCY_BAND, STALE_INPUT, OPERATOR_STOP, NOT_FINITE = 
         *(wire.STALE_INPUT, wire.OPERATOR_STOP, wire.NOT_FINITE),
     )
 )
-NOT_ENABLED, NOTHING_TO_DO, STICK_SEEN, HELD, LATE_SO_GENTLE, TOO_LATE = (
-    int(reason)
-    for reason in (
-        *(wire.NOT_ENABLED, wire.NOTHING_TO_DO, wire.STICK_SEEN),
-        *(wire.HELD, wire.LATE_SO_GENTLE, wire.TOO_LATE),
-    )
+NOT_ENABLED, NOTHING_TO_DO, STICK_SEEN, HELD = (
+    int(reason) for reason in (wire.NOT_ENABLED, wire.NOTHING_TO_DO, wire.STICK_SEEN, wire.HELD)
 )
 STILL_NEEDED, NOT_NEEDED, DRIVE_STANDS, PIEZO_WEAK = (
     int(reason) for reason in (wire.STILL_NEEDED, wire.NOT_NEEDED, wire.DRIVE_STANDS, wire.PIEZO_WEAK)
+)
+BLIND, CANNOT_HELP, HARMFUL, MOVING, START_OF_MOVE, SETTLING, NEEDED_BEFORE = (
+    int(reason)
+    for reason in (
+        *(wire.BLIND, wire.CANNOT_HELP, wire.HARMFUL, wire.MOVING),
+        *(wire.START_OF_MOVE, wire.SETTLING, wire.NEEDED_BEFORE),
+    )
 )
 
 # bits of a frame's events, as Trace.events

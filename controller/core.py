@@ -1,4 +1,4 @@
-"""One step of the controller: onset, policy, limits. The same function runs live, in lockstep and in replay."""
+"""One step of the controller: estimate, policy, amplitude, limits. The same function runs live, in lockstep and in replay."""
 
 import math
 from typing import Any
@@ -6,11 +6,19 @@ from typing import Any
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
+from controller.amplitude import FIRST_SHARE, REMEMBERED, amplitude, listen
 from controller.codes import BLOCK
+from controller.estimate.contact import contact
+from controller.estimate.learning import begin, forces, stiffness
+from controller.estimate.motion import drive_velocity
+from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, begin_anew, note_steps, push
 from controller.limits import allow
-from controller.onset import contact, drive_velocity, fill_gap
-from controller.policy import decide, want
+from controller.need import way_of
+from controller.policy import decide
 from controller.vibration import burst, measure, skip
+
+_STEPS_LOOK = 16  # blocks for one look at the resolution, which does not change
+_MOST_BRIDGED_BINS = 640  # 64 ms of bins of 0.1 ms: v_d is then still known from the longer windows
 
 
 @kernel
@@ -23,7 +31,6 @@ def step(
     t_ns: int,
     command: npt.NDArray[Any],
     trace: npt.NDArray[Any],
-    scratch: npt.NDArray[Any],
 ) -> None:
     """Advance `state` by one frame, in place, and fill in `command` and `trace`.
 
@@ -34,39 +41,32 @@ def step(
         gap_blocks: number of lost blocks just before this block.
         t_ns: time of the frame.
         command, trace: one message record each; all is filled except the trace's lateness.
-        scratch: float64 [samples], overwritten.
 
     """
     p: Record = params[0]
     s: Record = state[0]
-    samples = p.samples_per_block
+    if s.steps == 0:
+        _begin(p, s)
     force_N = 0.0
     usable = True
     if events & BLOCK:
         block: Record = sensors[0]
         s.block = block.sequence
-        position_m = 0.0
-        accel_mps2 = 0.0
-        for i in range(samples):
-            force_N += float(block.drive_force_N[i])
-            position_m += float(block.drive_position_m[i])
-            accel_mps2 += float(block.mass_accel_mps2[i]) + float(block.base_accel_mps2[i])
-        force_N /= samples
-        position_m /= samples
-        # A sample of NaN or infinity would stay in the filters for ever, so its block counts as lost.
-        usable = math.isfinite(force_N + position_m + accel_mps2)
+        usable = _is_usable(block)
         s.missing_blocks += gap_blocks if usable else gap_blocks + 1
         if usable:
             if s.missing_blocks > 0:
-                fill_gap(p, s, s.missing_blocks, force_N, position_m)
+                _bridge(p, s, block)
                 skip(p, s, s.missing_blocks)
                 s.missing_blocks = 0
             measure(p, s, block.base_accel_mps2)
-            drive_velocity(p, s, position_m)
-            contact(p, s, force_N, burst(p, s, block.mass_accel_mps2, scratch))
-            decide(p, s, t_ns, force_N)
-            want(p, s)
+            listen(p, s)
+            s.burst_mps2 = burst(s, block.mass_accel_mps2)
+            force_N = _look(p, s, block)
+            decide(p, s, t_ns, force_N, p.block_s)
+            amplitude(p, s)
     allow(p, s, events, s.wanted_Hz, s.wanted_m if usable else math.nan)
+    s.sent_m[s.steps % REMEMBERED] = s.allowed_m
 
     c: Record = command[0]
     c.sequence = s.steps
@@ -99,5 +99,98 @@ def step(
     t.wanted_amplitude_m = s.wanted_m
     t.wanted_frequency_Hz = s.wanted_Hz
     t.time_to_slip_s = s.time_to_slip_s
+    way = way_of(s)
+    t.surges = s.surges
+    t.sliding_velocity_mps = s.direction * s.sliding_mps
+    t.window_s = s.window_s
+    t.velocity_ratio = s.ratio_now
+    t.drive_stiffness_N_per_m = s.stiffness_N_per_m
+    t.drive_stiffness_sigma = s.stiffness_sigma
+    t.breakaway_force_N = s.breakaway_N[way]
+    t.sliding_force_N = s.sliding_N[way]
+    t.loop_delay_s = max(s.loop_delay_steps, 0) * p.block_s
+    t.exciter_gain = math.exp(s.log_gain[s.candidate])
     t.announcements = s.announced_count
     s.steps += 1
+
+
+@kernel
+def _begin(p: Record, s: Record) -> None:
+    """What of the memory is not zero at the start."""
+    begin(p, s)
+    s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
+    s.level = -1
+    s.growth = FIRST_SHARE
+    s.demodulated_Hz = 0.0
+    for way in range(2):
+        s.ratio[way] = p.v_ratio
+
+
+@kernel
+def _is_usable(block: Record) -> bool:
+    """Whether every sample is a number: NaN or infinity would stay in the filters for ever, so such a block counts as lost."""
+    total = 0.0
+    for i in range(block.drive_force_N.shape[0]):
+        total += float(block.drive_force_N[i]) + float(block.drive_position_m[i]) + float(block.mass_position_m[i])
+        total += float(block.mass_accel_mps2[i]) + float(block.base_accel_mps2[i])
+    return math.isfinite(total)
+
+
+@kernel
+def _bridge(p: Record, s: Record, block: Record) -> None:
+    """Fill the windows evenly over lost blocks; begin anew where more are lost than the shortest windows remember."""
+    bins = s.missing_blocks * (p.samples_per_block // p.bin_samples)
+    if bins > _MOST_BRIDGED_BINS or s.pushed[0] < BINS:
+        begin_anew(s)
+        return
+    # from the mean of the last window to the mean of as many samples: single samples would bend the windows by their noise
+    force_N, slide_m, drive_m = 0.0, 0.0, 0.0
+    for i in range(BINS):
+        force_N += s.bins[FORCE, 0, i] / BINS
+        slide_m += s.bins[SLIDE, 0, i] / BINS
+        drive_m += s.bins[DRIVE, 0, i] / BINS
+    samples = min(BINS * p.bin_samples, p.samples_per_block)
+    next_N, next_slide_m, next_drive_m = 0.0, 0.0, 0.0
+    for i in range(samples):
+        next_N += block.drive_force_N[i] / samples
+        next_slide_m += block.mass_position_m[i] / samples
+        next_drive_m += block.drive_position_m[i] / samples
+    apart = bins + 0.5 * BINS + 0.5 * samples / p.bin_samples
+    for i in range(bins):
+        share = (i + 0.5 + 0.5 * BINS) / apart
+        push(
+            p, s, force_N + share * (next_N - force_N), slide_m + share * (next_slide_m - slide_m),
+            drive_m + share * (next_drive_m - drive_m), False,
+        )  # fmt: skip
+
+
+@kernel
+def _look(p: Record, s: Record, block: Record) -> float:
+    """Estimate motion and contact, tick by tick; return the mean force of the block [N]."""
+    if s.steps % _STEPS_LOOK == 0:
+        note_steps(s, FORCE, block.drive_force_N)
+        note_steps(s, SLIDE, block.mass_position_m)
+        note_steps(s, DRIVE, block.drive_position_m)
+    tick_s = p.bins_per_tick * p.bin_s
+    total_N, at = 0.0, 0
+    slip_began, stick_began = 0, 0
+    for _ in range(p.ticks_per_block):
+        tick_N = 0.0
+        for _ in range(p.bins_per_tick):
+            force_N, slide_m, drive_m = 0.0, 0.0, 0.0
+            for _ in range(p.bin_samples):
+                force_N += float(block.drive_force_N[at])
+                slide_m += float(block.mass_position_m[at])
+                drive_m += float(block.drive_position_m[at])
+                at += 1
+            push(p, s, force_N / p.bin_samples, slide_m / p.bin_samples, drive_m / p.bin_samples, True)
+            tick_N += force_N / p.bin_samples
+        tick_N /= p.bins_per_tick
+        total_N += tick_N
+        drive_velocity(p, s, tick_s)
+        contact(p, s, tick_N, tick_s)
+        stiffness(p, s)
+        forces(s, tick_N, tick_s)
+        slip_began, stick_began = slip_began | s.slip_began, stick_began | s.stick_began
+    s.slip_began, s.stick_began = slip_began, stick_began
+    return total_N / p.ticks_per_block

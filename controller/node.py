@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
@@ -38,7 +36,6 @@ class ControllerNode:
         self._block_ns = round(config.block_s * 1e9)
         self._layout = sensor_block(config.samples_per_block)
         self._no_sensors = self._layout.blank()
-        self._scratch = np.empty(config.samples_per_block)
         self._command = COMMAND_LAYOUT.blank()
         self._trace = TRACE_LAYOUT.blank()
         self._lateness_ns = self._trace["lateness_ns"]
@@ -73,7 +70,7 @@ class ControllerNode:
         take_announcement(state[0], 0, 0.0)
         step(
             self._params, state, self._no_sensors, BLOCK, 0, 0,
-            COMMAND_LAYOUT.blank(), TRACE_LAYOUT.blank(), self._scratch,
+            COMMAND_LAYOUT.blank(), TRACE_LAYOUT.blank(),
         )  # fmt: skip
 
     def reconfigure(self, config: ControllerConfig) -> None:
@@ -131,12 +128,10 @@ class ControllerNode:
         slips_before = int(state.slips)
         step(
             self._params, self._state, sensors, events, gap_blocks, self.t_ns,
-            self._command, self._trace, self._scratch,
+            self._command, self._trace,
         )  # fmt: skip
         self.steps += 1
-        self.slipped_unmoved = (
-            state.slips > slips_before and state.drive_velocity_mps <= self._params[0]["standstill_mps"]
-        )
+        self.slipped_unmoved = state.slips > slips_before and state.moving == 0
         return Outgoing(COMMAND, self._command.tobytes())
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:

@@ -1,170 +1,237 @@
-"""When to vibrate, how strongly, at which frequency. A wrong policy does no harm: `limits` decides which vibration is allowed.
+"""When to vibrate, and how strongly. A wrong policy does no harm: `limits` decides which vibration is allowed.
 
-WATCH   no vibration; a stick leads to EXCITE, or to WAIT when it is too late for the coming slip
-WAIT    a vibration that starts this late causes the slip that it should prevent: wait for the re-stick
-EXCITE  hold v_a at v_ratio v_d; just above v_d at first where breakaway is near
-PROBE   fade out from time to time: a stick shows that the vibration is still needed, smooth sliding that it is not
+WATCH   no vibration; a stick or a slip leads to EXCITE at once: an early release is a small slip, a late one a large one
+EXCITE  hold v_a at a ratio to v_d that falls step by step to the least that is needed, and rises at every stick, slip or surge
+PROBE   fade out, no faster than the slide follows, to see whether the vibration is needed at all
 """
 
 import math
 
 from bridge.kernel import Record, kernel
+from controller.announced import announced_ahead
 from controller.codes import (
+    BLIND,
+    CANNOT_HELP,
     DISABLED,
     DRIVE_STANDS,
     EXCITE,
+    HARMFUL,
     HELD,
-    LATE_SO_GENTLE,
+    MOVING,
+    NEEDED_BEFORE,
     NOT_ENABLED,
-    NOT_NEEDED,
     NOTHING_TO_DO,
-    PIEZO_WEAK,
     PROBE,
-    STANDSTILL,
+    SETTLING,
+    SMOOTH,
+    START_OF_MOVE,
     STICK,
     STICK_SEEN,
-    STILL_NEEDED,
     STOPPED,
-    TOO_LATE,
-    WAIT,
     WATCH,
 )
-from controller.onset import known_breakaway_N
+from controller.config import MODES
+from controller.frequency import cheapest
+from controller.modes import enter, excite, stop_helping, tune_to
+from controller.need import (
+    QUIET,
+    is_needed,
+    is_needless,
+    lower_ratio,
+    note_needed,
+    raise_ratio,
+    way_of,
+)
+from controller.probe import STEADY_S, begin_probe, probe
 
 TWO_PI = 2.0 * math.pi
-# Steps of smooth sliding until a gentle vibration is raised. Fewer: the raise may cause a slip. More: weak for longer.
-_SMOOTH_STEPS_TO_RAISE = 200
-# Steps without stick after which WAIT ends without a slip, as when the drive slows down.
-_RELAXED_STEPS = 500
-# Steps without a limit before the amplitude is trimmed. Fewer: filter and delay still show the limited command. More: late trim.
-_FREE_STEPS_TO_TRIM = 10
-# Share of the set point below which the measured v_a is not trusted. Larger: a weak piezo is not trimmed. Smaller: the noise of
-# a dead accelerometer is.
-_LEAST_SHARE_TO_TRIM = 0.02
-# Largest correction, a factor of 30 either way. Smaller: a lightly damped mount, which amplifies 10 to 25 times, is not held.
-_LARGEST_LOG_GAIN = 3.4
-# Steps in a row until a piezo is called weak, and until no longer. Fewer: noise around 1.05 switches. More: it is told late.
-_WEAK_STEPS = 50
-_ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak: 1.00 does not stop stick-slip, 1.05 does
+ON_DEMAND, WHILE_MOVING, START_ONLY, SETTLE = range(len(MODES))
+
+_STICK_STEP, _SLIP_STEP = 0.08, 0.4  # by which the ratio rises at a stick, and at a slip or a surge
+_TURNING_S = 0.05  # that a drive stands at most where it turns
+_STARTING_S = 0.15  # of a vibration in which the contact still lets go of what it held
+_CALM_SHARE = 3.0  # sticks, as long as expected, without an event until the ratio goes down
+_LEAST_CALM_S, _MOST_CALM_S = 0.25, 2.0
+_ROUGH = 0.4  # share of v_d by which the slide is off, from which a vibration becomes stronger before it slips
+_SWING_S = 0.5  # in which a swing is forgotten
+_SEEING_S = 2.0  # without being blind until it counts as seeing
+_HELPLESS = 3  # events at the limit, at one frequency, until another is tried, then until it cannot help
+_WORSE = 1.1  # roughness with vibration over that without from which the vibration is called worse
 
 
 @kernel
-def _enter(s: Record, mode: int, reason: int) -> None:
-    if s.mode != mode:
-        s.mode = mode
-        s.steps_in_mode = 0
-        s.smooth_steps = 0
-        s.fade = 1.0
-    s.reason = reason
-
-
-@kernel
-def choose_frequency(p: Record, velocity_mps: float) -> float:
-    """Lowest candidate whose amplitude for `velocity_mps` uses at most 80 % of the stroke; else the highest [Hz]."""
-    for i in range(p.candidates):
-        if velocity_mps / (TWO_PI * p.candidate_Hz[i]) <= 0.8 * p.amplitude_max_m:
-            return p.candidate_Hz[i]
-    return p.candidate_Hz[p.candidates - 1]
-
-
-@kernel
-def _begin_to_excite(p: Record, s: Record, reason: int, gentle: int) -> None:
-    _enter(s, EXCITE, reason)
-    s.gentle = gentle
-    s.probe_steps = max(s.probe_steps, p.probe_steps)
-    if s.allowed_m == 0.0:
-        s.wanted_Hz = choose_frequency(p, p.v_ratio * s.drive_velocity_held_mps)
-        s.log_gain = 0.0
-
-
-@kernel
-def decide(p: Record, s: Record, t_ns: int, force_N: float) -> None:
+def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> None:
     """Set the mode and its reason, and the wanted vibration velocity amplitude [m/s]."""
-    s.steps_in_mode += 1
-    s.smooth_steps = s.smooth_steps + 1 if s.contact != STICK and s.slipping == 0 else 0
+    s.mode_s += block_s
+    way = way_of(s)
+    for i in range(2):
+        s.off_left_s[i] = max(s.off_left_s[i] - block_s, 0.0)
+    speed_mps = math.fabs(s.drive_velocity_mps)
+    ahead_mps = announced_ahead(s, t_ns, t_ns + round(1e9 * _look_ahead_s(p, s)))
+    s.wanted_speed_mps = max(s.held_mps, speed_mps, math.fabs(ahead_mps))  # at a reversal the spring is still wound up
+    if s.moving == 0 and ahead_mps != 0.0:
+        s.direction = 1 if ahead_mps > 0.0 else -1
+        way = way_of(s)
+    _note_roughness(s, speed_mps, block_s)
     if s.stopped == 1:
-        _enter(s, STOPPED, NOT_ENABLED)
+        enter(s, STOPPED, NOT_ENABLED)
     elif t_ns < p.enabled_from_ns:
-        _enter(s, DISABLED, NOT_ENABLED)
+        enter(s, DISABLED, NOT_ENABLED)
+        if s.slip_began == 1 and s.moving == 1:
+            note_needed(s, speed_mps)
     elif s.mode in (DISABLED, STOPPED):
-        _enter(s, WATCH, NOTHING_TO_DO)
-    elif s.contact == STANDSTILL:
-        _enter(s, WATCH, DRIVE_STANDS)
-
-    if s.mode == WATCH:
-        breakaway_N = known_breakaway_N(p, s)
-        near = force_N / breakaway_N if breakaway_N > 0.0 else 0.0
-        if s.slipping == 1:
-            s.slips_at_wait = s.slips - 1
-            _enter(s, WAIT, TOO_LATE)
-        elif s.contact == STICK and s.score > 0.5:
-            if near >= p.too_late_from:
-                s.slips_at_wait = s.slips
-                _enter(s, WAIT, TOO_LATE)
-            elif near >= p.gentle_from:
-                _begin_to_excite(p, s, LATE_SO_GENTLE, 1)
-            else:
-                _begin_to_excite(p, s, STICK_SEEN, 0)
-    elif s.mode == WAIT:
-        if s.slips > s.slips_at_wait and s.slipping == 0:
-            _begin_to_excite(p, s, STICK_SEEN, 0)
-        elif s.smooth_steps > _RELAXED_STEPS:
-            _enter(s, WATCH, NOTHING_TO_DO)
-    elif s.mode == EXCITE:
-        if s.gentle == 1 and s.smooth_steps > _SMOOTH_STEPS_TO_RAISE:
-            s.gentle = 0
-            s.reason = HELD
-        if s.steps_in_mode > s.probe_steps:
-            _enter(s, PROBE, HELD)
-    elif s.mode == PROBE:
-        s.fade = max(s.fade - p.block_s / p.probe_fade_s, 0.0)
-        if s.slipping == 1 or (s.contact == STICK and s.score > 0.5):
-            s.probe_steps = min(2 * s.probe_steps, p.probe_steps_max)
-            _begin_to_excite(p, s, STILL_NEEDED, 1)
-        elif s.fade == 0.0 and s.smooth_steps > p.probe_hold_steps:
-            s.probe_steps = p.probe_steps
-            _enter(s, WATCH, NOT_NEEDED)
+        enter(s, WATCH, NOTHING_TO_DO)
+    elif s.moving == 0 and s.mode != WATCH and s.measured == 1 and s.stood_s > _TURNING_S:
+        if ahead_mps == 0.0:
+            _stand(p, s)
+    elif s.moving == 0 and s.mode == WATCH and s.reason != SETTLING:
+        s.reason = DRIVE_STANDS
 
     ratio = 0.0
-    if s.mode == EXCITE:
-        ratio = p.gentle_ratio if s.gentle == 1 else p.v_ratio
+    if s.mode == WATCH:
+        ratio = _watch(p, s, way, speed_mps, ahead_mps, block_s)
+    elif s.mode == EXCITE:
+        _hold(p, s, way, force_N, speed_mps, block_s)
     elif s.mode == PROBE:
-        ratio = p.v_ratio * s.fade
-    s.wanted_velocity_mps = ratio * s.drive_velocity_held_mps
+        probe(p, s, way, speed_mps, block_s)
+    if s.mode == EXCITE:
+        # v_d is measured a window late, so a drive that speeds up needs more
+        ratio = s.ratio[way] if s.steady_s > STEADY_S else max(s.ratio[way], p.v_ratio)
+    elif s.mode == PROBE:
+        ratio = s.fade
+    s.ratio_now = ratio
+    s.wanted_velocity_mps = ratio * (s.settle_mps if s.mode == WATCH else s.wanted_speed_mps)
 
 
 @kernel
-def _judge_piezo(s: Record, weak: bool) -> None:
-    s.weak_steps = max(s.weak_steps, 0) + 1 if weak else min(s.weak_steps, 0) - 1
-    if s.weak_steps > _WEAK_STEPS:
-        s.reason = PIEZO_WEAK
-    elif s.weak_steps < -_WEAK_STEPS and s.reason == PIEZO_WEAK:
-        s.reason = HELD
+def _look_ahead_s(p: Record, s: Record) -> float:
+    """Time that a vibration takes from a command at zero to the amplitude of the largest velocity."""
+    largest_m = (
+        min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz)) if s.tuned == 1 else p.amplitude_max_m
+    )
+    delay_s = (max(s.loop_delay_steps, 0) + 1) * p.block_s
+    return delay_s + largest_m / p.slew_m_per_step * p.block_s
 
 
 @kernel
-def want(p: Record, s: Record) -> None:
-    """Turn the wanted velocity into frequency and amplitude, and trim the amplitude by the measured v_a.
+def _stand(p: Record, s: Record) -> None:
+    if p.mode == SETTLE and s.mode == EXCITE:
+        s.settle_left_s, s.settle_mps = p.settle_s, s.held_mps
+        enter(s, WATCH, SETTLING)
+    else:
+        enter(s, WATCH, DRIVE_STANDS)
 
-    The loop works on logarithms, where the exciter's unknown gain is a constant, so its margins hold for any mount.
-    """
-    velocity_mps = s.wanted_velocity_mps
-    if velocity_mps <= 0.0:
-        s.wanted_m = 0.0
-        _judge_piezo(s, weak=False)
+
+@kernel
+def _watch(p: Record, s: Record, way: int, speed_mps: float, ahead_mps: float, block_s: float) -> float:
+    """Without vibration; returns the ratio of a vibration that dies out after a move."""
+    if s.reason == SETTLING:
+        s.settle_left_s = max(s.settle_left_s - block_s, 0.0)
+        if s.settle_left_s == 0.0:
+            s.reason = DRIVE_STANDS
+        return p.v_ratio * s.settle_left_s / p.settle_s
+    if s.moving == 0:
+        if ahead_mps != 0.0 and (p.mode == WHILE_MOVING or is_needed(s, math.fabs(ahead_mps))):
+            excite(p, s, NEEDED_BEFORE, 0.0)
+        return 0.0
+    if s.reason == DRIVE_STANDS:
+        s.reason = NOTHING_TO_DO
+    steady = s.steady_s > STEADY_S
+    if s.slip_began == 1 and steady:
+        note_needed(s, speed_mps)
+    if s.harmful[way] >= 2:
+        s.reason = HARMFUL
+        return 0.0
+    if s.off_left_s[way] > 0.0:
+        return 0.0
+    if s.reason in (CANNOT_HELP, HARMFUL):
+        s.reason = NOTHING_TO_DO
+    began = s.moved_s <= 2.0 * block_s
+    if p.mode == WHILE_MOVING:
+        excite(p, s, MOVING, p.v_ratio)
+    elif p.mode == START_ONLY:
+        if began:
+            excite(p, s, START_OF_MOVE, p.v_ratio)
+    elif s.blind == 1:
+        excite(p, s, BLIND, p.v_ratio)
+    elif is_needed(s, speed_mps):
+        excite(p, s, NEEDED_BEFORE, 0.0)
+    elif s.needless_from_mps[way] > 0.0 and not steady:
+        pass  # a pair that did without may stick while the drive speeds up or slows down
+    elif s.slip_began == 1 or (s.contact == STICK and not is_needless(s, speed_mps)):
+        excite(p, s, STICK_SEEN, p.v_ratio)
+    elif s.stick_began == 1 and s.slid_s > max(s.expected_stick_s, STEADY_S):  # it slid at this speed, and sticks again
+        note_needed(s, speed_mps)
+        excite(p, s, STICK_SEEN, p.v_ratio)
+    s.slid_s = s.slid_s + block_s if s.contact == SMOOTH and steady else 0.0 if not steady else s.slid_s
+    return 0.0
+
+
+@kernel
+def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, block_s: float) -> None:
+    starting_s = _STARTING_S + 12.0 * max(s.loop_delay_steps, 0) * block_s
+    if p.mode == START_ONLY and s.moved_s > p.start_s:
+        enter(s, WATCH, NOTHING_TO_DO)
         return
-    trusted = s.vibration_velocity_mps > _LEAST_SHARE_TO_TRIM * velocity_mps
-    settled = s.free_steps > _FREE_STEPS_TO_TRIM
-    too_strong = s.vibration_velocity_mps > velocity_mps  # trimmed at once, so that a resonating mount does not ring up
-    if trusted and (settled or too_strong) and s.mode == EXCITE:
-        s.log_gain += p.loop_gain * (math.log(velocity_mps) - math.log(s.vibration_velocity_mps))
-        s.log_gain = min(max(s.log_gain, -_LARGEST_LOG_GAIN), _LARGEST_LOG_GAIN)
-    s.wanted_m = velocity_mps * math.exp(s.log_gain) / (TWO_PI * s.wanted_Hz)
-    if s.wanted_m > p.amplitude_max_m:
-        higher_Hz = choose_frequency(p, velocity_mps * math.exp(s.log_gain))
-        if higher_Hz > s.wanted_Hz:
-            s.wanted_Hz = higher_Hz
-            s.wanted_m = velocity_mps * math.exp(s.log_gain) / (TWO_PI * higher_Hz)
-    largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz))
-    helpless = s.wanted_m > largest_m or (settled and not trusted)  # too weak at its limit, or no vibration arrives
-    _judge_piezo(s, helpless and s.vibration_velocity_mps < _ALARM_RATIO * s.drive_velocity_mps)
+    s.waiting_s = max(s.waiting_s - block_s, 0.0)
+    changed = s.steady_s < STEADY_S  # a slide that lags behind, or runs on after, a change of the drive
+    begun = (s.slip_began == 1 or s.stick_began == 1) and not changed
+    if s.mode_s > starting_s and begun and s.waiting_s == 0.0:
+        if s.slip_began == 1 and s.steady_s > STEADY_S:
+            note_needed(s, speed_mps)
+        s.waiting_s = max(0.05, 3.0 * s.window_s, 2.0 * max(s.loop_delay_steps, 0) * block_s)
+        _more(p, s, way, _SLIP_STEP if s.slip_began == 1 else _STICK_STEP)
+        if s.mode != EXCITE:
+            return
+    if s.level >= 0 and s.mode_s > starting_s and not changed:
+        s.swing = max(s.swing * (1.0 - block_s / _SWING_S), math.fabs(s.fine_mps / speed_mps - 1.0))
+        s.even_s = s.even_s + block_s if s.swing < QUIET else s.even_s
+        wound_up = s.even_s > _SWING_S  # before, the slide lags because the spring still takes up the friction
+        if s.swing > _ROUGH and (wound_up or s.fine_mps > speed_mps) and s.waiting_s == 0.0 and s.at_limit == 0:
+            s.waiting_s = _SWING_S
+            raise_ratio(p, s, _STICK_STEP)
+    calm_s = min(max(_CALM_SHARE * s.expected_stick_s, _LEAST_CALM_S), _MOST_CALM_S)
+    if s.contact == SMOOTH and s.mode_s > starting_s:
+        lower_ratio(p, s, block_s, calm_s)
+    if s.calm_s > 2.0 * calm_s:
+        s.helpless = 0
+    if p.mode in (WHILE_MOVING, START_ONLY):
+        return
+    if s.blind == 1:
+        s.reason, s.mode_s = BLIND, 0.0
+    elif s.reason == BLIND and s.mode_s > _SEEING_S:
+        s.reason = HELD
+    if s.reason == BLIND:
+        return
+    begin_probe(p, s, way, force_N, speed_mps)
+
+
+@kernel
+def _more(p: Record, s: Record, way: int, by: float) -> None:
+    """The vibration does not do: more of it, then another frequency, then none."""
+    if s.at_limit == 0 and s.ratio[way] < p.most_ratio:
+        raise_ratio(p, s, by)
+        return
+    s.calm_s = 0.0
+    s.helpless += 1
+    if s.helpless == _HELPLESS and p.candidates > 1:
+        tune_to(p, s, cheapest(p, s, s.ratio[way] * s.wanted_speed_mps, s.candidate))
+    elif s.helpless >= 2 * _HELPLESS:
+        s.helpless = 0
+        s.rough_with[way] = s.roughness / max(s.roughness_s, 1e-9)
+        stop_helping(s, CANNOT_HELP)
+
+
+@kernel
+def _note_roughness(s: Record, speed_mps: float, block_s: float) -> None:
+    """Add up (v_s / v_d - 1)^2, which tells whether a vibration makes the motion worse."""
+    if s.level < 0 or s.moving == 0:
+        return
+    off = s.sliding_mps / speed_mps - 1.0
+    s.roughness += off * off * block_s
+    s.roughness_s += block_s
+    way = way_of(s)
+    if s.mode == WATCH and s.reason == CANNOT_HELP and s.roughness_s > 1.0 and s.rough_with[way] > 0.0:
+        without = s.roughness / s.roughness_s
+        s.harmful[way] = s.harmful[way] + 1 if s.rough_with[way] > _WORSE * without else 0
+        s.rough_with[way] = 0.0

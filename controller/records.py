@@ -8,82 +8,168 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import record
+from controller.amplitude import LEARN_S, LOUD_S, REMEMBERED, SETTLE_S, SILENCE_S
 from controller.announced import MOST_ANNOUNCED
 from controller.config import (
-    LONGEST_WINDOW_BLOCKS,
+    MODES,
     MOST_BANDS,
     MOST_CANDIDATES,
     ControllerConfig,
     candidate_frequencies_Hz,
     forbidden_bands_Hz,
 )
+from controller.estimate.windows import BINS, LEVELS, ROWS
+
+_BIN_S = 1e-4  # shortest bin: a window of four sees the slips of a drive of 50 N/um
+_TICK_S = 1e-3  # the contact is judged so often, whatever the length of a block
+_LONGEST_WINDOW_S = 3.3  # a feed of 0.5 um/s stands out of 0.5 um of noise in 0.1 s; drift makes longer windows useless
+
+
+def _divisor(count: int, wanted: float) -> int:
+    """The largest divisor of `count` up to `wanted`, at least 1."""
+    return max(n for n in range(1, count + 1) if count % n == 0 and (n <= wanted * (1.0 + 1e-9) or n == 1))
+
 
 _PARAMS_FLOATS = (
-    *("block_s", "sample_s", "drive_stiffness_N_per_m"),
-    *("stick_force_rate", "slip_drop_N", "slip_burst_mps2", "standstill_mps", "breakaway_force_N"),
-    *("gentle_ratio", "gentle_from", "too_late_from", "probe_fade_s"),
-    *("loop_gain", "filter_share", "accel_bandwidth_Hz"),
-    *(
-        "v_ratio",
-        "amplitude_max_m",
-        "velocity_max_mps",
-        "slew_m_per_step",
-        "frequency_min_Hz",
-        "frequency_max_Hz",
-    ),
+    *("block_s", "sample_s", "bin_s", "drive_stiffness_N_per_m", "least_feed_mps"),
+    *("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
+    *("least_ratio", "most_ratio", "start_s", "settle_s"),
+    *("filter_share", "learn_share", "accel_bandwidth_Hz", "accel_range_mps2"),
+    *("v_ratio", "amplitude_max_m", "velocity_max_mps", "slew_m_per_step", "frequency_min_Hz", "frequency_max_Hz"),
 )
 _PARAMS_INTS = (
-    *("samples_per_block", "window_blocks", "velocity_window_blocks", "probe_steps", "probe_steps_max"),
-    *("probe_hold_steps", "enabled_from_ns", "candidates", "bands"),
+    *("samples_per_block", "bin_samples", "bins_per_tick", "ticks_per_block", "levels"),
+    *("use_force", "use_slide_position", "mode", "enabled_from_ns", "candidates", "bands"),
+    *("silence_steps", "settle_steps", "loud_steps"),
 )
 PARAMS = np.dtype(
     [(name, "f8") for name in _PARAMS_FLOATS]
     + [(name, "i8") for name in _PARAMS_INTS]
-    + [("candidate_Hz", "f8", (MOST_CANDIDATES,)), ("band_Hz", "f8", (MOST_BANDS, 2))],
+    + [("window_s", "f8", (LEVELS,)), ("candidate_Hz", "f8", (MOST_CANDIDATES,)), ("band_Hz", "f8", (MOST_BANDS, 2))],
     align=True,
 )
 
+_WAYS = 2  # forwards and backwards
 STATE = np.dtype(
     [
-        # onset
-        ("force_N", "f8", (LONGEST_WINDOW_BLOCKS,)),  # means of the last blocks, newest at force_at - 1
-        ("position_m", "f8", (LONGEST_WINDOW_BLOCKS,)),
-        ("force_at", "i8"),
-        ("force_count", "i8"),
-        ("position_at", "i8"),
-        ("position_count", "i8"),
+        # windows: rows FORCE, SLIDE, DRIVE
+        ("bins", "f8", (ROWS, LEVELS, BINS)),
+        ("carried", "f8", (ROWS, LEVELS)),  # the odd bin of a level, until its neighbour comes
+        ("slope", "f8", (ROWS, LEVELS)),
+        ("slope_before", "f8", (ROWS, LEVELS, 2)),  # of the window just before, and of that before it
+        ("sigma", "f8", (ROWS, LEVELS)),  # of a slope, measured
+        (
+            "noise",
+            "f8",
+            (ROWS, LEVELS),
+        ),  # of a slope: sigma, or that of a shorter window carried on, and the resolution; 0: unknown
+        ("pushed", "i8", (LEVELS,)),
+        ("differences", "i8", (LEVELS,)),  # that sigma was learnt from
+        ("resolution", "f8", (ROWS,)),
+        # motion
+        ("drive_velocity_mps", "f8"),
+        ("drive_velocity_sigma_mps", "f8"),
+        ("held_mps", "f8"),  # |v_d|, rises at once, falls slowly
+        ("steady_mps", "f8"),
+        ("steady_s", "f8"),  # since v_d last changed
+        ("moved_s", "f8"),  # since the drive started or turned
+        ("stood_s", "f8"),
+        ("measured", "i8"),
+        ("moving", "i8"),
+        ("direction", "i8"),
+        # contact
+        ("contact", "i8"),  # ContactState
+        ("level", "i8"),  # shortest window that sees a stick; -1 for none
+        ("window_s", "f8"),
+        ("sliding_mps", "f8"),  # of the slide, along the drive's direction
+        ("fine_mps", "f8"),  # as sliding_mps, over a longer window with less noise
+        ("fine_sigma_mps", "f8"),
         ("force_rate", "f8"),
         ("score", "f8"),
-        ("peak_N", "f8"),  # highest force since the last slip
-        ("breakaway_N", "f8"),  # learnt; 0 while unknown
-        ("drive_velocity_mps", "f8"),
-        ("drive_velocity_held_mps", "f8"),  # rises at once, falls slowly
-        ("burst_mps2", "f8"),
-        ("burst_held_mps2", "f8"),
+        ("stick_s", "f8"),
+        ("since_stick_s", "f8"),
+        ("smooth_s", "f8"),
+        ("slid_s", "f8"),  # in this move, without vibration
+        ("expected_stick_s", "f8"),
+        ("unseen_s", "f8"),
         ("time_to_slip_s", "f8"),
-        ("contact", "i8"),  # ContactState
+        ("blind", "i8"),
         ("slipping", "i8"),
+        ("slip_began", "i8"),  # in this step
+        ("stick_began", "i8"),
         ("slips", "i8"),
+        ("surges", "i8"),
+        # learnt of the axis
+        ("stiffness_N_per_m", "f8"),
+        ("stiffness_sigma", "f8"),  # over the stiffness
+        ("stiffness_learnt", "i8"),
+        ("taught", "f8"),
+        ("taught_ratio", "f8"),
+        ("taught_square", "f8"),
+        ("peak_N", "f8"),  # highest force of this stick
+        ("slip_from_N", "f8"),  # highest force before the last slip without vibration; 0 once the next stick began
+        ("swing_N", "f8", (_WAYS,)),  # fall of the force in a slip
+        ("breakaway_N", "f8", (_WAYS,)),
+        ("sliding_N", "f8", (_WAYS,)),
         # vibration
+        ("burst_mps2", "f8"),
         ("phase_rad", "f8"),
         ("in_phase_mps2", "f8"),
         ("quadrature_mps2", "f8"),
         ("vibration_velocity_mps", "f8"),
+        ("fast_mps", "f8"),  # v_a of the last block alone
         ("demodulated_Hz", "f8"),
         # policy
         ("mode", "i8"),
         ("reason", "i8"),
-        ("steps_in_mode", "i8"),
-        ("smooth_steps", "i8"),
-        ("gentle", "i8"),
-        ("slips_at_wait", "i8"),
-        ("probe_steps", "i8"),
-        ("fade", "f8"),
-        ("log_gain", "f8"),  # natural logarithm of the correction of the commanded amplitude
+        ("mode_s", "f8"),
+        ("calm_s", "f8"),  # without stick or slip, since the ratio last changed
+        ("waiting_s", "f8"),
+        ("swing", "f8"),  # share of v_d by which the slide was off while vibrating, forgotten in time
+        ("even_s", "f8"),  # with little of it, in this mode
+        ("fade", "f8"),  # ratio of a vibration that fades
+        ("fade_from_N", "f8"),
+        ("fade_from_rad", "f8"),
+        ("settle_left_s", "f8"),
+        ("settle_mps", "f8"),
+        ("helpless", "i8"),
+        ("roughness", "f8"),
+        ("roughness_s", "f8"),
+        ("rough_with", "f8", (_WAYS,)),
+        ("harmful", "i8", (_WAYS,)),
+        ("off_s", "f8", (_WAYS,)),
+        ("off_left_s", "f8", (_WAYS,)),
+        ("ratio", "f8", (_WAYS,)),  # set point of v_a / v_d
+        ("edge_ratio", "f8", (_WAYS,)),  # the largest that was too little; 0 for none
+        ("edge_held_s", "f8", (_WAYS,)),
+        ("probe_s", "f8", (_WAYS,)),
+        ("needed_to_mps", "f8", (_WAYS,)),
+        ("needless_from_mps", "f8", (_WAYS,)),
+        ("ratio_now", "f8"),
+        ("wanted_speed_mps", "f8"),
         ("wanted_velocity_mps", "f8"),
         ("wanted_Hz", "f8"),
+        ("candidate", "i8"),
+        ("tuned", "i8"),
+        # amplitude
         ("wanted_m", "f8"),
-        ("weak_steps", "i8"),  # steps in a row in which the piezo was too weak; below 0: in which it was not
+        ("log_gain", "f8", (MOST_CANDIDATES,)),  # natural logarithm of delivered over commanded v_a
+        ("gain_known", "i8", (MOST_CANDIDATES,)),
+        ("growth", "f8"),
+        ("sent_m", "f8", (REMEMBERED,)),
+        ("was_wanted_mps", "f8", (REMEMBERED,)),
+        ("expected_mps", "f8"),
+        ("noise_mps", "f8"),
+        ("silent_steps", "i8"),
+        ("listening", "i8"),
+        ("onset_steps", "i8"),
+        ("heard_steps", "i8"),
+        ("loud_steps", "i8"),
+        ("cut_steps", "i8"),
+        ("loop_delay_steps", "i8"),  # -1 while unknown
+        ("delay_jitter_steps", "f8"),
+        ("at_limit", "i8"),
+        ("weak_s", "f8"),  # for which the piezo was too weak; below 0: for which it was not
         # limits
         ("allowed_Hz", "f8"),
         ("allowed_m", "f8"),
@@ -110,27 +196,36 @@ def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]
     """Derive the parameters and an empty memory from a configuration."""
     params = record(PARAMS)
     p: Any = params[0]
-    onset, policy, amplitude, limits = config.onset, config.policy, config.amplitude, config.limits
 
     def steps(time_s: float) -> int:
-        return round(time_s / config.block_s)
+        return max(math.ceil(time_s / config.block_s - 1e-9), 1)
 
+    estimator, policy, amplitude, limits = config.estimator, config.policy, config.amplitude, config.limits
     p.block_s = config.block_s
     p.sample_s = config.block_s / config.samples_per_block
     p.samples_per_block = config.samples_per_block
+    p.bin_samples = _divisor(config.samples_per_block, _BIN_S / p.sample_s)
+    p.bin_s = p.bin_samples * p.sample_s
+    bins = config.samples_per_block // p.bin_samples
+    p.bins_per_tick = _divisor(bins, _TICK_S / p.bin_s)
+    p.ticks_per_block = bins // p.bins_per_tick
+    p.levels = min(LEVELS, 1 + math.floor(math.log2(_LONGEST_WINDOW_S / (BINS * p.bin_s))))
+    for level in range(LEVELS):
+        p.window_s[level] = BINS * p.bin_s * 2**level
     p.drive_stiffness_N_per_m = config.drive_stiffness_N_per_m
-    for name in ("stick_force_rate", "slip_drop_N", "slip_burst_mps2", "standstill_mps", "breakaway_force_N"):
-        p[name] = getattr(onset, name)
-    p.window_blocks = steps(onset.window_s)
-    p.velocity_window_blocks = steps(onset.velocity_window_s)
-    for name in ("gentle_ratio", "gentle_from", "too_late_from", "probe_fade_s"):
+    p.least_feed_mps = estimator.least_feed_mps
+    p.use_force, p.use_slide_position = estimator.use_force, estimator.use_slide_position
+    p.mode = MODES.index(policy.mode)
+    for name in (
+        *("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
+        *("least_ratio", "most_ratio", "start_s", "settle_s"),
+    ):
         p[name] = getattr(policy, name)
     p.enabled_from_ns = round(policy.enabled_from_s * 1e9)
-    p.probe_steps = steps(policy.probe_every_s)
-    p.probe_steps_max = steps(policy.probe_every_max_s)
-    p.probe_hold_steps = steps(policy.probe_hold_s)
-    p.loop_gain = amplitude.gain
     p.filter_share = 1.0 - math.exp(-config.block_s / amplitude.filter_s)
+    p.learn_share = config.block_s / (config.block_s + LEARN_S)
+    p.silence_steps, p.settle_steps, p.loud_steps = steps(SILENCE_S), steps(SETTLE_S), steps(LOUD_S)
+    p.accel_range_mps2 = amplitude.accel_range_mps2
     p.accel_bandwidth_Hz = amplitude.accel_bandwidth_Hz
     for name in ("v_ratio", "amplitude_max_m", "velocity_max_mps", "frequency_min_Hz", "frequency_max_Hz"):
         p[name] = getattr(limits, name)

@@ -72,7 +72,6 @@ def _steps(
     announce: npt.NDArray[Any],
     command: npt.NDArray[Any],
     trace: npt.NDArray[Any],
-    scratch: npt.NDArray[np.float64],
 ) -> None:
     s: Record = state[0]
     for i in range(rows.shape[0]):
@@ -82,7 +81,7 @@ def _steps(
         row = max(rows[i], 0)  # a step without a block does not read its row
         step(
             params, state, sensors[row : row + 1], events[i], gap_blocks[i], t_ns[i],
-            command[i : i + 1], trace[i : i + 1], scratch,
+            command[i : i + 1], trace[i : i + 1],
         )  # fmt: skip
 
 
@@ -112,7 +111,6 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
     sensors = _writable(run.sensors)
 
     _, memory = build(changes[0].config)
-    scratch = np.empty(changes[0].config.samples_per_block)
     replayed: list[npt.NDArray[np.int64]] = []
     commands, traces = COMMAND.blank(len(trace)), TRACE.blank(len(trace))
     at = _start(run, sequence, round(from_s * 1e9), memory)
@@ -122,7 +120,7 @@ def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
             part = slice(start, stop)
             _steps(
                 params, memory, sensors, rows[part], events[part], gaps[part], t_ns[part],
-                announced[part], announce, commands[part], traces[part], scratch,
+                announced[part], announce, commands[part], traces[part],
             )  # fmt: skip
         replayed.append(np.arange(at, end))
         at = _resume(run, sequence, end, memory)

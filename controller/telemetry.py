@@ -30,7 +30,7 @@ def plotted(traces: Records, steps: int) -> Records:
     states["sequence"] = steps // STATE_EVERY - 1 + np.arange(len(traces))
     for name in _COPIED:
         states[name] = traces[name]
-    drive_mps = traces["drive_velocity_mps"]
+    drive_mps = np.abs(traces["drive_velocity_mps"])
     moving = (traces["state"] > wire.STANDSTILL) & (drive_mps > 0.0)
     # otherwise the trace repeats an old value
     measured = (traces["limit"] != wire.STALE_INPUT) & (traces["limit"] != wire.NOT_FINITE)

@@ -1,6 +1,8 @@
-"""The vibration as the accelerometers measure it: the delivered v_a, and the slide's burst without the exciter's lines."""
+"""The vibration as the accelerometers measure it: the delivered v_a, and the slide's own acceleration without it."""
 
 import math
+
+import numpy as np
 
 from bridge.kernel import Record, kernel
 
@@ -34,17 +36,6 @@ def _fit(samples: Record, step_rad: float, start_rad: float) -> tuple[float, flo
 
 
 @kernel
-def _remove_line(samples: Record, step_rad: float) -> None:
-    """Subtract the best fitting line at one frequency from `samples`, in place."""
-    a, b = _fit(samples, step_rad, 0.0)
-    c, sn = 1.0, 0.0
-    turn_c, turn_sn = math.cos(step_rad), math.sin(step_rad)
-    for i in range(samples.shape[0]):
-        samples[i] -= a * c + b * sn
-        c, sn = c * turn_c - sn * turn_sn, sn * turn_c + c * turn_sn
-
-
-@kernel
 def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
     """Demodulate the base accelerometer at the commanded frequency into v_a = a / (2 pi f).
 
@@ -52,10 +43,7 @@ def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
         base_accel_mps2: [samples].
 
     """
-    frequency_Hz = s.allowed_Hz
-    if frequency_Hz <= 0.0:
-        s.vibration_velocity_mps = 0.0
-        return
+    frequency_Hz = s.allowed_Hz if s.allowed_Hz > 0.0 else p.candidate_Hz[0]
     step_rad = TWO_PI * frequency_Hz * p.sample_s
     a, b = _fit(base_accel_mps2, step_rad, s.phase_rad)
     s.phase_rad = (s.phase_rad + step_rad * p.samples_per_block) % TWO_PI
@@ -64,9 +52,16 @@ def measure(p: Record, s: Record, base_accel_mps2: Record) -> None:
         s.in_phase_mps2, s.quadrature_mps2 = a, b
     s.in_phase_mps2 += p.filter_share * (a - s.in_phase_mps2)
     s.quadrature_mps2 += p.filter_share * (b - s.quadrature_mps2)
+    s.vibration_velocity_mps = _velocity(p, frequency_Hz, s.in_phase_mps2, s.quadrature_mps2)
+    s.fast_mps = _velocity(p, frequency_Hz, a, b)
+
+
+@kernel
+def _velocity(p: Record, frequency_Hz: float, in_phase_mps2: float, quadrature_mps2: float) -> float:
+    """v_a of an acceleration, with the accelerometer's roll-off undone."""
     rolled_off = frequency_Hz / p.accel_bandwidth_Hz
-    amplitude_mps2 = math.sqrt(s.in_phase_mps2 * s.in_phase_mps2 + s.quadrature_mps2 * s.quadrature_mps2)
-    s.vibration_velocity_mps = amplitude_mps2 * math.sqrt(1.0 + rolled_off * rolled_off) / (TWO_PI * frequency_Hz)
+    amplitude_mps2 = math.sqrt(in_phase_mps2 * in_phase_mps2 + quadrature_mps2 * quadrature_mps2)
+    return amplitude_mps2 * math.sqrt(1.0 + rolled_off * rolled_off) / (TWO_PI * frequency_Hz)
 
 
 @kernel
@@ -76,15 +71,12 @@ def skip(p: Record, s: Record, blocks: int) -> None:
 
 
 @kernel
-def burst(p: Record, s: Record, mass_accel_mps2: Record, scratch: Record) -> float:
-    """Rms of the slide's acceleration over the block [m/s2], without the exciter's line and its second harmonic."""
-    for i in range(mass_accel_mps2.shape[0]):
-        scratch[i] = float(mass_accel_mps2[i])
+def burst(s: Record, mass_accel_mps2: Record) -> float:
+    """Rms of the slide's acceleration over the block [m/s2]; 0 while vibrating, when it shows the exciter."""
     if s.allowed_m > 0.0:
-        step_rad = TWO_PI * s.allowed_Hz * p.sample_s
-        _remove_line(scratch, step_rad)
-        _remove_line(scratch, 2.0 * step_rad)
+        return 0.0
     total = 0.0
-    for i in range(scratch.shape[0]):
-        total += scratch[i] * scratch[i]
-    return math.sqrt(total / scratch.shape[0])
+    for i in range(mass_accel_mps2.shape[0]):
+        value = np.float64(mass_accel_mps2[i])  # numba's float() of a float32 stays one
+        total += value * value
+    return math.sqrt(total / mass_accel_mps2.shape[0])

@@ -43,6 +43,9 @@ What the numbers of the columns `mode`, `state`, `reason` and `limit` of a log a
 _FILES_INTRO = """\
 Keys of the TOML files, with their defaults and ranges. A misspelt key or a value out of range is an error that names file,
 key, rule and remedy. Units are in the names."""
+_GONE_INTRO = """\
+Keys of older scenarios. They are still read, so that an old file works, and do nothing: a line on stderr says what holds
+instead."""
 _FILES: tuple[tuple[str, str, type[Strict]], ...] = (
     (
         "Scenario",
@@ -202,6 +205,8 @@ def _files() -> list[str]:
             name = f"`[{path}]`" if path and not path.startswith("[") else f"`{path}`" if path else "top of the file"
             lines += [f"### {name}" if path else f"**{name}**", "", *([_paragraph(told), ""] if told else [])]
             lines += _table(("key", "type and range", "default", "meaning"), rows)
+    lines += ["## Keys that are gone", "", _GONE_INTRO, ""]
+    lines += _table(("key", "what holds instead"), _gone(Scenario, ""))
     lines += [
         "## Friction pairs",
         "",
@@ -214,6 +219,15 @@ def _files() -> list[str]:
         ([name, *(_number(pair[key]) if key in pair else "" for key in keys)] for name, pair in PAIRS.items()),
     )
     return lines
+
+
+def _gone(model: type[Strict], path: str) -> Iterator[tuple[str, str]]:
+    """Path and successor of every key of older files, of a table and of the tables in it."""
+    for key, instead in model.gone.items():
+        yield f"`{path}{key}`", instead
+    for key, field in model.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Strict):
+            yield from _gone(field.annotation, f"{path}{key}.")
 
 
 def _sections(schema: dict[str, Any], known: dict[str, Any], path: str) -> Iterator[tuple[str, str, list[list[str]]]]:

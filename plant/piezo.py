@@ -7,7 +7,8 @@ the ramp of u0 is over. The phase continues through a change of frequency; it re
 import math
 
 from bridge.kernel import Record, kernel
-from plant.effects.piezo import mode_gain, roll_off
+from plant.effects.piezo import heat_share, load_share, mode_gain, roll_off
+from plant.effects.waves import TWO_PI
 
 
 @kernel
@@ -34,3 +35,17 @@ def accepted(p: Record, frequency_Hz: float, amplitude_m: float) -> tuple[float,
         min(max(frequency_Hz, p.frequency_min_Hz), p.frequency_max_Hz),
         min(max(amplitude_m, 0.0), p.amplitude_max_m),
     )
+
+
+@kernel
+def base_velocity_mps(p: Record, s: Record) -> float:
+    """The vibration velocity amplitude v_a = 2 pi f u0 that the base has at the end of the last block [m/s].
+
+    Args:
+        p, s: records of `plant.records.PARAMS` and `STATE`.
+
+    """
+    share = delivered_share(p, s.frequency_Hz)
+    if p.sag_ratio != 0.0:
+        share *= load_share(p.sag_ratio / p.F_s, s.drive_N) if p.sag_settling_s == 0.0 else heat_share(p, s.vibrating_s)
+    return share * TWO_PI * s.frequency_Hz * s.amplitude_m

@@ -31,6 +31,16 @@ def control(folder: Path) -> None:
     replay(run, changes_of(run, []))
 
 
+def bench_of_the_controller() -> None:
+    """The rig with its judge, with the controller and with the rules."""
+    from cockpit.bank.cost import step_cost_ratio
+    from cockpit.bank.scenario import load_bank
+    from cockpit.bank.suite import warm_up
+
+    warm_up(load_bank()[0])
+    step_cost_ratio()
+
+
 def diagnosis() -> None:
     """The model alone and four rigs at once, of a rig that a spring moves and of one that a motor force moves."""
     import numpy as np
@@ -59,5 +69,6 @@ if __name__ == "__main__":
         with tempfile.TemporaryDirectory() as folder:
             control(Path(folder))
             generator(Path(folder) / "rig")
+        bench_of_the_controller()
         diagnosis()
         DONE.touch()

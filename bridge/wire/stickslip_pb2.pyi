@@ -47,6 +47,13 @@ class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     NOT_NEEDED: _ClassVar[Reason]
     DRIVE_STANDS: _ClassVar[Reason]
     PIEZO_WEAK: _ClassVar[Reason]
+    BLIND: _ClassVar[Reason]
+    CANNOT_HELP: _ClassVar[Reason]
+    HARMFUL: _ClassVar[Reason]
+    MOVING: _ClassVar[Reason]
+    START_OF_MOVE: _ClassVar[Reason]
+    SETTLING: _ClassVar[Reason]
+    NEEDED_BEFORE: _ClassVar[Reason]
 DISABLED: Mode
 WATCH: Mode
 EXCITE: Mode
@@ -76,6 +83,13 @@ STILL_NEEDED: Reason
 NOT_NEEDED: Reason
 DRIVE_STANDS: Reason
 PIEZO_WEAK: Reason
+BLIND: Reason
+CANNOT_HELP: Reason
+HARMFUL: Reason
+MOVING: Reason
+START_OF_MOVE: Reason
+SETTLING: Reason
+NEEDED_BEFORE: Reason
 
 class SensorBlock(_message.Message):
     __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
@@ -140,7 +154,7 @@ class Applied(_message.Message):
     def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ...) -> None: ...
 
 class Trace(_message.Message):
-    __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns", "announcements")
+    __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns", "announcements", "surges", "sliding_velocity_mps", "window_s", "velocity_ratio", "drive_stiffness_N_per_m", "drive_stiffness_sigma", "breakaway_force_N", "sliding_force_N", "loop_delay_s", "exciter_gain")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     BLOCK_FIELD_NUMBER: _ClassVar[int]
@@ -163,6 +177,16 @@ class Trace(_message.Message):
     TIME_TO_SLIP_S_FIELD_NUMBER: _ClassVar[int]
     LATENESS_NS_FIELD_NUMBER: _ClassVar[int]
     ANNOUNCEMENTS_FIELD_NUMBER: _ClassVar[int]
+    SURGES_FIELD_NUMBER: _ClassVar[int]
+    SLIDING_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    WINDOW_S_FIELD_NUMBER: _ClassVar[int]
+    VELOCITY_RATIO_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_STIFFNESS_N_PER_M_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_STIFFNESS_SIGMA_FIELD_NUMBER: _ClassVar[int]
+    BREAKAWAY_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    SLIDING_FORCE_N_FIELD_NUMBER: _ClassVar[int]
+    LOOP_DELAY_S_FIELD_NUMBER: _ClassVar[int]
+    EXCITER_GAIN_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     block: int
@@ -185,7 +209,17 @@ class Trace(_message.Message):
     time_to_slip_s: float
     lateness_ns: int
     announcements: int
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., events: _Optional[int] = ..., gap_blocks: _Optional[int] = ..., state: _Optional[int] = ..., mode: _Optional[int] = ..., reason: _Optional[int] = ..., limit: _Optional[int] = ..., slips: _Optional[int] = ..., score: _Optional[float] = ..., force_rate: _Optional[float] = ..., drive_force_N: _Optional[float] = ..., burst_mps2: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., wanted_velocity_mps: _Optional[float] = ..., wanted_amplitude_m: _Optional[float] = ..., wanted_frequency_Hz: _Optional[float] = ..., time_to_slip_s: _Optional[float] = ..., lateness_ns: _Optional[int] = ..., announcements: _Optional[int] = ...) -> None: ...
+    surges: int
+    sliding_velocity_mps: float
+    window_s: float
+    velocity_ratio: float
+    drive_stiffness_N_per_m: float
+    drive_stiffness_sigma: float
+    breakaway_force_N: float
+    sliding_force_N: float
+    loop_delay_s: float
+    exciter_gain: float
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., events: _Optional[int] = ..., gap_blocks: _Optional[int] = ..., state: _Optional[int] = ..., mode: _Optional[int] = ..., reason: _Optional[int] = ..., limit: _Optional[int] = ..., slips: _Optional[int] = ..., score: _Optional[float] = ..., force_rate: _Optional[float] = ..., drive_force_N: _Optional[float] = ..., burst_mps2: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., wanted_velocity_mps: _Optional[float] = ..., wanted_amplitude_m: _Optional[float] = ..., wanted_frequency_Hz: _Optional[float] = ..., time_to_slip_s: _Optional[float] = ..., lateness_ns: _Optional[int] = ..., announcements: _Optional[int] = ..., surges: _Optional[int] = ..., sliding_velocity_mps: _Optional[float] = ..., window_s: _Optional[float] = ..., velocity_ratio: _Optional[float] = ..., drive_stiffness_N_per_m: _Optional[float] = ..., drive_stiffness_sigma: _Optional[float] = ..., breakaway_force_N: _Optional[float] = ..., sliding_force_N: _Optional[float] = ..., loop_delay_s: _Optional[float] = ..., exciter_gain: _Optional[float] = ...) -> None: ...
 
 class Announce(_message.Message):
     __slots__ = ("sequence", "t_ns", "holds_from_ns", "drive_velocity_mps")

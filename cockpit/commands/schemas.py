@@ -51,6 +51,30 @@ def _scenario() -> dict[str, Any]:
     return _with_pairs_and_effects(schema)
 
 
+def _bank() -> dict[str, Any]:
+    from cockpit.bank.scenario import BankConfig
+
+    schema, bank = _scenario(), BankConfig.model_json_schema()
+    schema["$defs"] |= bank.pop("$defs") | {"BankConfig": bank}
+    tables = {name: schema["properties"][name] for name in ("duration_s", "seed", "rig", "controller")}
+    tables |= {"bank": {"$ref": "#/$defs/BankConfig"}}
+    words = {name: {"type": "string"} for name in ("name", "description")}
+    one = {"type": "object", "properties": words | tables, "required": [*words], "additionalProperties": False}
+    several = {
+        "type": "array",
+        "minItems": 1,
+        "items": one,
+        "description": "Each is the tables above, and what it says itself.",
+    }
+    return {
+        "$defs": schema["$defs"],
+        "type": "object",
+        "properties": {"description": words["description"]} | tables | {"scenario": several},
+        "required": ["description", "scenario"],
+        "additionalProperties": False,
+    }
+
+
 def _with_pairs_and_effects(schema: dict[str, Any]) -> dict[str, Any]:
     from plant.effects.library import EFFECTS
     from plant.effects.row import Form
@@ -151,6 +175,17 @@ def _blind_scores() -> dict[str, Any]:
     return schema_of(objects("BlindScores", fields | {"cases": list[dict[str, Any]]}))
 
 
+def _bench_control() -> dict[str, Any]:
+    from cockpit.bank.bars import Bar
+    from cockpit.bank.figures import Figures
+    from cockpit.bank.least import Least
+    from cockpit.commands.json_types import objects, schema_of
+
+    fields = {"passed": bool, "bars": list[Bar], "runs": list[Figures], "least": dict[str, Least]}
+    fields |= {"step_cost_ratio": float, "elapsed_s": float}
+    return schema_of(objects("BenchControl", fields))
+
+
 def _fault() -> dict[str, Any]:
     from cockpit.commands.json_types import objects, schema_of
 
@@ -219,6 +254,7 @@ def _result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[
 TOML = (
     Format("rig", "A rig file, as in deploy/rigs: `--rig FILE.toml`.", _rig),
     Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", _scenario),
+    Format("bank", "A family of the bank of `stickslip bench control`, as in deploy/scenarios/bank.", _bank),
     Format("controller", "The table [controller] of a scenario, and the configuration in a log.", _controller),
     Format("evidence-1", "manifest.toml of an evidence folder, evidence/1.", _evidence),
     Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
@@ -249,6 +285,7 @@ JSON = (
     Format(
         "log-import-result", "`stickslip log import --json`.", _result_of("diagnosis.evidence.import_table", "Imported")
     ),
+    Format("bench-control-result", "`stickslip bench control --json`.", _bench_control),
     Format("blind-run-result", "`stickslip blind run --json`.", _result_of("cockpit.commands.blind", "SetDone")),
     Format("scenarios-result", "`stickslip scenarios --json`.", _result_of("cockpit.commands.scenarios", "Known")),
     Format("explain-result", "`stickslip explain --json`.", _explain),

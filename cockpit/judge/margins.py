@@ -1,7 +1,7 @@
-"""What is left of the amplitude loop's margins on a rig that differs from the one it was designed for, from the log alone.
+"""What is left of the amplitude loop's margins with the delay of the run, and of the exciter's stroke, from the log alone.
 
-The loop works in the logarithm of v_a: what the exciter delivers of its command is an offset there, which the integrator makes
-up for, so a weak exciter costs stroke and no stability. Both are said: the margins, and how much of the stroke was needed.
+The loop works in the logarithm of v_a: what the exciter delivers of its command is an offset there, which is learnt, so a weak
+exciter costs stroke and no stability. The margins are those for a delay that is a block longer than the learnt one.
 """
 
 from typing import Any, NamedTuple
@@ -10,9 +10,10 @@ import numpy as np
 
 from bridge.log.logfile import RunData
 from bridge.wire import stickslip_pb2 as wire
-from controller.loop_design import open_loop
+from controller.config import ControllerConfig
+from controller.loop_design import margins
+from controller.records import build
 
-_DELAY_BLOCKS = 2  # in reserve, as in controller/loop_design.py
 _NEAR_LIMIT = 0.95
 
 
@@ -21,6 +22,7 @@ class Margins(NamedTuple):
 
     phase_margin_deg: float
     gain_margin: float
+    loop_delay_s: float  # learnt; 0 where nothing vibrated
     delivered_min: float  # share of the commanded v_a, 5 % of the time below
     delivered_max: float
     amplitude_m: float  # the largest commanded
@@ -33,13 +35,11 @@ class Margins(NamedTuple):
 
 def loop_margins(run: RunData) -> Margins:
     """Margins from the configuration in the log, shares and stroke from its commands and measurements."""
-    import control
-
     controller, plant = run.configuration("controller"), run.configuration("plant")
-    loop = controller["amplitude"]
-    gain_margin, phase_deg, *_ = control.stability_margins(
-        open_loop(loop["gain"], controller["block_s"], loop["filter_s"], _DELAY_BLOCKS), method="frd"
-    )
+    params: Any = build(ControllerConfig.model_validate(controller))[0][0]
+    delay_s = float(run.trace["loop_delay_s"].max()) if len(run.trace) else 0.0
+    delay_blocks = round(delay_s / params.block_s)
+    loop = margins(params.learn_share, params.filter_share, delay_blocks + 1, delay_blocks, params.block_s)
     _, at_trace, at_command = np.intersect1d(run.trace["block"], run.command["block"], return_indices=True)
     trace, command = run.trace[at_trace], run.command[at_command]
     excited = (trace["mode"] == wire.EXCITE) & (command["amplitude_m"] > 0.0)
@@ -47,8 +47,9 @@ def loop_margins(run: RunData) -> Margins:
     share = trace["vibration_velocity_mps"][excited] / told_mps
     low, high = np.quantile(share, (0.05, 0.95)) if len(share) else (0.0, 0.0)
     return Margins(
-        phase_margin_deg=float(phase_deg),
-        gain_margin=float(gain_margin),
+        phase_margin_deg=loop.phase_margin_deg,
+        gain_margin=loop.gain_margin,
+        loop_delay_s=delay_s,
         delivered_min=float(low),
         delivered_max=float(high),
         amplitude_m=float(command["amplitude_m"].max()) if len(command) else 0.0,
@@ -60,7 +61,8 @@ def margins_in_words(margins: Margins) -> list[str]:
     """As lines for a person."""
     m = margins
     lines = [
-        f"loop     phase margin {m.phase_margin_deg:.0f} degrees, gain margin {m.gain_margin:.1f}, whatever the exciter delivers"
+        f"loop     {m.loop_delay_s * 1e3:.3g} ms late, as learnt; a block later still: phase margin {m.phase_margin_deg:.0f} "
+        f"degrees, gain margin {m.gain_margin:.1f}"
     ]
     if m.amplitude_m > 0.0:
         enough = "AT ITS LIMIT" if m.amplitude_m > _NEAR_LIMIT * m.amplitude_max_m else "enough stroke"

@@ -120,7 +120,7 @@ def judge_run(run: RunData) -> RunVerdict:
         faults.append(f"NOT_FINITE: /sensors {name}: {many} a sample that is no number, first {first}; left out")
     slips = trace["slips"].astype(np.int64)
     rose = np.diff(slips, prepend=slips[:1]) > 0
-    unmoved = rose & (trace["drive_velocity_mps"] <= _STANDSTILL_MPS)
+    unmoved = rose & (np.abs(trace["drive_velocity_mps"]) <= _STANDSTILL_MPS)
     if unmoved.any():
         first_s = float(trace["t_ns"][unmoved][0]) * 1e-9
         faults.append(
@@ -163,7 +163,7 @@ def _untested(run: RunData, after: Phase | None, in_charge_s: float) -> str:
         return "no block was recorded"
     if not len(run.trace):
         return "no step of a controller was recorded: nothing was tested"
-    if not (run.trace["drive_velocity_mps"] > _STANDSTILL_MPS).any():
+    if not (np.abs(run.trace["drive_velocity_mps"]) > _STANDSTILL_MPS).any():
         return "the drive never moved: nothing was tested"
     if after is not None:
         return ""

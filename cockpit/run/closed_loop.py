@@ -38,7 +38,6 @@ def advance_both(
     answered: int,
     analogue: npt.NDArray[np.float64],
     truth: npt.NDArray[np.float64],
-    scratch: npt.NDArray[np.float64],
     sensors: npt.NDArray[Any],
     applied: npt.NDArray[Any],
     commands: npt.NDArray[Any],
@@ -56,7 +55,6 @@ def advance_both(
         announce: these announcements in order, message records.
         answered: 1 where `commands[0]` answers the block before the first, 0 at the start of a run.
         analogue, truth: [5, samples] and [6, samples], overwritten by every block.
-        scratch: [samples], overwritten.
         sensors, applied, traces: message records [blocks], filled.
         commands: message records [blocks + 1]; the first is what the rig hears first, the others are filled.
 
@@ -78,7 +76,7 @@ def advance_both(
             events |= ANNOUNCED
         controller_step(
             controller_params, controller_state, sensors[i : i + 1], events, 0, sensors[i].t_ns,
-            commands[i + 1 : i + 2], traces[i : i + 1], scratch,
+            commands[i + 1 : i + 2], traces[i : i + 1],
         )  # fmt: skip
     return velocity_mps.shape[0]
 
@@ -114,7 +112,6 @@ class ClosedLoop:
         self._plant_params, self._plant_state = plant_records(rig)
         self._controller_params, self.controller_state = controller_records(config)
         self._analogue, self._truth = np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples))
-        self._scratch = np.empty(samples)
         self._last_command = COMMAND.blank()
 
     def warm_up(self) -> None:
@@ -137,7 +134,7 @@ class ClosedLoop:
         done = advance_both(
             self._plant_params, self._plant_state, velocity_mps, delay_blocks, noise,
             self._controller_params, self.controller_state, operator_events, announcements, announce, min(self.block, 1),
-            self._analogue, self._truth, self._scratch, sensors, applied, commands, trace,
+            self._analogue, self._truth, sensors, applied, commands, trace,
         )  # fmt: skip
         self.block += done
         self._last_command = commands[done : done + 1]

@@ -41,11 +41,12 @@ def find(name: str, kind: str) -> Path:
     return known[name]
 
 
-def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+def merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """A copy of `below` with the keys of `above` over it, table by table."""
     result = dict(below)
     for key, value in above.items():
         inner = result.get(key)
-        result[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
+        result[key] = merged(inner, value) if isinstance(inner, dict) and isinstance(value, dict) else value
     return result
 
 
@@ -73,7 +74,7 @@ def with_rig(path: Path, table: dict[str, Any]) -> tuple[dict[str, Any], str]:
     rig_name = str(rig["file"])
     beside = path.parent / rig_name
     rig_path = beside if beside.suffix == ".toml" and beside.is_file() else find(rig_name, "rigs")
-    return table | {"rig": _merged(rig_table(rig_path), overrides)}, f"{path.name} with {rig_path.name}"
+    return table | {"rig": merged(rig_table(rig_path), overrides)}, f"{path.name} with {rig_path.name}"
 
 
 def load_bus(name: str, settings: list[str]) -> BusConfig:

@@ -20,7 +20,7 @@ class Loop(NamedTuple):
     t_s: Any
     trace: Any
     drive_force_N: Any  # the true one, at the end of each block
-    velocity_mps: Any  # of the slide, true
+    velocity_mps: Any  # of the slide, true: the fastest of each block, backwards below 0
 
     def modes(self) -> list[int]:
         """The modes in the order in which they came."""
@@ -29,13 +29,31 @@ class Loop(NamedTuple):
 
     def slips(self, from_s: float, to_s: float = 1e9, fast_mps: float = 0.01) -> int:
         """Slips as the slide's own speed shows them: it passes 10 mm/s (a slip of the paper's rig reaches 22)."""
-        fast = (self.velocity_mps > fast_mps) & (self.t_s >= from_s) & (self.t_s < to_s)
+        fast = (np.abs(self.velocity_mps) > fast_mps) & (self.t_s >= from_s) & (self.t_s < to_s)
         return int(np.count_nonzero(fast[1:] & ~fast[:-1]))
 
     def ratio(self, from_s: float, to_s: float = 1e9) -> Any:
         """v_a / v_d as measured."""
         inside = (self.t_s >= from_s) & (self.t_s < to_s)
-        return self.trace["vibration_velocity_mps"][inside] / self.trace["drive_velocity_mps"][inside]
+        return self.trace["vibration_velocity_mps"][inside] / np.abs(self.trace["drive_velocity_mps"][inside])
+
+    def held(self, from_s: float, to_s: float = 1e9) -> Any:
+        """Measured over wanted v_a, where a vibration is wanted."""
+        inside = (self.t_s >= from_s) & (self.t_s < to_s) & (self.trace["wanted_velocity_mps"] > 0.0)
+        return self.trace["vibration_velocity_mps"][inside] / self.trace["wanted_velocity_mps"][inside]
+
+    def reasons(self, from_s: float, to_s: float = 1e9) -> set[int]:
+        """The reasons that were given."""
+        return set(self.trace["reason"][(self.t_s >= from_s) & (self.t_s < to_s)].tolist())
+
+    def excited(self, from_s: float, to_s: float = 1e9) -> float:
+        """Share of the time in which a vibration was wanted."""
+        return float((self.trace["wanted_velocity_mps"][(self.t_s >= from_s) & (self.t_s < to_s)] > 0.0).mean())
+
+    def longest_s(self, is_so: Any) -> float:
+        """Longest time for which something is so, of [blocks]."""
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], np.asarray(is_so, int), [0]))))
+        return float((edges[1::2] - edges[::2]).max(initial=0) * np.diff(self.t_s[:2])[0])
 
 
 def close_the_loop(
@@ -47,14 +65,18 @@ def close_the_loop(
     deliver: Callable[[int, bytes], bytes | None] = lambda _, payload: payload,
 ) -> Loop:
     """Run the loop in lockstep for `seconds`; `deliver` says what becomes of each block on its way, None for lost."""
-    plant = PlantNode(validate(RigConfig, {"contact": {"pair": pair}} | (rig or {}), "rig"), seed)
-    node = ControllerNode(validate(ControllerConfig, controller or {}, "controller"))
-    blocks = round(seconds * 1000)
+    rig_config = validate(RigConfig, {"contact": {"pair": pair}} | (rig or {}), "rig")
+    plant, node = (
+        PlantNode(rig_config, seed),
+        ControllerNode(validate(ControllerConfig, controller or {}, "controller")),
+    )
     traces: list[bytes] = []
     truth: list[tuple[float, float]] = []
     commands: list[bytes] = []
-    for block in range(blocks):
+    for block in range(round(seconds / rig_config.solver.block_s)):
         sensors, _ = plant.advance(commands)
+        for message in plant.announcements:
+            node.announcement(message.payload)
         payload = deliver(block, sensors.payload)
         if payload is None:
             commands = []
@@ -63,6 +85,7 @@ def close_the_loop(
         assert command is not None
         commands = [command.payload]
         traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)
-        truth.append((plant.truth[0, -1], plant.truth[2].max()))
+        velocity_mps = plant.truth[2]
+        truth.append((plant.truth[0, -1], velocity_mps[np.abs(velocity_mps).argmax()]))
     trace = np.frombuffer(b"".join(traces), TRACE_LAYOUT.dtype)
     return Loop(trace["t_ns"] * 1e-9, trace, *np.array(truth).T)

@@ -21,17 +21,16 @@ def test_paper_case() -> None:
     loop = close_the_loop(16.0, controller={"policy": {"enabled_from_s": 8.0}})
     assert loop.slips(0.0, 8.0) == 5
     assert loop.slips(9.0) == 0
-    assert loop.ratio(9.0).min() >= 1.05
-    assert loop.ratio(9.0).max() <= 1.6
+    assert loop.ratio(9.0).min() >= 1.0
+    assert loop.ratio(9.0).max() <= 1.25
     assert np.ptp(loop.drive_force_N[loop.t_s > 12.0]) < 0.05 * 17.38
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("pair", PAIRS)
-def test_from_the_start_no_pair_slips_more_than_once(pair: str) -> None:
+def test_from_the_start_no_pair_slips(pair: str) -> None:
     loop = close_the_loop(16.0, controller={"contact_resonance_Hz": PAIRS[pair]}, pair=pair)
-    assert loop.slips(0.0) <= 1
-    assert loop.slips(1.0) == 0
+    assert loop.slips(0.0) == 0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -45,16 +44,16 @@ def test_slips_counted_are_slips_that_happened(seed: int) -> None:
     [
         {"delivered_ratio": 0.6},
         {"delivered_ratio": 0.3},
-        {"mount_resonance_Hz": 2700.0},
-        {"mount_resonance_Hz": 2600.0, "mount_damping_ratio": 0.02},
+        {"mount_resonance_Hz": 4700.0},
+        {"mount_resonance_Hz": 4500.0, "mount_damping_ratio": 0.02},
     ],
     ids=["60 %", "30 %", "mount near f", "mount at f"],
 )
 def test_measured_velocity_is_held_whatever_the_exciter_delivers(piezo: dict[str, float]) -> None:
     loop = close_the_loop(4.0, rig={"piezo": piezo})
     assert loop.slips(0.0) == 0
-    assert loop.ratio(1.0).min() > 1.15
-    assert loop.ratio(1.0).max() < 1.25
+    assert loop.held(0.5).min() > 0.97
+    assert loop.held(0.5).max() < 1.08
 
 
 def test_a_piezo_that_is_too_weak_is_said() -> None:
@@ -65,7 +64,8 @@ def test_a_piezo_that_is_too_weak_is_said() -> None:
 
 def test_a_velocity_limit_that_is_too_low_is_said() -> None:
     rig = {"drive": {"profile": [(0.0, 5e-3)]}, "piezo": {"amplitude_max_m": 1e-6}}
-    loop = close_the_loop(3.0, rig=rig, controller={"limits": {"amplitude_max_m": 1e-6}})
+    policy = {"mode": "moving"}  # on demand it is found that nothing is needed at this speed
+    loop = close_the_loop(3.0, rig=rig, controller={"limits": {"amplitude_max_m": 1e-6}, "policy": policy})
     late = loop.trace[loop.t_s > 2.0]
     assert set(late["limit"]) == {wire.RANGE}  # 6 mm/s are wanted, 5 allowed
     assert set(late["reason"]) == {wire.PIEZO_WEAK}
@@ -99,14 +99,15 @@ def test_velocity_ratio_holds_while_the_drive_speeds_up_and_slows_down() -> None
     assert loop.ratio(1.0).min() >= 1.05
 
 
-def test_frequency_rises_when_the_stroke_runs_out() -> None:
-    profile = [(0.0, 5e-4), (2.0, 5e-4), (2.2, 2e-3)]
-    loop = close_the_loop(4.0, rig={"drive": {"profile": profile}})
-    start, end = loop.trace["wanted_frequency_Hz"][1000], loop.trace["wanted_frequency_Hz"][-1]
-    assert start == 2600.0  # 2.2 times the contact resonance, rounded up
-    assert end > start
-    assert not 4600.0 <= end <= 5000.0
-    assert loop.ratio(3.0).min() >= 1.05
+@pytest.mark.parametrize(("accel_range_mps2", "frequency_Hz"), [(490.3325, 4500.0), (20.0, 2600.0)])
+def test_frequency_takes_little_of_stroke_and_of_the_accelerometers_range(
+    accel_range_mps2: float, frequency_Hz: float
+) -> None:
+    """4500 Hz lies below the forbidden band, 2600 Hz above 2.2 times the contact resonance."""
+    amplitude = {"accel_range_mps2": accel_range_mps2}
+    loop = close_the_loop(2.0, controller={"amplitude": amplitude})
+    assert loop.trace["wanted_frequency_Hz"][-1] == frequency_Hz
+    assert loop.held(0.5).min() > 0.97
 
 
 def test_drive_that_stands_needs_no_vibration() -> None:
@@ -119,7 +120,8 @@ def test_drive_that_stands_needs_no_vibration() -> None:
 
 
 def test_probe_keeps_the_vibration_that_is_needed() -> None:
-    loop = close_the_loop(12.0, controller={"policy": {"probe_every_s": 4.0}})
+    # a spring that takes up what the vibration took off the friction faster than the slide could stick
+    loop = close_the_loop(5.0, rig={"drive": {"profile": [(0.0, 2e-3)]}}, controller={"policy": {"probe_every_s": 2.0}})
     assert loop.modes()[:4] == [wire.WATCH, wire.EXCITE, wire.PROBE, wire.EXCITE]
     assert wire.STILL_NEEDED in loop.trace["reason"]
     assert loop.slips(0.0) == 0
@@ -132,21 +134,15 @@ def test_probe_ends_the_vibration_that_is_not_needed() -> None:
     assert loop.slips(0.0) == 0
 
 
-# After the slip at 7.1 s the force is at 0.76, 0.83 and 0.93 of the breakaway force at these times.
-@pytest.mark.parametrize(
-    ("enabled_from_s", "reason", "slips"),
-    [(7.40, wire.STICK_SEEN, 0), (7.58, wire.LATE_SO_GENTLE, 0), (7.90, wire.TOO_LATE, 1)],
-)
-def test_late_start(enabled_from_s: float, reason: int, slips: int) -> None:
-    loop = close_the_loop(10.0, controller={"policy": {"enabled_from_s": enabled_from_s}})
-    assert loop.trace["reason"][round(enabled_from_s * 1000) + 2] == reason
-    assert loop.slips(enabled_from_s) == slips
-
-
-def test_a_start_past_the_point_of_no_return_would_have_caused_a_slip() -> None:
-    policy = {"enabled_from_s": 7.70, "gentle_from": 0.98, "too_late_from": 0.99}
-    loop = close_the_loop(7.95, controller={"policy": policy})
-    assert loop.slips(7.70, 7.95, fast_mps=0.003) == 1  # 0.2 s before it would have come by itself
+# After the slip at 7.1 s the force is at 0.76, 0.83, 0.87 and 0.93 of the breakaway force at these times. Without vibration the
+# slip comes at 8.0 s. The later the start, the larger the slip that it releases; waiting for the slip gives 22 mm/s.
+@pytest.mark.parametrize(("enabled_from_s", "fastest_mps"), [(7.40, 1.5e-3), (7.58, 5e-3), (7.70, 8e-3), (7.90, 22e-3)])
+def test_a_late_start_excites_at_once_and_releases_less_than_waiting(enabled_from_s: float, fastest_mps: float) -> None:
+    loop = close_the_loop(9.0, controller={"policy": {"enabled_from_s": enabled_from_s}})
+    from_block = round(enabled_from_s * 1000)
+    assert wire.EXCITE in loop.trace["mode"][from_block : from_block + 3]
+    assert loop.velocity_mps[from_block:].max() < fastest_mps
+    assert loop.slips(enabled_from_s + 0.3) == 0
 
 
 def test_stick_is_seen_long_before_the_slip() -> None:
@@ -195,20 +191,20 @@ def test_a_sample_that_is_no_number_is_forgotten(channel: str, value: float, bad
     ):
         assert np.isfinite(loop.trace[field]).all(), field
     assert loop.slips(0.0) == 0
-    assert loop.ratio(2.0).min() > 1.15
+    assert loop.held(2.0).min() > 0.97
 
 
 @pytest.mark.parametrize("pause_blocks", [1, 2, 3])
 def test_lost_blocks_do_not_disturb_the_measured_velocity(pause_blocks: int) -> None:
-    """At 2600 Hz a block holds 2.6 periods: a lost one must turn the demodulator on."""
+    """At 4500 Hz a block holds 4.5 periods: a lost one must turn the demodulator on."""
 
     def deliver(block: int, payload: bytes) -> bytes | None:
         return None if block > 1000 and block % 100 < pause_blocks else payload
 
     loop = close_the_loop(3.0, deliver=deliver)
     assert loop.trace["gap_blocks"].max() == pause_blocks
-    assert loop.ratio(1.0).min() > 1.15
-    assert loop.ratio(1.0).max() < 1.25
+    assert loop.held(1.0).min() > 0.97
+    assert loop.held(1.0).max() < 1.08
     assert loop.slips(0.0) == 0
 
 
@@ -234,4 +230,4 @@ def test_blocks_that_keep_failing_do_not_make_it_blind(every_blocks: int, unread
     late = loop.trace[loop.t_s > 5.0]
     assert late["drive_velocity_mps"] == pytest.approx(8e-4, rel=0.05)
     assert not np.isin(late["state"], [wire.UNKNOWN, wire.STANDSTILL]).any()
-    assert loop.ratio(5.0).min() > 1.1
+    assert loop.held(5.0).min() > 0.97

@@ -266,7 +266,7 @@ def test_a_rig_that_leaves_before_its_first_word_ends_the_record(tmp_path: Path)
     log = RunLog(tmp_path / "run.mcap", lockstep=False)
     bus: Any = Left()
     inbox: Any = Quiet()
-    assert recorder._record(log, bus, inbox, threading.Event()) is True
+    assert recorder._record(log, bus, inbox, threading.Event(), None) is True
     log.close()
     assert [event.code for event in read_run(log.path).events] == ["PLANT_LOST"]
 
@@ -301,6 +301,6 @@ def test_a_stop_ends_the_record_of_a_rig_that_goes_on(tmp_path: Path, monkeypatc
     stop.set()
     bus: Any = None
     inbox: Any = Endless()
-    assert recorder._record(log, bus, inbox, stop) is False
+    assert recorder._record(log, bus, inbox, stop, None) is False
     assert inbox.count > 0
     log.close()

@@ -75,8 +75,9 @@ def test_a_rig_written_from_the_page_alone_is_controlled_and_recorded(start: Sta
     assert seen["vibrates_from_s"] == pytest.approx(ENABLED_FROM_S, abs=0.05)
     assert seen["slips_before"] == 8
     assert seen["slips_after"] == 0
-    # the set point is 1.2; this rig's accelerometer does not roll off, which the controller takes for 3 % more
-    assert 1.1 < seen["velocity_ratio"] < 1.25
+    # the set point sinks from 1.2 to 1.09, where this rig surges once, and rises by 0.4; its accelerometer does not roll off,
+    # which the controller takes for 3 % more
+    assert 1.05 < seen["velocity_ratio"] < 1.6
 
     run = read_run(log)
     assert run.damage.closed
@@ -92,7 +93,7 @@ def test_a_rig_written_from_the_page_alone_is_controlled_and_recorded(start: Sta
     assert (run.applied["fallback"] == (everything == 0)).all()
     assert (run.applied["amplitude_m"][: int(ENABLED_FROM_S * 1000)] == 0.0).all()
     first = int(np.argmax(run.trace["mode"] == wire.EXCITE))
-    assert run.trace["reason"][first] == wire.STICK_SEEN
+    assert run.trace["reason"][first] == wire.NEEDED_BEFORE  # it has counted slips at this speed
     assert run.trace["state"][first] == wire.STICK
     assert run.trace["slips"][-1] == seen["slips_before"]
     codes = [(event.source, event.code) for event in run.events]

@@ -97,10 +97,12 @@ def test_a_repeated_block_is_not_fresh() -> None:
 
 def test_a_slip_of_a_drive_that_seems_to_stand_is_an_event() -> None:
     controller, bus = process()
-    for number in range(60):
+    chance = np.random.default_rng(1)
+    for number in range(220):
         sensors = np.frombuffer(bytearray(block(number)), sensor_block(20).dtype)
-        sensors["drive_force_N"] = 10.0 - 0.3 * max(number - 50, 0)  # falls by 0.9 N in 3 ms
-        sensors["mass_accel_mps2"] = 2.0 if number > 50 else 0.0
+        slid_s = np.clip(1e-3 * (number - 200) + 5e-5 * np.arange(20), 0.0, None)
+        sensors["mass_position_m"] = 0.02 * slid_s + chance.normal(0.0, 5e-7, 20)
+        sensors["drive_force_N"] = 10.0 - 11700.0 * 0.02 * slid_s + chance.normal(0.0, 0.02, 20)
         bus.say(SENSORS, sensors.tobytes())
     bus.say(PLANT_EVENT, END)
     controller.loop(threading.Event(), "")

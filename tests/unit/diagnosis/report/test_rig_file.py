@@ -78,10 +78,10 @@ def test_the_loop_holds_on_the_corrected_rig(diagnosed, tmp_path):
     assert table["effects"] == ["piezo-roll-off", "static-friction-ageing"]
     assert table["before"]["slips"] > 0
     assert table["after"]["slips"] == 0
-    # first order, 2.5 kHz: 70.7 % at 2.5 kHz, the lowest candidate above the contact's resonance
-    assert 0.6 < table["loop"]["delivered_min"] < 0.75
-    assert table["loop"]["phase_margin_deg"] == pytest.approx(60.0, abs=1.0)
-    assert table["velocity_ratio_min"] > 1.05
+    # first order, 2.5 kHz: 48.6 % at 4.5 kHz, where stroke and acceleration together cost least
+    assert 0.45 < table["loop"]["delivered_min"] < 0.52
+    assert table["loop"]["phase_margin_deg"] >= 60.0
+    assert table["velocity_ratio_min"] > 1.0
 
 
 def test_a_piezo_that_is_too_weak_is_said(diagnosed, tmp_path):

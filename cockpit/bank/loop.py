@@ -1,0 +1,172 @@
+"""A rig with the controller or a rival, many blocks in one call of compiled code, with the truth of all of them."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.kernel import unlocked_kernel
+from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, TRACE, Records, sensor_block
+from cockpit.bank.rules import step as rule_step
+from controller.announced import take_announcement
+from controller.codes import ANNOUNCED, BLOCK
+from controller.core import step as controller_step
+from plant.config import RigConfig
+from plant.inputs import RigInputs
+from plant.loop_delay import whole_blocks
+from plant.piezo import base_velocity_mps, delivered_share
+from plant.records import TRUTH
+from plant.records import build as plant_records
+from plant.simulate import held_velocity
+from plant.step import step as plant_step
+
+_VELOCITY = TRUTH.index("true_velocity_mps")
+Pair = tuple[npt.NDArray[Any], npt.NDArray[Any]]  # parameters and memory, one record each
+
+
+@unlocked_kernel
+def advance_with_truth(
+    plant_params: npt.NDArray[Any],
+    plant_state: npt.NDArray[Any],
+    velocity_mps: npt.NDArray[Any],
+    noise: npt.NDArray[np.float64],
+    by_rule: bool,
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    rule_params: npt.NDArray[Any],
+    rule_state: npt.NDArray[Any],
+    delay_blocks: npt.NDArray[np.int64],
+    announcements: npt.NDArray[np.int64],
+    announce: npt.NDArray[Any],
+    ahead_blocks: int,
+    answered: int,
+    analogue: npt.NDArray[np.float64],
+    sensors: npt.NDArray[Any],
+    applied: npt.NDArray[Any],
+    commands: npt.NDArray[Any],
+    traces: npt.NDArray[Any],
+    truth: npt.NDArray[np.float64],
+    v_a_mps: npt.NDArray[np.float64],
+    frequency_Hz: npt.NDArray[np.float64],
+    gain: npt.NDArray[np.float64],
+) -> int:
+    """Advance a rig and what controls it, in place; return how many blocks were done.
+
+    Args:
+        plant_params, plant_state, params, state, rule_params, rule_state: one record each.
+        velocity_mps: of the drive, [blocks + ahead_blocks]: `CONSTANT` looks ahead.
+        noise: standard normal numbers, [blocks, 5, samples].
+        by_rule: whether a rule of `cockpit.bank.rules` stands in for the controller.
+        delay_blocks: that the command takes to the exciter besides, [blocks].
+        announcements, announce: how many the rig makes before it sends its samples, [blocks], and these in order.
+        ahead_blocks: from a block to the one in which its command acts.
+        answered: 1 where `commands[0]` answers the block before the first, 0 at the start of a run.
+        analogue, sensors, applied: [5, samples] and one record each, overwritten by every block.
+        commands: message records [blocks + 1]; the first is what the rig hears first, the others are filled.
+        traces, truth, v_a_mps, frequency_Hz, gain: filled, as `cockpit.bank.watch.watch` takes them.
+
+    Fewer blocks than asked are done where the slide's velocity becomes NaN or infinite.
+
+    """
+    samples = analogue.shape[1]
+    blocks, said = noise.shape[0], 0
+    for i in range(blocks):
+        rows = truth[:, i * samples : (i + 1) * samples]
+        plant_step(
+            plant_params, plant_state, velocity_mps[i], commands[i : i + 1], answered if i == 0 else 1, delay_blocks[i],
+            noise[i], 0, 0, 0, analogue, rows, sensors, applied,
+        )  # fmt: skip
+        if not math.isfinite(rows[_VELOCITY, samples - 1]):
+            return i
+        p, s = plant_params[0], plant_state[0]
+        v_a_mps[i] = base_velocity_mps(p, s)
+        frequency_Hz[i] = s.frequency_Hz
+        gain[i] = delivered_share(p, s.frequency_Hz) * 2.0 * math.pi * s.frequency_Hz
+        if s.amplitude_m > 0.0:
+            gain[i] = v_a_mps[i] / s.amplitude_m
+        answer = commands[i + 1 : i + 2]
+        if by_rule:
+            next_mps = velocity_mps[i + ahead_blocks]
+            rule_step(rule_params, rule_state, sensors, sensors[0].t_ns, next_mps, gain[i], answer, traces[i : i + 1])
+        else:
+            events = BLOCK
+            for _ in range(announcements[i]):
+                take_announcement(state[0], announce[said].holds_from_ns, announce[said].drive_velocity_mps)
+                said += 1
+                events |= ANNOUNCED
+            controller_step(params, state, sensors, events, 0, sensors[0].t_ns, answer, traces[i : i + 1])
+    return blocks
+
+
+class Hum(NamedTuple):
+    """A sine on the force and on both positions, as mains and a carrier make it."""
+
+    frequency_Hz: float
+    force_N: float
+    position_m: float
+
+
+class Stretch(NamedTuple):
+    """Truth and traces of a stretch; [6, samples] and [blocks] each."""
+
+    truth: npt.NDArray[np.float64]
+    v_a_mps: npt.NDArray[np.float64]
+    frequency_Hz: npt.NDArray[np.float64]
+    gain: npt.NDArray[np.float64]
+    traces: Records
+
+
+class JudgedLoop:
+    """A rig and what controls it, in lockstep.
+
+    Args:
+        rig: the rig file.
+        seed: of the sensor noise.
+        subject: parameters and memory of the controller.
+        rule: parameters and memory of a rule.
+        by_rule: which of the two controls.
+        hum: on the sensors; the noise must not be 0 where it has a size.
+
+    """
+
+    def __init__(self, rig: RigConfig, seed: int, subject: Pair, rule: Pair, by_rule: bool, hum: Hum) -> None:
+        self.block = 0
+        self._rig, self._hum, self._by_rule = rig, hum, by_rule
+        self._inputs, self._velocity_mps = RigInputs(rig, seed), held_velocity(rig)
+        self._plant, self._subject, self._rule = plant_records(rig), subject, rule
+        samples = rig.solver.samples_per_block
+        self._ahead_blocks = 1 + whole_blocks(rig.loop.delay_s, rig.solver.block_s)
+        self._analogue = np.empty((len(CHANNELS), samples))
+        self._sensors, self._applied = sensor_block(samples).blank(), APPLIED.blank()
+        self._last_command = COMMAND.blank()
+
+    def _add_hum(self, noise: npt.NDArray[np.float64]) -> None:
+        block_s, samples = self._rig.solver.block_s, self._rig.solver.samples_per_block
+        blocks = len(noise)
+        hum, sensors = self._hum, self._rig.sensors
+        t_s = (self.block + (np.arange(blocks * samples) + 1.0).reshape(blocks, samples) / samples) * block_s
+        wave = np.sin(2.0 * np.pi * hum.frequency_Hz * t_s)
+        if hum.force_N:
+            noise[:, 0] += hum.force_N / sensors.force_noise_N * wave
+        if hum.position_m:
+            noise[:, 3:] += (hum.position_m / sensors.position_noise_m * wave)[:, None]
+
+    def advance(self, blocks: int) -> Stretch:
+        """Advance by `blocks`; fewer come back where the rig's state became NaN or infinite."""
+        _, noise, delay_blocks, announcements, announce = self._inputs.draw(blocks)
+        self._add_hum(noise)
+        samples, block_s = self._rig.solver.samples_per_block, self._rig.solver.block_s
+        velocity_mps = self._velocity_mps((self.block + np.arange(blocks + self._ahead_blocks)) * block_s)
+        commands = COMMAND.blank(blocks + 1)
+        commands[:1] = self._last_command
+        traces, truth = TRACE.blank(blocks), np.empty((len(TRUTH), blocks * samples))
+        v_a_mps, frequency_Hz, gain = (np.empty(blocks) for _ in range(3))
+        done = advance_with_truth(
+            *self._plant, velocity_mps, noise, self._by_rule, *self._subject, *self._rule, delay_blocks, announcements,
+            announce, self._ahead_blocks, min(self.block, 1), self._analogue, self._sensors, self._applied,
+            commands, traces, truth, v_a_mps, frequency_Hz, gain,
+        )  # fmt: skip
+        self.block += done
+        self._last_command = commands[done : done + 1]
+        return Stretch(truth[:, : done * samples], v_a_mps[:done], frequency_Hz[:done], gain[:done], traces[:done])

@@ -1,0 +1,80 @@
+"""`stickslip bench control`: the bank run and judged, as a result, as JSON and in words."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from cockpit.bank import rules
+from cockpit.bank.bars import Bar, bars
+from cockpit.bank.cost import step_cost_ratio
+from cockpit.bank.figures import Figures
+from cockpit.bank.least import Least
+from cockpit.bank.scenario import BankScenario
+from cockpit.bank.suite import Done, find_least, run_bank, warm_up
+
+OWN = rules.NAMES[rules.CONTROLLER]
+_WIDTH = 26
+
+
+class BankResult(NamedTuple):
+    """The table, every run, and how long it took."""
+
+    bars: list[Bar]
+    done: list[Done]
+    least: dict[str, Least]  # of the long scenarios, by name
+    step_cost_ratio: float
+    scenarios: list[BankScenario]
+    elapsed_s: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether no bar is missed."""
+        return all(bar.holds is not False for bar in self.bars)
+
+    @property
+    def failed(self) -> list[Done]:
+        """The runs of the controller that miss a bar."""
+        return [one for one in self.done if one.figures.failures]
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain dictionaries."""
+        runs: list[Figures] = [one.figures for one in self.done]
+        return {
+            "passed": self.passed,
+            "bars": [bar._asdict() for bar in self.bars],
+            "runs": [one._asdict() for one in runs],
+            "least": {name: ratio._asdict() for name, ratio in self.least.items()},
+            "step_cost_ratio": self.step_cost_ratio,
+            "elapsed_s": self.elapsed_s,
+        }
+
+
+def bench(bank: Sequence[BankScenario], rivals: bool, jobs: int, progress: Callable[[float, str], None]) -> BankResult:
+    """Run the controller, and its rivals if asked for, on these scenarios."""
+    started_s = time.perf_counter()
+    warm_up(bank[0])
+    cost = step_cost_ratio()
+    subjects = (rules.CONTROLLER, *(rules.RIVALS if rivals else ()))
+    done = run_bank(bank, subjects, jobs, progress)
+    long = {one.figures.scenario for one in done if one.figures.settled_ratio >= 0.0 and one.figures.expect == "helped"}
+    least = find_least([one for one in bank if one.name in long], jobs, progress)
+    table = bars([one.figures for one in done], least, cost, OWN)
+    return BankResult(table, done, least, cost, list(bank), time.perf_counter() - started_s)
+
+
+def in_words(result: BankResult) -> list[str]:
+    """The table, then a line for each run that misses a bar."""
+    lines: list[str] = []
+    for bar in result.bars:
+        mark = {True: "holds", False: "MISSED", None: "-"}[bar.holds]
+        lines.append(f"{mark:<7}{bar.name:<38}{bar.bar}")
+        lines.extend(f"{'':<9}{name:<{_WIDTH}}{value}" for name, value in bar.values.items())
+    for one in result.failed:
+        lines.extend(f"{one.figures.scenario:<32}{line}" for line in one.figures.failures)
+    missed = sum(bar.holds is False for bar in result.bars)
+    simulated_s = sum(one.figures.duration_s for one in result.done)
+    lines.append(
+        f"{len(result.scenarios)} scenarios, {missed} of {len(result.bars)} bars missed; {simulated_s:.0f} s simulated in "
+        f"{result.elapsed_s:.0f} s"
+    )
+    return lines

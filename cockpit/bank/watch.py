@@ -1,0 +1,68 @@
+"""Judge a stretch of a run: what truly happened, and what the controller made of it."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.kernel import Record, unlocked_kernel
+from cockpit.bank.answer import add_up, announce, follow_vibration
+from cockpit.bank.motion import follow
+from cockpit.bank.record import RING
+from plant.records import TRUTH
+
+_FORCE, _BRISTLE, _PLACE, _DRIVE = (
+    TRUTH.index(f"true_{name}") for name in ("drive_force_N", "bristle_m", "position_m", "drive_position_m")
+)
+_SHAKING_MPS = 1e-9
+
+
+@unlocked_kernel
+def watch(
+    params: npt.NDArray[Any],
+    state: npt.NDArray[Any],
+    truth: npt.NDArray[np.float64],
+    v_a_mps: npt.NDArray[np.float64],
+    frequency_Hz: npt.NDArray[np.float64],
+    gain: npt.NDArray[np.float64],
+    traces: npt.NDArray[Any],
+    events: npt.NDArray[np.float64],
+    rows: npt.NDArray[np.float32],
+) -> int:
+    """Judge a stretch of a run; return the number of events in it, which may be more than fit.
+
+    Args:
+        params, state: one record each of `cockpit.bank.record`; the state is advanced.
+        truth: rows as `plant.records.TRUTH`, [6, blocks * samples].
+        v_a_mps, frequency_Hz: of the base at the end of each block, true, [blocks].
+        gain: v_a for one metre of commanded amplitude at that frequency, [blocks].
+        traces: of the controller, [blocks].
+        events: filled from the first row, [most, 7]; columns as `cockpit.bank.record` says.
+        rows: filled, [blocks, 6], columns as `BLOCK_ROWS`.
+
+    """
+    p: Record = params[0]
+    s: Record = state[0]
+    found = 0
+    for i in range(traces.shape[0]):
+        t: Record = traces[i]
+        shaking = v_a_mps[i] > _SHAKING_MPS
+        window_s = math.ceil(p.window_s * frequency_Hz[i]) / frequency_Hz[i] if shaking else p.window_s
+        force_N = 0.0
+        for j in range(i * p.samples, (i + 1) * p.samples):
+            force_N += truth[_FORCE, j]
+            found = follow(
+                p, s, truth[_PLACE, j], truth[_BRISTLE, j], truth[_DRIVE, j], window_s, v_a_mps[i], events, found
+            )
+        newest = (s.at - 1) % RING
+        found = announce(p, s, t, shaking, events, found)
+        add_up(p, s, t, v_a_mps[i], s.drive_m[newest] - s.x_m[newest])
+        follow_vibration(p, s, t, v_a_mps[i], frequency_Hz[i], gain[i])
+        rows[i, 0] = force_N / p.samples
+        rows[i, 1] = s.dir * s.v_mps
+        rows[i, 2] = s.dir * s.speed_mps
+        rows[i, 3] = v_a_mps[i]
+        rows[i, 4] = t.state
+        rows[i, 5] = t.mode
+    return found

@@ -1,0 +1,124 @@
+"""The commanded amplitude for a wanted v_a: by the exciter's gain, learnt from the delivered v_a.
+
+The gain, delivered over commanded v_a, is compared with what was commanded one loop delay before. So the command follows from the
+learnt gain and not from an integrator behind the delay: it is stable for any delay that was measured (a Smith predictor in
+logarithms). A gain that was never measured starts at a tenth of the rigid mount's stroke, as a mount may resonate tenfold.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import HELD, PIEZO_WEAK
+
+TWO_PI = 2.0 * math.pi
+REMEMBERED = 512  # steps of the command: 0.1 s of blocks of 0.25 ms
+FIRST_SHARE = 0.1  # of the model's stroke, for a gain never measured
+_GROWTH = 1.25  # a loop delay, while the gain is not known
+_UNKNOWN_DELAY_S = 0.05  # loop delay until it is measured: the longest that the loop is designed for
+SETTLE_S = 0.004  # of vibration until a first gain is believed
+LEARN_S = 0.01  # time constant of the learnt gain; beyond it the delay's error must stay
+_HEARD = 5.0  # sigmas of the silent accelerometer from which a vibration counts as heard
+_LEAST_HEARD_MPS = 1e-7  # below it no accelerometer hears a vibration of some kHz
+_LOUDER, _MUCH_LOUDER = 1.3, 2.0  # measured over wanted v_a at which the command is corrected, or cut, at once
+LOUD_S = 0.003  # for which it is louder
+SILENCE_S = 0.1  # of commands of zero until the base is taken to stand still
+_LARGEST_LOG_GAIN = 4.6  # a factor of 100 either way
+_WEAK_S = 0.05  # until a piezo is called weak, and until no longer
+_ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak
+
+
+@kernel
+def listen(p: Record, s: Record) -> None:
+    """Learn loop delay and gain from the v_a of this block, and correct the gain where v_a is too large."""
+    at = s.steps % REMEMBERED
+    delay = s.loop_delay_steps if s.loop_delay_steps >= 0 else 0
+    sent_m = s.sent_m[(at - 1 - delay) % REMEMBERED]
+    expected_mps = TWO_PI * s.allowed_Hz * sent_m
+    s.expected_mps += p.filter_share * (expected_mps - s.expected_mps)
+    s.silent_steps = s.silent_steps + 1 if s.allowed_m == 0.0 else 0
+    if s.silent_steps > p.silence_steps:
+        s.noise_mps += 0.02 * (s.fast_mps - s.noise_mps)
+        s.onset_steps, s.listening = -1, 1
+    heard = s.fast_mps > max(_HEARD * s.noise_mps, _LEAST_HEARD_MPS)
+    if s.listening == 1 and s.allowed_m > 0.0:
+        s.onset_steps += 1
+        if heard:
+            _note_delay(s)
+    s.heard_steps = s.heard_steps + 1 if heard and s.listening == 0 else 0
+    if s.heard_steps < p.settle_steps or s.demodulated_Hz != s.allowed_Hz:
+        s.loud_steps = 0
+        return
+    i = s.candidate
+    if s.gain_known[i] == 0 and s.expected_mps > 0.0:
+        s.log_gain[i], s.gain_known[i] = _bounded(math.log(s.vibration_velocity_mps / s.expected_mps)), 1
+    elif s.expected_mps > 0.0 and s.vibration_velocity_mps > 0.02 * s.expected_mps * math.exp(s.log_gain[i]):
+        now = math.log(s.vibration_velocity_mps / s.expected_mps)
+        s.log_gain[i] += p.learn_share * (_bounded(now) - s.log_gain[i])
+    _hold_down(p, s, i, expected_mps)
+
+
+@kernel
+def _bounded(log_gain: float) -> float:
+    return min(max(log_gain, -_LARGEST_LOG_GAIN), _LARGEST_LOG_GAIN)
+
+
+@kernel
+def _note_delay(s: Record) -> None:
+    """The first vibration is heard: the steps since it was commanded are the loop delay."""
+    if s.loop_delay_steps < 0:
+        s.loop_delay_steps = s.onset_steps
+    else:
+        s.delay_jitter_steps = max(0.9 * s.delay_jitter_steps, math.fabs(float(s.onset_steps - s.loop_delay_steps)))
+        s.loop_delay_steps += (s.onset_steps - s.loop_delay_steps) // 2
+    s.listening = 0
+    # both low-passes begin here, as the delay was not known before
+    s.expected_mps, s.in_phase_mps2, s.quadrature_mps2 = 0.0, 0.0, 0.0
+
+
+@kernel
+def _hold_down(p: Record, s: Record, i: int, expected_mps: float) -> None:
+    wanted_mps = 0.0
+    for back in range(s.loop_delay_steps + p.settle_steps + 2):
+        wanted_mps = max(wanted_mps, s.was_wanted_mps[(s.steps - 1 - back) % REMEMBERED])
+    ratio = s.fast_mps / wanted_mps if wanted_mps > 0.0 else 0.0
+    s.loud_steps = s.loud_steps + 1 if ratio > _LOUDER else 0
+    if s.loud_steps >= p.loud_steps and expected_mps > 0.0:
+        s.log_gain[i] = _bounded(math.log(s.fast_mps / expected_mps))
+        s.loud_steps = -s.loop_delay_steps  # the correction is heard one delay later
+        if ratio > _MUCH_LOUDER:
+            s.cut_steps = s.loop_delay_steps + p.settle_steps
+
+
+@kernel
+def amplitude(p: Record, s: Record) -> None:
+    """Set the wanted amplitude [m] for the wanted v_a, and say whether the piezo is too weak for it."""
+    velocity_mps = s.wanted_velocity_mps
+    s.was_wanted_mps[s.steps % REMEMBERED] = velocity_mps
+    s.cut_steps = max(s.cut_steps - 1, 0)
+    if velocity_mps <= 0.0 or s.cut_steps > 0:
+        s.wanted_m, s.growth = 0.0, FIRST_SHARE
+        _judge_piezo(p, s, weak=False)
+        return
+    model_m = velocity_mps / (TWO_PI * s.wanted_Hz)
+    if s.gain_known[s.candidate] == 1:
+        s.wanted_m = model_m * math.exp(-s.log_gain[s.candidate])
+    else:
+        delay_s = _UNKNOWN_DELAY_S if s.loop_delay_steps < 0 else (s.loop_delay_steps + 1) * p.block_s + SETTLE_S
+        s.growth = min(s.growth * _GROWTH ** (p.block_s / delay_s), 1.0)
+        s.wanted_m = model_m * s.growth
+    largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz))
+    settled = s.free_steps > s.loop_delay_steps + p.settle_steps
+    tried = s.growth >= 1.0 or s.gain_known[s.candidate] == 1
+    unheard = settled and tried and s.vibration_velocity_mps < 0.02 * velocity_mps
+    s.at_limit = 1 if s.wanted_m > largest_m else 0
+    weak = (s.at_limit == 1 or unheard) and s.vibration_velocity_mps < _ALARM_RATIO * s.held_mps
+    _judge_piezo(p, s, weak)
+
+
+@kernel
+def _judge_piezo(p: Record, s: Record, weak: bool) -> None:
+    s.weak_s = max(s.weak_s, 0.0) + p.block_s if weak else min(s.weak_s, 0.0) - p.block_s
+    if s.weak_s > _WEAK_S:
+        s.reason = PIEZO_WEAK
+    elif s.weak_s < -_WEAK_S and s.reason == PIEZO_WEAK:
+        s.reason = HELD

@@ -1,0 +1,154 @@
+"""Stick, slip, surge or smooth sliding, from the slide's velocity relative to the drive's.
+
+The slide's velocity v_s comes from two places: its own position, and what the drive's spring tells, v_d - F' / k_d. Each counts
+by its measured noise, so that either may be missing. A stick is v_s near 0 while the drive moves; a slip is v_s beyond 1.5 v_d.
+
+The window is the shortest in which a stick stands out from the noise. Where no window does, or none that is shorter than the
+stick that is to be expected, the controller is blind and says so.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
+from controller.estimate.windows import BINS, FORCE, SLIDE
+
+_SIGMAS = 6.0  # 1e-9 a window: less than one false announcement in 100 hours of windows of 1 ms
+_HALF = 0.5  # of v_d: the distance between stick and sliding that a window must resolve
+_FINE = 0.06  # of v_d: what the longer window resolves that tells a swing from its noise
+# Share of v_d below which the slide sticks. Larger: a slide that lags behind a step of the drive is called stuck. Smaller: less
+# noise is needed to miss a stick: 0.35 is 4.2 sigma from a stick, and 7.8 sigma from sliding, in the noisiest window that counts.
+_STICK = 0.35
+_STICK_ENDS = 0.65  # as far from sliding as _STICK is from a stick
+_SLIP = 1.5  # share of v_d from which the slide runs ahead
+_SLIP_ENDS = 1.2
+_UNSEEN_MPS = 1e-5  # velocity of a slide whose drive seems to stand, from which it slips
+_STANDS_S = 0.1  # of a standstill at the beginning, until a slide that moves alone slips
+_AFTER_STOP_S = 0.01  # shortest of the longest windows after a stop
+_SCORE_S = 0.005  # time constant of the score
+_LONGEST_WINDOW_S = 1.0  # a stick that takes longer to see is one that nobody can prevent
+_EXPECTED_SWING = 0.2  # of the force, while no slip was seen: what F_s = 1.1 F_c gives
+# Time without a window that sees a stick until the controller calls itself blind. Shorter: every start of a move is, while the
+# windows fill. Longer: slips that nobody sees.
+_BLIND_S = 0.3
+_EXCITER_PERIODS = 2.0  # least length of a window while vibrating
+
+
+@kernel
+def contact(p: Record, s: Record, force_N: float, tick_s: float) -> None:
+    """Judge the contact after `tick_s` more seconds; `force_N` is the mean over them."""
+    speed_mps = math.fabs(s.drive_velocity_mps)
+    direction = float(s.direction)
+    least_s = _EXCITER_PERIODS / s.allowed_Hz if s.allowed_m > 0.0 else 0.0
+    found, found_F, found_x, fine = -1, -1, -1, False
+    slipping, known = False, s.held_mps > 0.0 or s.stood_s > _STANDS_S
+    by_force_mps, by_place_mps = 0.0, 0.0
+    s.window_s = 0.0
+    for level in range(p.levels):
+        length_s = p.window_s[level]
+        if s.pushed[level] < BINS or length_s > _LONGEST_WINDOW_S or fine:
+            break
+        noise_N_per_s, noise_mps = s.noise[FORCE, level], s.noise[SLIDE, level]
+        if length_s < least_s:
+            continue
+        if s.moving == 0 and s.held_mps > 0.0 and length_s * (1.0 + 1.0 / BINS) > max(s.stood_s, _AFTER_STOP_S):
+            break  # it reaches back into the move
+        weight_x, weight_F, place_mps, force_mps = 0.0, 0.0, 0.0, 0.0
+        if p.use_slide_position == 1 and noise_mps > 0.0:
+            weight_x = 1.0 / (noise_mps * noise_mps)
+            place_mps = direction * s.slope[SLIDE, level]
+        if p.use_force == 1 and noise_N_per_s > 0.0:
+            rate_mps = noise_N_per_s / s.stiffness_N_per_m
+            weight_F = 1.0 / (rate_mps * rate_mps + s.drive_velocity_sigma_mps * s.drive_velocity_sigma_mps)
+            force_mps = speed_mps - direction * s.slope[FORCE, level] / s.stiffness_N_per_m
+        if weight_F + weight_x == 0.0:
+            continue
+        sigma_mps = 1.0 / math.sqrt(weight_F + weight_x)
+        both_mps = (weight_F * force_mps + weight_x * place_mps) * sigma_mps * sigma_mps
+        if known and both_mps > max(_SLIP * max(s.held_mps, speed_mps), _UNSEEN_MPS) + _SIGMAS * sigma_mps:
+            slipping = True
+        resolved_mps = _HALF * speed_mps / _SIGMAS if s.moving == 1 else max(s.held_mps, _UNSEEN_MPS)
+        enough = 1.0 / (resolved_mps * resolved_mps)
+        if found_F < 0 and weight_F >= enough:
+            found_F, by_force_mps = level, force_mps
+        if found_x < 0 and weight_x >= enough:
+            found_x, by_place_mps = level, place_mps
+        if found < 0 and weight_F + weight_x >= enough:
+            found = level
+            s.window_s = length_s
+            s.sliding_mps = both_mps
+        if found >= 0:
+            s.fine_mps, s.fine_sigma_mps = both_mps, sigma_mps
+            fine = _SIGMAS * sigma_mps <= _FINE * speed_mps or s.moving == 0
+    if s.stiffness_learnt == 0 and found_F >= 0 and found_x >= 0:
+        s.sliding_mps = min(by_force_mps, by_place_mps)  # a wrong stiffness hides a stick from one of them
+    s.level = found
+    _follow(s, tick_s, slipping, speed_mps)
+    if s.moving == 1 and found >= 0:
+        s.force_rate = 1.0 - s.sliding_mps / speed_mps
+        likely = min(max(s.force_rate, 0.0), 1.0)
+    else:
+        s.force_rate, likely = 0.0, 0.0
+    s.score += min(tick_s / _SCORE_S, 1.0) * (likely - s.score)
+    _expect(s, force_N, tick_s, speed_mps)
+
+
+@kernel
+def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
+    """Go from one state of the contact to the next, and count."""
+    vibrated = s.allowed_m > 0.0
+    before = s.contact
+    s.slip_began, s.stick_began = 0, 0
+    if s.slipping == 1 and not slipping and (s.level < 0 or s.sliding_mps < _SLIP_ENDS * max(speed_mps, s.held_mps)):
+        s.slipping = 0
+    if slipping and s.slipping == 0:
+        s.slipping = 1
+        s.slip_began = 1
+        if s.since_stick_s <= 2.0 * s.window_s or not vibrated:
+            s.slips += 1
+        else:
+            s.surges += 1
+    if s.slipping == 1:
+        s.contact = SLIP
+    elif s.measured == 0:
+        s.contact = UNKNOWN
+    elif s.moving == 0:
+        s.contact = STANDSTILL
+    elif s.level < 0 and s.unseen_s < _BLIND_S and before in (STANDSTILL, STICK):
+        s.contact = STICK  # a slide that stood sticks until it is seen to slide
+    elif s.level < 0:
+        s.contact = UNKNOWN
+    elif s.sliding_mps < (_STICK_ENDS if before == STICK else _STICK) * speed_mps:
+        s.contact = STICK
+    else:
+        s.contact = SMOOTH
+    if s.contact == STICK:
+        if before != STICK:
+            s.stick_began = 1
+            s.stick_s = 0.0
+        s.stick_s += tick_s
+        s.since_stick_s = 0.0
+    else:
+        s.since_stick_s += tick_s
+    s.smooth_s = s.smooth_s + tick_s if s.contact == SMOOTH else 0.0
+
+
+@kernel
+def _expect(s: Record, force_N: float, tick_s: float, speed_mps: float) -> None:
+    """Say how long a stick will last and how long it is until the slip, and whether a stick can be seen in time."""
+    way = 0 if s.direction > 0 else 1
+    along_N = s.direction * force_N
+    climbing_N_per_s = s.stiffness_N_per_m * speed_mps
+    s.time_to_slip_s = -1.0
+    if s.moving == 0 or climbing_N_per_s <= 0.0:
+        s.blind, s.unseen_s = 0, 0.0
+        return
+    swing_N = _EXPECTED_SWING * math.fabs(force_N)
+    if s.swing_N[way] > 0.0:
+        swing_N = max(s.swing_N[way], 0.5 * swing_N)
+    s.expected_stick_s = swing_N / climbing_N_per_s
+    if s.contact == STICK and s.breakaway_N[way] > 0.0:
+        s.time_to_slip_s = max(s.breakaway_N[way] - along_N, 0.0) / climbing_N_per_s
+    in_time = s.level >= 0 and (s.window_s < s.expected_stick_s or s.contact == STICK or s.slipping == 1)
+    s.unseen_s = 0.0 if in_time else s.unseen_s + tick_s
+    s.blind = 1 if s.unseen_s > _BLIND_S else 0

@@ -1,0 +1,33 @@
+"""Which of the allowed frequencies to vibrate at."""
+
+import math
+
+from bridge.kernel import Record, kernel
+
+TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def cost(p: Record, s: Record, i: int, velocity_mps: float) -> float:
+    """Cost of a v_a [m/s] at a candidate: the shares of stroke and of the accelerometer's range that it takes, squared.
+
+    A resonance that was measured takes less stroke but its gain moves; so no gain counts as more than 1.
+    """
+    frequency_Hz = p.candidate_Hz[i]
+    gain = min(math.exp(s.log_gain[i]), 1.0) if s.gain_known[i] == 1 else 1.0
+    stroke = velocity_mps / (TWO_PI * frequency_Hz) / gain / p.amplitude_max_m
+    accel = TWO_PI * frequency_Hz * velocity_mps / p.accel_range_mps2
+    return stroke * stroke + accel * accel
+
+
+@kernel
+def cheapest(p: Record, s: Record, velocity_mps: float, but: int) -> int:
+    """The candidate of least cost, the lowest of equals; never candidate `but` where there is another."""
+    best, least = -1, math.inf
+    for i in range(p.candidates):
+        if i == but and p.candidates > 1:
+            continue
+        now = cost(p, s, i, velocity_mps)
+        if now < least:
+            best, least = i, now
+    return best

@@ -1,0 +1,49 @@
+"""How the controller goes from one mode to another, and which frequency it vibrates at."""
+
+from bridge.kernel import Record, kernel
+from controller.codes import EXCITE, WATCH
+from controller.frequency import cheapest
+from controller.need import way_of
+
+_RETRY_S = 60.0  # until a vibration that could not help is tried again; doubles
+
+
+@kernel
+def enter(s: Record, mode: int, reason: int) -> None:
+    """Set mode and reason; another mode begins anew what is counted in it."""
+    if s.mode != mode:
+        s.mode = mode
+        s.mode_s = 0.0
+        s.calm_s = 0.0
+        s.even_s = 0.0
+        s.roughness, s.roughness_s = 0.0, 0.0
+    s.reason = reason
+
+
+@kernel
+def excite(p: Record, s: Record, reason: int, ratio: float) -> None:
+    """Begin, or go on, to vibrate at least at `ratio`."""
+    way = way_of(s)
+    s.ratio[way] = max(s.ratio[way], ratio)
+    if s.mode != EXCITE:
+        s.waiting_s = 0.0
+    enter(s, EXCITE, reason)
+    if s.allowed_m == 0.0:
+        tune_to(p, s, s.candidate if s.tuned == 1 else cheapest(p, s, p.v_ratio * s.wanted_speed_mps, -1))
+
+
+@kernel
+def tune_to(p: Record, s: Record, candidate: int) -> None:
+    """Vibrate at a candidate frequency."""
+    s.candidate = candidate
+    s.wanted_Hz = p.candidate_Hz[candidate]
+    s.tuned = 1
+
+
+@kernel
+def stop_helping(s: Record, reason: int) -> None:
+    """Leave the axis alone for a time that doubles."""
+    way = way_of(s)
+    s.off_s[way] = _RETRY_S if s.off_s[way] == 0.0 else 2.0 * s.off_s[way]
+    s.off_left_s[way] = s.off_s[way]
+    enter(s, WATCH, reason)

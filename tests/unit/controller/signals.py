@@ -1,0 +1,61 @@
+"""Made signals of a slide and its drive, and what the controller's estimate says to them."""
+
+from typing import Any
+
+import numpy as np
+
+from bridge.config import validate
+from bridge.wire.messages import TRACE as TRACE_LAYOUT
+from bridge.wire.messages import sensor_block
+from bridge.wire.topics import TRACE
+from controller.config import ControllerConfig
+from controller.node import ControllerNode
+
+SAMPLES = 20  # a block of 1 ms
+SAMPLE_S = 5e-5
+STIFFNESS_N_PER_M = 11700.0
+FORCE_NOISE_N, POSITION_NOISE_M = 0.02, 5e-7  # white, rms, of the paper's stand
+
+
+def time_s(seconds: float) -> Any:
+    """The times of the samples [s]."""
+    return SAMPLE_S * (1.0 + np.arange(round(seconds / SAMPLE_S)))
+
+
+def listen(drive_m: Any, slide_m: Any, offset_N: float = 0.0, seed: int = 1, **config: Any) -> Any:
+    """The trace of a controller that only listens, of [blocks].
+
+    Args:
+        drive_m, slide_m: positions, [samples]; the force follows from them and `offset_N`.
+        seed: of the noise.
+        config: tables of the controller file besides.
+
+    """
+    chance = np.random.default_rng(seed)
+    tables = {"policy": {"enabled_from_s": 1000.0}, **config}
+    node = ControllerNode(validate(ControllerConfig, tables, "test"))
+    sensors = sensor_block(SAMPLES).blank()
+    force_N = offset_N + STIFFNESS_N_PER_M * (drive_m - slide_m)
+    channels = {
+        "drive_force_N": force_N + chance.normal(0.0, FORCE_NOISE_N, len(force_N)),
+        "drive_position_m": drive_m + chance.normal(0.0, POSITION_NOISE_M, len(drive_m)),
+        "mass_position_m": slide_m + chance.normal(0.0, POSITION_NOISE_M, len(slide_m)),
+    }
+    traces: list[bytes] = []
+    for block in range(len(drive_m) // SAMPLES):
+        sensors["sequence"], sensors["t_ns"] = block, 1_000_000 * (block + 1)
+        for name, values in channels.items():
+            sensors[name][0] = values[SAMPLES * block : SAMPLES * (block + 1)]
+        node.block(sensors.tobytes())
+        traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)
+    return np.frombuffer(b"".join(traces), TRACE_LAYOUT.dtype)
+
+
+def stick_slip(seconds: float, velocity_mps: float, stick_s: float, slip_s: float) -> tuple[Any, Any]:
+    """Positions [m], [samples], of a drive and of a slide that sticks for `stick_s` and catches up in `slip_s`."""
+    t_s = time_s(seconds)
+    period_s = stick_s + slip_s
+    slipping_s = np.clip(t_s % period_s - stick_s, 0.0, None)
+    way_m = velocity_mps * period_s
+    slide_m = way_m * (np.floor(t_s / period_s) + 0.5 * (1.0 - np.cos(np.pi * slipping_s / slip_s)))
+    return velocity_mps * t_s, slide_m

@@ -1,0 +1,115 @@
+"""The amplitude loop with an exciter of any gain behind any delay: what it learns, and that it never drives too far."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.config import validate
+from bridge.wire import stickslip_pb2 as wire
+from controller.amplitude import FIRST_SHARE, REMEMBERED, amplitude, listen
+from controller.codes import BLOCK
+from controller.config import ControllerConfig
+from controller.limits import allow
+from controller.records import build
+from controller.vibration import measure
+
+WANTED_MPS, FREQUENCY_HZ = 6e-4, 2600.0
+SILENT_S = 0.2
+SILENT = 200  # steps of 1 ms
+NOISE_MPS2 = 0.0015
+
+
+def run(steps: int, delay: int, gain: Callable[[int], float], block_s: float = 1e-3) -> tuple[Any, Any, Any]:
+    """Parameters, memory, and true v_a of each step [m/s]: `SILENT_S` without, then with a vibration wanted.
+
+    Args:
+        steps: in all.
+        delay: blocks that a command takes besides the one in which it is given.
+        gain: delivered over commanded amplitude at a step.
+        block_s: length of a block.
+
+    """
+    samples = round(block_s / 5e-5)
+    limits = {"stale_after_s": 0.04, "slew_m_per_s": 1e-5}
+    config = {"block_s": block_s, "samples_per_block": samples, "limits": limits}
+    params, state = build(validate(ControllerConfig, config, "test"))
+    p, s = params[0], state[0]
+    silent = round(SILENT_S / block_s)
+    s.listening, s.onset_steps, s.loop_delay_steps, s.growth = 1, -1, -1, FIRST_SHARE
+    s.candidate = int(np.argmin(np.abs(p.candidate_Hz - FREQUENCY_HZ)))
+    s.wanted_Hz, s.tuned, s.held_mps = p.candidate_Hz[s.candidate], 1, WANTED_MPS / 1.2
+    omega = 2.0 * math.pi * s.wanted_Hz
+    rolled_off = math.sqrt(1.0 + (s.wanted_Hz / p.accel_bandwidth_Hz) ** 2)
+    chance = np.random.default_rng(1)
+    on_its_way = deque([0.0] * (delay + 1))
+    now_m, true_mps = 0.0, []
+    for step in range(steps):
+        before_m, now_m = now_m, on_its_way.popleft() * gain(step)
+        t_s = block_s * step + p.sample_s * np.arange(1, samples + 1)
+        share = np.arange(1, samples + 1) / samples
+        accel = (before_m + share * (now_m - before_m)) * omega**2 / rolled_off * np.cos(omega * t_s)
+        measure(p, s, (accel + chance.normal(0.0, NOISE_MPS2, samples)).astype(np.float32))
+        listen(p, s)
+        s.wanted_velocity_mps = WANTED_MPS if step >= silent else 0.0
+        amplitude(p, s)
+        allow(p, s, BLOCK, s.wanted_Hz, s.wanted_m)
+        s.sent_m[s.steps % REMEMBERED] = s.allowed_m
+        on_its_way.append(s.allowed_m)
+        s.steps += 1
+        true_mps.append(omega * now_m)
+    return p, s, np.array(true_mps)
+
+
+@pytest.mark.parametrize("delay", [0, 2, 20, 50])
+@pytest.mark.parametrize("gain", [0.5, 1.0, 10.0])
+def test_delay_and_gain_are_learnt_and_the_set_point_is_held(delay: int, gain: float) -> None:
+    _, s, true_mps = run(SILENT + 1500, delay, lambda _: gain)
+    assert s.loop_delay_steps == pytest.approx(delay, abs=1)
+    assert math.exp(s.log_gain[s.candidate]) == pytest.approx(gain, rel=0.02)
+    from_step = SILENT + 150 + 12 * delay
+    assert true_mps[from_step:] == pytest.approx(WANTED_MPS, rel=0.02)
+
+
+@pytest.mark.parametrize(("block_s", "delay"), [(2.5e-4, 100), (5e-3, 4), (10e-3, 5)])
+def test_it_holds_with_short_and_long_blocks(block_s: float, delay: int) -> None:
+    steps = round((SILENT_S + 1.5) / block_s)
+    _, s, true_mps = run(steps, delay, lambda _: 3.0, block_s)
+    assert s.loop_delay_steps == pytest.approx(delay, abs=max(1, round(1e-3 / block_s)))
+    assert true_mps[-round(0.5 / block_s) :] == pytest.approx(WANTED_MPS, rel=0.02)
+
+
+def longest(above: Any) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], above.astype(int), [0]))))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+@pytest.mark.parametrize("delay", [0, 20, 50])
+def test_the_first_start_on_a_mount_of_gain_ten_is_not_too_strong(delay: int) -> None:
+    _, _, true_mps = run(SILENT + 600, delay, lambda _: 10.0)
+    assert longest(true_mps > 1.3 * WANTED_MPS) <= 6
+
+
+@pytest.mark.parametrize("delay", [0, 20])
+@pytest.mark.parametrize("factor", [1.6, 5.0])
+def test_a_gain_that_jumps_is_taken_back_within_a_delay(delay: int, factor: float) -> None:
+    jump = SILENT + 800
+    _, s, true_mps = run(jump + 600, delay, lambda step: factor if step >= jump else 1.0)
+    assert longest(true_mps > 1.3 * WANTED_MPS) <= 6 + delay
+    assert true_mps[-100:] == pytest.approx(WANTED_MPS, rel=0.02)
+    assert math.exp(s.log_gain[s.candidate]) == pytest.approx(factor, rel=0.02)
+
+
+def test_an_exciter_that_is_not_heard_is_told_and_driven_no_further_than_the_model() -> None:
+    _, s, _ = run(SILENT + 1000, 0, lambda _: 0.0)
+    assert s.reason == wire.PIEZO_WEAK
+    assert s.wanted_m == pytest.approx(WANTED_MPS / (2.0 * math.pi * s.wanted_Hz))
+
+
+def test_an_accelerometer_that_is_lost_is_told() -> None:
+    _, s, _ = run(SILENT + 1000, 0, lambda step: 1.0 if step < SILENT + 500 else 0.0)
+    assert s.reason == wire.PIEZO_WEAK
+    assert math.exp(s.log_gain[s.candidate]) == pytest.approx(1.0, rel=0.05)  # as learnt before

@@ -1,0 +1,70 @@
+"""Stick, slip and smooth sliding on made signals, with either channel missing and with a wrong stiffness."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.wire import stickslip_pb2 as wire
+from tests.unit.controller.signals import STIFFNESS_N_PER_M, listen, stick_slip, time_s
+
+CHANNELS = {"both": {}, "no slide position": {"use_slide_position": False}, "no force": {"use_force": False}}
+
+
+@pytest.fixture(params=CHANNELS)
+def estimator(request: pytest.FixtureRequest) -> dict[str, Any]:
+    return CHANNELS[request.param]
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_sticks_and_slips_are_found(estimator: dict[str, Any], way: float) -> None:
+    drive_m, slide_m = stick_slip(6.0, 5e-4, 0.96, 0.04)
+    trace = listen(way * drive_m, way * slide_m, offset_N=way * 8.0, estimator=estimator)
+    assert int(trace["slips"][-1]) == 6
+    for slip in range(1, 6):
+        # from the force alone a slip is seen to end 70 ms late: only the longer windows tell its rate from noise
+        assert (trace["state"][1000 * slip + 110 : 1000 * slip + 950] == wire.STICK).all()
+        assert (trace["state"][1000 * slip - 30 : 1000 * slip - 10] == wire.SLIP).all()
+    assert trace["surges"][-1] == 0
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_smooth_sliding_is_no_stick_and_no_slip(estimator: dict[str, Any], way: float) -> None:
+    drive_m = way * 5e-4 * time_s(20.0)
+    trace = listen(drive_m, drive_m, offset_N=way * 12.0, estimator=estimator)
+    assert trace["slips"][-1] == 0
+    assert (trace["state"][1000:] == wire.SMOOTH).all()
+
+
+def test_a_slide_that_swings_by_less_than_half_slips_not() -> None:
+    t_s = time_s(5.0)
+    drive_m = 5e-4 * t_s
+    slide_m = drive_m - 5e-4 * 0.3 / 30.0 * np.sin(30.0 * t_s)  # v_s between 0.7 and 1.3 v_d
+    trace = listen(drive_m, slide_m, offset_N=12.0)
+    assert trace["slips"][-1] == 0
+    assert not (trace["state"][1000:] == wire.STICK).any()
+
+
+@pytest.mark.parametrize("factor", [10.0, 0.1])
+def test_the_stiffness_is_learnt_whatever_was_told(factor: float) -> None:
+    drive_m, slide_m = stick_slip(3.0, 5e-4, 0.96, 0.04)
+    trace = listen(drive_m, slide_m, offset_N=8.0, drive_stiffness_N_per_m=factor * STIFFNESS_N_PER_M)
+    assert trace["drive_stiffness_N_per_m"][-1] == pytest.approx(STIFFNESS_N_PER_M, rel=0.05)
+    assert trace["drive_stiffness_sigma"][-1] < 0.1
+    assert int(trace["slips"][-1]) == 3
+    assert (trace["state"][40:950] == wire.STICK).mean() > 0.95
+
+
+def test_breakaway_and_the_time_to_the_next_slip_are_learnt() -> None:
+    drive_m, slide_m = stick_slip(6.0, 5e-4, 0.96, 0.04)
+    trace = listen(drive_m, slide_m, offset_N=8.0)
+    breakaway_N = 8.0 + STIFFNESS_N_PER_M * 5e-4 * 0.97
+    assert trace["breakaway_force_N"][-1] == pytest.approx(breakaway_N, rel=0.03)
+    assert trace["time_to_slip_s"][5500] == pytest.approx(0.46, abs=0.05)
+
+
+def test_a_slide_on_a_drive_that_stands_is_at_a_standstill_and_slips_not() -> None:
+    drive_m = 5e-4 * np.clip(time_s(5.0), 0.0, 2.0)
+    trace = listen(drive_m, drive_m, offset_N=12.0)
+    assert (trace["state"][2030:] == wire.STANDSTILL).all()
+    assert trace["slips"][-1] == 0

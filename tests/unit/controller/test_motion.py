@@ -1,0 +1,49 @@
+"""The drive's velocity, direction and standstill from positions with the noise of the paper's stand."""
+
+import numpy as np
+import pytest
+
+from bridge.wire import stickslip_pb2 as wire
+from tests.unit.controller.signals import listen, time_s
+
+
+@pytest.mark.parametrize("velocity_mps", [5e-3, 5e-4, 5e-5, -5e-4, -5e-5])
+def test_velocity_and_direction_are_found(velocity_mps: float) -> None:
+    drive_m = velocity_mps * np.clip(time_s(2.0) - 0.5, 0.0, None)
+    trace = listen(drive_m, drive_m)
+    late = trace["drive_velocity_mps"][1000:]
+    assert late == pytest.approx(velocity_mps, rel=0.03)
+    assert (trace["state"][1000:] == wire.SMOOTH).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_drive_that_stands_is_never_called_moving(seed: int) -> None:
+    still = np.zeros(len(time_s(10.0)))
+    trace = listen(still, still, seed=seed)
+    assert not trace["drive_velocity_mps"].any()
+    assert set(trace["state"]) <= {wire.UNKNOWN, wire.STANDSTILL}
+
+
+def test_a_creep_feed_of_a_micrometre_a_second_is_motion() -> None:
+    drive_m = 1e-6 * np.clip(time_s(12.0) - 1.0, 0.0, None)
+    trace = listen(drive_m, drive_m)
+    assert trace["drive_velocity_mps"][-3000:] == pytest.approx(1e-6, rel=0.3)
+    assert not (trace["state"][-3000:] == wire.STANDSTILL).any()
+
+
+def test_a_stop_is_seen_at_once_and_its_tail_is_no_motion() -> None:
+    drive_m = 5e-4 * np.clip(time_s(4.0), 0.0, 2.0)
+    trace = listen(drive_m, drive_m)
+    assert (trace["drive_velocity_mps"][1000:2000] > 0.0).all()
+    assert not trace["drive_velocity_mps"][2030:].any()
+    assert (trace["state"][2030:] == wire.STANDSTILL).all()
+
+
+@pytest.mark.parametrize("after_mps", [1e-3, 2e-4, -5e-4])
+def test_a_step_of_the_velocity_is_followed(after_mps: float) -> None:
+    t_s = time_s(2.0)
+    drive_m = 5e-4 * np.clip(t_s, 0.0, 1.0) + after_mps * np.clip(t_s - 1.0, 0.0, None)
+    trace = listen(drive_m, drive_m)
+    assert trace["drive_velocity_mps"][900:1000] == pytest.approx(5e-4, rel=0.05)
+    assert trace["drive_velocity_mps"][1060:] == pytest.approx(after_mps, rel=0.1)
+    assert trace["drive_velocity_mps"][1500:] == pytest.approx(after_mps, rel=0.03)

@@ -1,0 +1,90 @@
+"""Slopes in windows of every length, and their noise as it is measured."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.config import validate
+from controller.config import ControllerConfig
+from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, begin_anew, note_steps, push
+from controller.records import build
+
+
+def _start() -> tuple[Any, Any]:
+    params, state = build(validate(ControllerConfig, {}, "test"))
+    return params[0], state[0]
+
+
+def _push(p: Any, s: Any, force_N: Any) -> None:
+    for value in force_N.tolist():
+        push(p, s, value, 0.0, 0.0, True)
+
+
+def _of_white(p: Any, sigma_N: float, level: int) -> float:
+    """The same of white noise of bins of `sigma_N`, from the weights -3, -1, 1, 3 over 10."""
+    return math.sqrt(0.2) * sigma_N / math.sqrt(2.0**level) / (p.bin_s * 2.0**level)
+
+
+def test_a_ramp_has_its_slope_at_every_level() -> None:
+    p, s = _start()
+    for n in range(40000):
+        push(p, s, 3.0 + 5.0 * p.bin_s * n, -2e-3 * p.bin_s * n, 5e-4 * p.bin_s * n, True)
+    seen = [level for level in range(p.levels) if s.pushed[level] >= BINS]
+    assert max(p.window_s[level] for level in seen) > 3.0
+    for level in seen:
+        assert s.slope[FORCE, level] == pytest.approx(5.0, rel=1e-6)
+        assert s.slope[SLIDE, level] == pytest.approx(-2e-3, rel=1e-6)
+        assert s.slope[DRIVE, level] == pytest.approx(5e-4, rel=1e-6)
+        assert s.noise[DRIVE, level] < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_noise_of_white_noise_is_found_on_a_ramp(seed: int) -> None:
+    p, s = _start()
+    chance = np.random.default_rng(seed)
+    _push(p, s, 3.0 * p.bin_s * np.arange(60000) + chance.normal(0.0, 0.02, 60000))
+    for level in range(8):
+        assert s.noise[FORCE, level] == pytest.approx(_of_white(p, 0.02, level), rel=0.15 if level < 6 else 0.3)
+
+
+def test_slips_do_not_move_the_noise() -> None:
+    p, s = _start()
+    bins = np.arange(60000) % 10000
+    saw_N = 6.0 * np.where(bins < 9600, bins / 9600.0, (10000 - bins) / 400.0)  # climbs in 960 ms, falls in 40
+    _push(p, s, saw_N + np.random.default_rng(1).normal(0.0, 0.02, 60000))
+    for level in range(5):
+        assert s.noise[FORCE, level] == pytest.approx(_of_white(p, 0.02, level), rel=0.2)
+
+
+def test_hum_is_in_the_noise_of_the_windows_that_see_it() -> None:
+    p, s = _start()
+    t_s = p.bin_s * np.arange(40000)
+    chance = np.random.default_rng(1)
+    _push(p, s, 0.1 * np.sin(2.0 * np.pi * 50.0 * t_s) + chance.normal(0.0, 0.02, 40000))
+    short, half_a_period = 0, 4
+    assert p.window_s[half_a_period] == pytest.approx(6.4e-3)
+    assert s.noise[FORCE, short] == pytest.approx(_of_white(p, 0.02, short), rel=0.15)
+    assert s.noise[FORCE, half_a_period] > 5.0 * _of_white(p, 0.02, half_a_period)
+
+
+def test_a_signal_that_stands_within_a_step_is_not_known_better_than_the_step() -> None:
+    p, s = _start()
+    step_m = 1e-6
+    note_steps(s, SLIDE, np.array([0.0, step_m, 3.0 * step_m], np.float32))
+    _push(p, s, np.zeros(2000))
+    assert s.resolution[SLIDE] == pytest.approx(step_m, rel=1e-3)
+    for level in range(4):
+        assert s.noise[SLIDE, level] == pytest.approx(0.29 * step_m / p.window_s[level], rel=1e-3)
+
+
+def test_the_noise_outlives_a_new_beginning_and_what_was_not_measured_does_not_count() -> None:
+    p, s = _start()
+    _push(p, s, np.random.default_rng(1).normal(0.0, 0.02, 10000))
+    before = s.noise[FORCE, 2]
+    begin_anew(s)
+    assert (s.pushed == 0).all()
+    for _ in range(2000):
+        push(p, s, 0.0, 0.0, 0.0, False)
+    assert s.noise[FORCE, 2] == before
