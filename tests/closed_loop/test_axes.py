@@ -9,6 +9,8 @@ from bridge.wire import stickslip_pb2 as wire
 from tests.closed_loop.axes import machine_axis, told
 from tests.closed_loop.loop import close_the_loop
 
+pytestmark = pytest.mark.slow
+
 BOTH_WAYS = {"force_lowest_N": -50.0, "position_lowest_m": -0.05}
 FAST_MPS = 1e-3  # a slip of the stiff axes reaches 1.2 to 1.5 mm/s at a feed of 0.5
 

@@ -8,6 +8,8 @@ import pytest
 from bridge.wire import stickslip_pb2 as wire
 from tests.closed_loop.loop import Loop, close_the_loop
 
+pytestmark = pytest.mark.slow
+
 GO = [(0.0, 5e-4), (1.5, 5e-4), (1.55, 0.0), (2.5, 0.0), (2.55, 5e-4)]
 PTFE = "C45-PTFE @ 0.063"
 
