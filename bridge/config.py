@@ -2,7 +2,6 @@
 
 import re
 import reprlib
-import sys
 import tomllib
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -13,7 +12,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from bridge.faults import Fault
 from bridge.files import check_file
+from bridge.plain import say
 
+_LARGEST_BYTES = 2 << 20  # of a TOML file; the largest that people write, of hundreds of runs, have some 100 kB
+_DEEPEST = 32  # parts of a key or brackets one in the other; files of this project need 5
+_MOST_PROBLEMS = 20  # that are told of one table
+_QUOTED = re.compile(r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"|\'[^\'\n]*\'')
+_DOTS = re.compile(r"[ \t]*\.[ \t]*")
+_CHAIN = re.compile(r"[\w-]+(?:\.[\w-]+)*")
 _TOLD: set[str] = set()  # lines about keys that are gone, each told once by a process
 
 
@@ -32,7 +38,7 @@ class Strict(BaseModel):
             line = f"stickslip: {key}: is not used any more; {cls.gone[key]}"
             if line not in _TOLD:
                 _TOLD.add(line)
-                print(line, file=sys.stderr)
+                say(line)
         return {key: value for key, value in table.items() if key not in cls.gone}
 
 
@@ -57,7 +63,13 @@ def read_toml(path: Path) -> dict[str, Any]:
     check_file(path, "CONFIG", "give the path of a TOML file")  # also no pipe, which nobody may ever write into
     text = ""
     try:
-        text = path.read_bytes().decode("utf-8-sig")  # Notepad marks what it saves as UTF-8
+        with path.open("rb") as file:
+            data = file.read(_LARGEST_BYTES + 1)
+        if len(data) > _LARGEST_BYTES:
+            rule = f"{path.stat().st_size / 1e6:.0f} MB: must be at most {_LARGEST_BYTES >> 20} MiB"
+            raise Fault("CONFIG", f"{path}: {rule}; keep measured data in files beside it")
+        text = data.decode("utf-8-sig")  # Notepad marks what it saves as UTF-8
+        _refuse_depth(path, text)
         return tomllib.loads(text)
     except OSError as error:
         raise Fault("CONFIG", f"{path}: cannot be read: {error.strerror}; give the path of a TOML file") from None
@@ -65,6 +77,18 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise Fault("CONFIG", f"{path}: is not UTF-8 from byte {error.start + 1} on; save it as UTF-8") from None
     except (ValueError, RecursionError) as error:  # also Python's own limits: 5000 digits, brackets 1000 deep
         raise Fault("CONFIG", f"{path}: not valid TOML: {error}{_decimal_comma(text, str(error))}") from None
+
+
+def _refuse_depth(path: Path, text: str) -> None:
+    """Raise Fault CONFIG for a dotted key of more parts than any table is deep: reading it takes seconds, or ends in an error.
+
+    Brackets one in the other are bounded by the reader itself.
+    """
+    keys = _DOTS.sub(".", _QUOTED.sub("q", text))
+    if any(found[0].count(".") >= _DEEPEST for found in _CHAIN.finditer(keys)):
+        raise Fault(
+            "CONFIG", f"{path}: has a key of more than {_DEEPEST} parts: must be at most {_DEEPEST}; shorten it"
+        )
 
 
 def _decimal_comma(text: str, error: str) -> str:
@@ -118,7 +142,10 @@ def validate(model: type[T], table: dict[str, Any], source: str) -> T:
         return model.model_validate(table)
     except ValidationError as error:
         problems = _without_misspelt(error.errors())
-        raise Fault("CONFIG", "\n".join(_line(model, source, problem) for problem in problems)) from None
+        lines = [_line(model, source, problem) for problem in problems[:_MOST_PROBLEMS]]
+        if len(problems) > _MOST_PROBLEMS:
+            lines.append(f"{source}: and {len(problems) - _MOST_PROBLEMS} more of such")
+        raise Fault("CONFIG", "\n".join(lines)) from None
 
 
 def _without_misspelt(problems: Sequence[Any]) -> list[Any]:

@@ -43,6 +43,21 @@ FAULTS = {
             "makes a cut log whole.",
         ),
         FaultKind(
+            "NOT_SECURE",
+            2,
+            "Whoever reaches the bus of a rig can stop and command its exciter. So a rig listens beyond this machine only with "
+            "TLS and certificates (`stickslip certs FOLDER`, then --endpoint tls/HOST:PORT --certs FOLDER), a key must be closed "
+            "to others (mode 0600), and a Dask cluster beyond this machine needs tls://. --insecure allows a plain endpoint on "
+            "a network that nobody else can reach. Nothing was started.",
+        ),
+        FaultKind(
+            "LOG_LOST",
+            5,
+            "The file of a log was deleted, renamed, cut or replaced while it was recorded. The recording went on in the next "
+            "file, NAME-0001.mcap and so on, which the line names; what was in the first file is gone unless it has another name "
+            "now. Nothing else should write where a log is recorded.",
+        ),
+        FaultKind(
             "PEER_DIED",
             6,
             "A process of the run ended before the run did (killed, or it failed by itself: see its line above). The "

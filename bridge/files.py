@@ -1,12 +1,16 @@
 """Files: a clear line for a file that cannot be read; text and strict JSON written whole or not at all."""
 
+import contextlib
+import errno
 import json
 import math
 import os
+import shutil
 import stat
-from collections.abc import Iterable
+import tempfile
+from collections.abc import Generator, Iterable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from bridge.faults import Fault
 
@@ -29,6 +33,18 @@ def check_file(path: Path, code: str, remedy: str) -> None:
     raise Fault(code, f"{path}: {why}; {remedy}")
 
 
+def read_json(path: Path) -> Any:
+    """The value in a JSON file. Raises OSError, also for a pipe or a device, and ValueError where it is no JSON."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EINVAL, "must be a file on a disk", str(path))
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:  # brackets 1000 deep
+        raise ValueError("its brackets are too deep") from None
+
+
+_MOST_LINKS = 40  # one after the other, as the kernel's own limit is
+_LONGEST_STEM_BYTES = 100  # of a file's name that the name of its unfinished copy begins with
 LOG, JSON = "run log", "JSON"
 _BEGINS = {LOG: (b"\x89MCAP",), JSON: (b"{", b"[")}
 
@@ -69,22 +85,98 @@ def shown(path: Path) -> str:
     return os.fsencode(path).decode(errors="backslashreplace")
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file whole or not at all, and make its folder. A symbolic link stays a link. Raises OSError.
+def followed(path: Path) -> Path:
+    """The file that a path means, at the end of links of our own. Raises Fault LOG_WRITE for a link of somebody else.
 
-    A path that is not a regular file, such as /dev/null or a pipe, is written into and never replaced.
+    In a folder that several people write to, such a link may lead to a file that only we may write.
     """
-    if path.is_relative_to("/dev") or (path.exists() and not path.is_file()):
-        path.write_text(text, encoding="utf-8")
-        return
-    path = path.resolve()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
+    for _ in range(_MOST_LINKS):
+        try:
+            if not path.is_symlink():
+                break
+            owner = path.lstat().st_uid
+            target = path.readlink()
+        except OSError:  # who writes it says why it cannot
+            break
+        if owner not in {os.geteuid(), 0}:
+            line = f"{path}: is a link that another user laid, to {shown(target)}: is not written through"
+            raise Fault("LOG_WRITE", f"{line}; remove the link, or choose another file")
+        path = path.parent / target
+    return path
+
+
+def open_new(path: Path, mode: int = 0o666) -> IO[bytes]:
+    """A file that was not there before, open for writing and reading. Raises OSError, also where a link is in its place."""
+    return os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode), "w+b")
+
+
+def _hidden(path: Path) -> str:
+    """How the name of an unfinished copy begins."""
+    return f".{os.fsdecode(os.fsencode(path.name)[:_LONGEST_STEM_BYTES])}."
+
+
+class Replacement:
+    """A file that is written beside another under a name that nobody can foresee, and takes its place at the end.
+
+    A path that is not a regular file, such as /dev/null or a pipe, is written into and never replaced. The folder is made.
+
+    Raises Fault LOG_WRITE, OSError.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._part: Path | None = None
+        if path.is_relative_to("/dev") or (path.exists() and not path.is_file()):
+            self.path = path
+            self.file: IO[bytes] = path.open("wb")
+            return
+        self.path = followed(path)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        # a name of 255 bytes is the longest that a disk takes
+        part = self.path.with_name(f"{_hidden(self.path)}{os.urandom(8).hex()}.part")
+        self.file = open_new(part)
+        self._part = part
+
+    def finish(self) -> None:
+        """Put the file in its place. Raises OSError."""
+        self.file.close()
+        if self._part is not None:
+            self._part.replace(self.path)
+            self._part = None
+
+    def discard(self) -> None:
+        """Remove the file; what was there before stays."""
+        with contextlib.suppress(OSError):
+            self.file.close()
+        if self._part is not None:
+            self._part.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Generator[IO[bytes]]:
+    """A file that takes the place of `path` where the block ends well. Raises Fault LOG_WRITE, OSError."""
+    new = Replacement(path)
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        yield new.file
+        new.finish()
     finally:
-        part.unlink(missing_ok=True)
+        new.discard()
+
+
+@contextlib.contextmanager
+def folder_beside(path: Path) -> Generator[Path]:
+    """A folder beside `path` that is ours alone, for files on their way there; it is removed at the end. Raises OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix=_hidden(path), suffix=".part", dir=path.parent))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file whole or not at all, and make its folder. Raises Fault LOG_WRITE, OSError."""
+    with replacing(path) as file:
+        file.write(text.encode("utf-8"))
 
 
 def strict_json(value: Any) -> Any:

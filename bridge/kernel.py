@@ -7,6 +7,7 @@ from typing import Any, ParamSpec, TypeVar
 import numba
 import numpy as np
 import numpy.typing as npt
+from llvmlite.binding import get_host_cpu_features
 
 from bridge.kernel_cache import FOLDER, usable_folder
 
@@ -37,6 +38,11 @@ def unlocked_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """As `kernel`, and other threads of Python go on while it runs: for calls of a millisecond and more."""
     compiled: Any = numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True)(function)
     return compiled
+
+
+def has_wide_vectors() -> bool:
+    """Whether the processor that kernels are compiled for has registers of eight float64 (AVX-512)."""
+    return bool(get_host_cpu_features().get("avx512f"))
 
 
 def record(dtype: np.dtype[Any]) -> npt.NDArray[Any]:

@@ -8,12 +8,15 @@ import hashlib
 import os
 import re
 import shutil
+import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from numba.core.caching import UserProvidedCacheLocator
+
+from bridge.plain import say
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("bridge", "controller", "plant", "diagnosis", "cockpit")
@@ -105,6 +108,26 @@ def _say(words: str) -> None:
     print(f"stickslip: {words}", file=sys.stderr, flush=True)
 
 
+def _is_ours(folder: Path) -> bool:
+    """Whether nobody else may write there: a kernel is code, and whoever can put a file there has it run in our name."""
+    seen = folder.stat()
+    return seen.st_uid == os.geteuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _private(folder: Path) -> Path:
+    """A folder of our own inside one that others may write to. Raises OSError where it is not ours either."""
+    own = folder / f"stickslip-{os.geteuid()}"
+    if not own.exists():
+        own.mkdir(mode=0o700)
+        say(
+            f"stickslip: {folder}: is another user's, or others may write there: compiled kernels are code, so they are kept in "
+            f"{own}, which is yours alone"
+        )
+    if own.is_symlink() or not _is_ours(own):
+        raise OSError(errno.EPERM, "others may write there, and to the folder of your own in it")
+    return own
+
+
 def usable_folder() -> Path:
     """The folder for compiled kernels; where none can be written, a temporary one until this process ends."""
     # not `Path.home`, which fails for a user without a home
@@ -113,7 +136,9 @@ def usable_folder() -> Path:
     try:
         if str(folder).startswith("~"):  # not expanded: a folder of that name would be made where the command is called
             raise OSError(errno.ENOENT, "its home is not known")
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not _is_ours(folder):
+            folder = _private(folder)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
         own = tempfile.mkdtemp(prefix="stickslip-kernels-")
@@ -122,6 +147,6 @@ def usable_folder() -> Path:
             f"stickslip: {folder}: {error.strerror}: compiled kernels cannot be kept, so every command compiles them anew, "
             f"which takes up to a minute; set {FOLDER} to a folder that can be written to"
         )
-        print(line, file=sys.stderr)
+        say(line)
         return Path(own)
     return folder

@@ -10,13 +10,15 @@ import typer
 
 from cockpit.commands.bench import bench_app
 from cockpit.commands.blind import blind_app
+from cockpit.commands.certs import certs
 from cockpit.commands.diagnose import diagnose
 from cockpit.commands.example import example
 from cockpit.commands.explain import explain
 from cockpit.commands.json_option import JsonGroup
 from cockpit.commands.log import log_app
+from cockpit.commands.person import arm, disarm, reset, status, stop
 from cockpit.commands.pictures import plot, reproduce, stability
-from cockpit.commands.processes import controller, operator_stop, plant, record, status
+from cockpit.commands.processes import controller, plant, record
 from cockpit.commands.replay import replay_command
 from cockpit.commands.run import run
 from cockpit.commands.scenarios import scenarios
@@ -51,8 +53,18 @@ app.command("plant")(plant)
 app.command("controller")(controller)
 app.command("record")(record)
 app.command("recorder", hidden=True)(record)  # a child is named by its role
-app.command("stop")(operator_stop)
+app.command("arm")(arm)
+app.command("disarm")(disarm)
+app.command("stop")(stop)
+app.command("reset")(reset)
 app.command("status")(status)
+app.command(
+    "certs",
+    epilog=_examples(
+        "stickslip certs ~/.config/stickslip/certificates --host rig.lab",
+        "stickslip run --endpoint tls/127.0.0.1:7447",
+    ),
+)(certs)
 app.command(
     "replay",
     epilog=_examples(

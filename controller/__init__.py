@@ -4,17 +4,19 @@ config         the controller file, checked
 records        the derived numbers (`PARAMS`) and all memory (`STATE`)
 announced      what the rig has announced of v_d
 estimate/      windows, motion, contact, learning: what drive and slide do
-vibration      the measured v_a; the slide's acceleration without it
+vibration      the measured v_a
 need           at which speeds vibration is needed, and how much
 frequency      the cheapest allowed frequency
 modes          going from one mode to another
 probe          fading out, to see whether vibration is needed at all
+failures       slips in spite of all that can be done, and that it is said
 policy         the wanted v_a
 amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
 limits         the allowed vibration
 core           one step of all of these
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
+doubts         what is wrong with what it receives; rig_header: whether the rig is one that it can control
 replay         the controller on the frames of a log
 codes          modes, states, reasons and limits as numbers
 loop_design    margins of the amplitude loop where its delay is off

@@ -8,7 +8,7 @@ logarithms). A gain that was never measured starts at a tenth of the rigid mount
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import HELD, PIEZO_WEAK
+from controller.codes import CHECKING, HELD, PIEZO_WEAK
 
 TWO_PI = 2.0 * math.pi
 REMEMBERED = 512  # steps of the command: 0.1 s of blocks of 0.25 ms
@@ -19,6 +19,11 @@ SETTLE_S = 0.004  # of vibration until a first gain is believed
 LEARN_S = 0.01  # time constant of the learnt gain; beyond it the delay's error must stay
 _HEARD = 5.0  # sigmas of the silent accelerometer from which a vibration counts as heard
 _LEAST_HEARD_MPS = 1e-7  # below it no accelerometer hears a vibration of some kHz
+_MEAN_STEPS = 50  # silent blocks that the noise is a mean of
+_FEW_STEPS = 10  # up to which the blocks before a vibration arrives count as silent as well
+# Silent blocks at which a vibration must be twice as loud. Smaller: noise is heard after the first of them, and teaches a delay
+# of nothing; at 5 that happens in 0.1 % of the first starts in the second block of a run.
+_UNSURE_STEPS = 5.0
 _LOUDER, _MUCH_LOUDER = 1.3, 2.0  # measured over wanted v_a at which the command is corrected, or cut, at once
 LOUD_S = 0.003  # for which it is louder
 SILENCE_S = 0.1  # of commands of zero until the base is taken to stand still
@@ -35,17 +40,23 @@ def listen(p: Record, s: Record) -> None:
     sent_m = s.sent_m[(at - 1 - delay) % REMEMBERED]
     expected_mps = TWO_PI * s.allowed_Hz * sent_m
     s.expected_mps += p.filter_share * (expected_mps - s.expected_mps)
-    s.silent_steps = s.silent_steps + 1 if s.allowed_m == 0.0 else 0
+    silent = s.allowed_m == 0.0 and s.guard_state != CHECKING  # the rig's own check vibrates
+    s.silent_steps = s.silent_steps + 1 if silent else 0
     if s.silent_steps > p.silence_steps:
-        s.noise_mps += 0.02 * (s.fast_mps - s.noise_mps)
+        _note_silence(s)
         s.onset_steps, s.listening = -1, 1
-    heard = s.fast_mps > max(_HEARD * s.noise_mps, _LEAST_HEARD_MPS)
+    unsure = 1.0 + _UNSURE_STEPS / max(s.noise_steps, 1)
+    heard = s.fast_mps > max(_HEARD * unsure * s.noise_mps, _LEAST_HEARD_MPS)
     if s.listening == 1 and s.allowed_m > 0.0:
         s.onset_steps += 1
         if heard:
             _note_delay(s)
+        elif s.noise_steps < _FEW_STEPS:
+            _note_silence(s)
     s.heard_steps = s.heard_steps + 1 if heard and s.listening == 0 else 0
-    if s.heard_steps < p.settle_steps or s.demodulated_Hz != s.allowed_Hz:
+    # a command that came late once may come earlier or later the next time, by half of its delay and more
+    unsteady_steps = s.loop_delay_steps // 2
+    if s.heard_steps < max(p.settle_steps, unsteady_steps) or s.demodulated_Hz != s.allowed_Hz:
         s.loud_steps = 0
         return
     i = s.candidate
@@ -53,8 +64,16 @@ def listen(p: Record, s: Record) -> None:
         s.log_gain[i], s.gain_known[i] = _bounded(math.log(s.vibration_velocity_mps / s.expected_mps)), 1
     elif s.expected_mps > 0.0 and s.vibration_velocity_mps > 0.02 * s.expected_mps * math.exp(s.log_gain[i]):
         now = math.log(s.vibration_velocity_mps / s.expected_mps)
-        s.log_gain[i] += p.learn_share * (_bounded(now) - s.log_gain[i])
+        share = min(p.learn_share, 1.0 / (1.0 + unsteady_steps))
+        s.log_gain[i] += share * (_bounded(now) - s.log_gain[i])
     _hold_down(p, s, i, expected_mps)
+
+
+@kernel
+def _note_silence(s: Record) -> None:
+    """Learn the noise of the accelerometer of a base that stands still."""
+    s.noise_steps = min(s.noise_steps + 1, _MEAN_STEPS)
+    s.noise_mps += (s.fast_mps - s.noise_mps) / s.noise_steps
 
 
 @kernel
@@ -68,7 +87,6 @@ def _note_delay(s: Record) -> None:
     if s.loop_delay_steps < 0:
         s.loop_delay_steps = s.onset_steps
     else:
-        s.delay_jitter_steps = max(0.9 * s.delay_jitter_steps, math.fabs(float(s.onset_steps - s.loop_delay_steps)))
         s.loop_delay_steps += (s.onset_steps - s.loop_delay_steps) // 2
     s.listening = 0
     # both low-passes begin here, as the delay was not known before
@@ -104,13 +122,14 @@ def amplitude(p: Record, s: Record) -> None:
         s.wanted_m = model_m * math.exp(-s.log_gain[s.candidate])
     else:
         delay_s = _UNKNOWN_DELAY_S if s.loop_delay_steps < 0 else (s.loop_delay_steps + 1) * p.block_s + SETTLE_S
-        s.growth = min(s.growth * _GROWTH ** (p.block_s / delay_s), 1.0)
+        if s.heard_steps == 0:  # what is heard is believed first: as much again is on its way
+            s.growth = min(s.growth * _GROWTH ** (p.block_s / delay_s), 1.0)
         s.wanted_m = model_m * s.growth
     largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz))
     settled = s.free_steps > s.loop_delay_steps + p.settle_steps
     tried = s.growth >= 1.0 or s.gain_known[s.candidate] == 1
     unheard = settled and tried and s.vibration_velocity_mps < 0.02 * velocity_mps
-    s.at_limit = 1 if s.wanted_m > largest_m else 0
+    s.at_limit = 1 if s.wanted_m > largest_m or unheard else 0
     weak = (s.at_limit == 1 or unheard) and s.vibration_velocity_mps < _ALARM_RATIO * s.held_mps
     _judge_piezo(p, s, weak)
 

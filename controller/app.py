@@ -7,6 +7,7 @@ from collections.abc import Callable
 from bridge.faults import Fault
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.complaints import FOREIGN
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import (
     ANNOUNCE,
@@ -21,14 +22,22 @@ from bridge.wire.topics import (
 )
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
+from controller.doubts import Doubts
 from controller.node import ControllerNode
+from controller.rig_header import refuse_another_rig
 
 # Blocks that may wait for the controller. Too small: a short pause loses blocks. Larger: commands answer older blocks.
 # A step with its messages takes 0.04 ms (median of Trace.lateness_ns), so 256 blocks are answered within 11 ms.
 _INBOX_LIMIT = 256
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
+_GIVEN_UP_S = 30.0  # without a rig this process ends then, as long as one waits for a rig at the start
+_HEADER_S = 1.0  # longest wait for what the rig says of itself; one that says nothing costs all of it
 _TOLD_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token costs all of it
 _AT_ONCE_S = 0.05  # time for a second controller of the same moment to appear, and the period of looking again
+_SAID_AGAIN_S = 0.4  # between two answers to one word of an operator, who says it every 0.5 s until it is answered
+_MOST_SAID = 16  # answers to operators a second; a flood of words is obeyed, and answered so often
+_MOST_OWED = 15  # events that wait for the links; older ones are given up
+_LONGEST_WHO = 200  # letters of a name
 _UNSEEN = "is its transducer at the end of its range, or loose? without v_d nothing is vibrated"
 # Wait for another controller to leave. Too small: one that was killed, and whose lease of 0.1 s lasts, still refuses this one.
 _OTHER_GONE_S = 0.5
@@ -52,6 +61,7 @@ def run(
         process = _Process(config, node, bus, lockstep)
         process.prepare()
         _refuse_a_second(bus, bus_config.endpoint)
+        refuse_another_rig(bus.headers(["plant"], _HEADER_S, stop).get("plant"), config)
         granted = ""
         if lockstep:
             # Plant and controller take turns: on one core waking the other process takes a tenth of the time. Runs at the
@@ -92,8 +102,18 @@ class _Process:
         self._inbox = Inbox(_INBOX_LIMIT)
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
-        self._ended = False
-        self._unreadable = False
+        self._doubts = Doubts(node, self._inbox, self.event)
+        self._said_s: dict[str, float] = {}  # what operators were answered within the last second, and when
+        self._end_said_s: float | None = None
+        self._restarts = 0
+        self._rig_came = 0
+        self._rig_lost = ""  # why, from when it was told until blocks come again
+        self._owed: list[tuple[str, str]] = []  # events that wait until the links stand
+        self._stale = False  # told, and not yet FRESH
+        self._in_time = 0  # blocks in a row without a stale step, of those that FRESH waits for
+        self._unreadable = False  # told, and not yet FRESH
+        self._unreadable_told_s = -1.0
+        self._numbers_again = 0  # blocks in a row whose samples are numbers, since the last one that had another
 
     def prepare(self) -> None:
         """Open the publishers and listen to plant and operator."""
@@ -119,41 +139,80 @@ class _Process:
             self._answer(stop, granted)
         finally:
             self._fade_out()
+            self._doubts.complaints.tell_when_due(all_of_it=True)
         node = self._node
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
 
+    @property
+    def _ended(self) -> bool:
+        """Whether the rig said END and left; one that said so and stays is a stranger's word."""
+        return self._end_said_s is not None and not self._bus.alive("plant")
+
     def _answer(self, stop: threading.Event, granted: str) -> None:
+        self._rig_came = self._bus.came("plant")
         heard_s = time.monotonic()
         due_s = heard_s + self._stale_after_s  # the command ramps down then, unless a new block comes
         started = False
-        stale = False
+        silent = False
         while not stop.is_set() and not self._ended:
             asked_s = time.monotonic()
             received = self._inbox.get(max(due_s - asked_s, 0.0))
-            if received is not None or realtime.was_paused(asked_s, due_s):
-                heard_s = time.monotonic()
+            waited_until_s = max(asked_s, due_s)
             if received is not None:
                 if self._consume(received):  # only a new block is fresh: a rig that hangs may repeat its last block
+                    heard_s = time.monotonic()
                     due_s = heard_s + self._stale_after_s
-                    if stale:
-                        self.event("FRESH", "blocks arrive again")
-                        stale = False
+                    silent = False
+                    self._tell_fresh()
                 if received.topic is SENSORS and not started:
                     started = True
                     if not self._lockstep:
                         # now, as the plant sends its first block only when the recorder listens
                         self.event("START", granted)
+                self._doubts.look()
+            if realtime.was_paused(waited_until_s, waited_until_s):
+                self._tell_own_pause(time.monotonic() - waited_until_s)
+                heard_s = time.monotonic()
             if time.monotonic() < due_s:
                 continue
             self._mind_the_plant(heard_s)
             if started and not self._lockstep:
-                silent_blocks = 1 if stale else round(self._stale_after_s / self._block_s)
-                if not stale:
+                silent_blocks = 1 if silent else round(self._stale_after_s / self._block_s)
+                if not self._stale:
                     self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
-                stale = True
+                silent = self._stale = True
+                self._in_time = 0
                 self._ramp(silent_blocks)
             # The slew limit counts a step: once stale, one step a block period ramps as fast as with blocks.
-            due_s = time.monotonic() + (self._block_s if stale else self._stale_after_s)
+            due_s = time.monotonic() + (self._block_s if silent else self._stale_after_s)
+
+    def _tell_fresh(self) -> None:
+        """Blocks are back once as many came in time as make a silence stale."""
+        if not self._stale:
+            return
+        self._in_time += 1
+        if self._in_time * self._block_s >= self._stale_after_s:
+            self._pay()
+            self.event("FRESH", f"blocks arrive again, {self._in_time} in time")
+            self._stale = False
+
+    def _tell_own_pause(self, paused_s: float) -> None:
+        """Tell that this process itself stood still."""
+        if not self._lockstep:
+            self._stale, self._in_time = True, 0
+            text = f"this controller stood still for {paused_s:.2f} s; the rig had no command meanwhile"
+            self._tell_later("PAUSED", text)
+
+    def _tell_later(self, code: str, text: str) -> None:
+        """Tell it with FRESH, or now where no FRESH is due: links may have lapsed, and what is said before they stand is lost."""
+        self._owed = [*self._owed[-_MOST_OWED:], (code, text)]
+        if not self._stale:
+            self._pay()
+
+    def _pay(self) -> None:
+        for code, text in self._owed:
+            self.event(code, text)
+        self._owed = []
 
     def _ramp(self, silent_blocks: int) -> None:
         self._send[COMMAND.name](self._node.stale(silent_blocks).payload)
@@ -166,18 +225,24 @@ class _Process:
             time.sleep(self._block_s)
 
     def _consume(self, received: Received) -> bool:
-        """Take one message; return whether it was a block that got an answer."""
+        """Take one message; return whether it was a block that got an answer. What cannot be read is dropped and told."""
+        try:
+            return self._take(received)
+        except Fault as fault:
+            if fault.kind.code != "BAD_MESSAGE":
+                raise
+            self._doubts.unreadable(received.topic, fault)
+            return False
+
+    def _take(self, received: Received) -> bool:
         node = self._node
         if received.topic is SENSORS:
-            command = node.block(received.payload)
+            before = node.last_block
+            command = node.block(received.payload, received.arrival_ns)
             if command is not None:
                 self._send[COMMAND.name](command.payload)
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
-                self._tell_unreadable()
-                if node.slipped_unmoved:
-                    self.event(
-                        "DRIVE_UNSEEN", f"block {node.last_block}: a slip, while the drive position stands: {_UNSEEN}"
-                    )
+                self._tell_of_block(before)
             return command is not None
         if received.topic is ANNOUNCE:
             node.announcement(received.payload)
@@ -187,9 +252,27 @@ class _Process:
             self._mind(parsed(wire.Event, received.payload, PLANT_EVENT.name))
         return False
 
+    def _tell_of_block(self, before: int) -> None:
+        """Tell what the block that was just answered shows; `before` is the number of the one before it."""
+        node = self._node
+        self._tell_unreadable()
+        if node.slipped_unmoved:
+            text = f"block {node.last_block}: a slip, while the drive position stands: {_UNSEEN}"
+            self._doubts.complaints.note("DRIVE_UNSEEN", SENSORS.name, text)
+        if node.restarts != self._restarts:
+            self._restarts = node.restarts
+            text = f"block {node.last_block} after block {before}: taken up again, windows begin anew"
+            self._tell_later("RIG_RESTARTED", text)
+        if self._rig_lost:  # why is said again, as nobody heard it while the link was down
+            self._tell_later("RIG_BACK", f"blocks come again, from block {node.last_block} on; {self._rig_lost}")
+            self._rig_lost = ""
+        if self._end_said_s is not None and time.monotonic() - self._end_said_s > _PLANT_LOST_S:
+            self._end_said_s = None
+            self._doubts.complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig is there and goes on: ignored")
+
     def _mind(self, event: wire.Event) -> None:
         if event.code == "END":
-            self._ended = True
+            self._end_said_s = time.monotonic()
         elif event.code == "START" and self._lockstep and event.text != "lockstep":
             line = f"{PLANT_EVENT.name}: START says {event.text!r}: must say 'lockstep' to a controller --lockstep, which waits"
             raise Fault(
@@ -197,24 +280,33 @@ class _Process:
             )
 
     def _tell_unreadable(self) -> None:
-        if self._node.unreadable == self._unreadable:
-            return
-        self._unreadable = self._node.unreadable
-        if self._unreadable:
-            self.event("NOT_FINITE", f"block {self._node.last_block} holds a sample that is no number: ramping to zero")
-        else:
-            self.event("FRESH", "every sample is a number again")
+        """Tell of samples that are no numbers, and that they are numbers again once that lasts."""
+        if self._node.unreadable:
+            self._numbers_again = 0
+            if not self._unreadable and time.monotonic() > self._unreadable_told_s + 1.0:
+                self._unreadable, self._unreadable_told_s = True, time.monotonic()
+                text = f"block {self._node.last_block} holds a sample that is no number: ramping to zero"
+                self.event("NOT_FINITE", text)
+        elif self._unreadable:
+            self._numbers_again += 1
+            if self._numbers_again * self._block_s >= self._stale_after_s:
+                self._unreadable = False
+                self.event("FRESH", "every sample is a number again")
 
     def _obey(self, payload: bytes) -> None:
-        """Take an operator's message; an unreadable message must not stop the control, so it is ignored and told."""
-        try:
-            word = parsed(wire.Operator, payload, OPERATOR.name)
-            name = wire.Operator.Action.Name(word.action)
-        except (Fault, ValueError) as error:
-            self.event("OPERATOR", f"ignored: {error}")
-            return
+        """Take an operator's message, and say so, a repeated one once in a while. Raises Fault BAD_MESSAGE."""
+        word = parsed(wire.Operator, payload, OPERATOR.name)
+        if word.action not in wire.Operator.Action.values():
+            raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {word.action}: not known")
         self._node.operator(word.action)
-        self.event("OPERATOR", f"{name} by {word.who or 'somebody'}")
+        said = f"{wire.Operator.Action.Name(word.action)} by {word.who[:_LONGEST_WHO] or 'somebody'}"
+        now_s = time.monotonic()
+        if now_s - self._said_s.get(said, -_SAID_AGAIN_S) < _SAID_AGAIN_S:
+            return
+        self._said_s = {text: at_s for text, at_s in self._said_s.items() if now_s - at_s < 1.0}
+        if len(self._said_s) < _MOST_SAID:
+            self._said_s[said] = now_s
+            self.event("OPERATOR", said)
 
     def _send_rest(self, arrival_ns: int) -> None:
         lateness_ns = time.perf_counter_ns() - arrival_ns if arrival_ns else 0
@@ -222,6 +314,17 @@ class _Process:
             self._send[message.topic.name](message.payload)
 
     def _mind_the_plant(self, heard_s: float) -> None:
+        """Tell of a rig that went away, and give it up after half a minute; called while no block comes."""
+        if self._bus.came("plant") != self._rig_came:
+            self._rig_came = self._bus.came("plant")
+            self._node.rig_was_away()
         silent_s = time.monotonic() - heard_s
-        if silent_s > _PLANT_LOST_S and not self._bus.alive("plant"):
-            raise Fault("PEER_DIED", f"the plant left the bus; last block at {self._node.t_ns * 1e-9:.3f} s")
+        if silent_s < _PLANT_LOST_S or self._bus.alive("plant"):
+            return
+        why = "the rig left the bus" if self._bus.linked() else "the link to the rig is down"
+        text = f"{why}; last block at {self._node.block_t_ns * 1e-9:.3f} s"
+        if self._lockstep or silent_s > _GIVEN_UP_S:
+            raise Fault("PEER_DIED", f"{text}, {silent_s:.1f} s ago")
+        if not self._rig_lost:
+            self._rig_lost = f"{text} then"
+            self.event("RIG_LOST", f"{text}; waiting for it for {_GIVEN_UP_S:g} s")

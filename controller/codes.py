@@ -28,6 +28,8 @@ BLIND, CANNOT_HELP, HARMFUL, MOVING, START_OF_MOVE, SETTLING, NEEDED_BEFORE = (
         *(wire.START_OF_MOVE, wire.SETTLING, wire.NEEDED_BEFORE),
     )
 )
+NOT_ARMED = int(wire.NOT_ARMED)
+NO_GUARD, CHECKING, ARMED, ACTIVE = (int(state) for state in (wire.NO_GUARD, wire.CHECKING, wire.ARMED, wire.ACTIVE))
 
 # bits of a frame's events, as Trace.events
 BLOCK = 1

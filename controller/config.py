@@ -50,8 +50,8 @@ class PolicyConfig(Strict):
     probe_every_max_s: Positive = 600.0
     probe_fade_s: Positive = Field(default=0.5, description="Shortest time in which a probe fades out.")
     probe_hold_s: Positive = Field(default=0.5, description="Shortest time without vibration until it is not needed.")
-    # 1.00 fails on the paper's rig, 1.02 holds at some frequencies, 1.05 at all (reference: docs/method/controller.md)
-    least_ratio: Annotated[float, Field(ge=1.02, le=1.5)] = Field(default=1.05, description="Least v_a / v_d held.")
+    # 1.00 fails on the paper's rig, 1.02 holds at some frequencies, 1.05 at all where friction is even; 1.07 leaves it a margin
+    least_ratio: Annotated[float, Field(ge=1.02, le=1.5)] = Field(default=1.07, description="Least v_a / v_d held.")
     most_ratio: Annotated[float, Field(ge=1.2, le=3.0)] = Field(
         default=2.4, description="Largest v_a / v_d, after slips in spite of the vibration."
     )

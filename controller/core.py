@@ -9,13 +9,13 @@ from bridge.kernel import Record, kernel
 from controller.amplitude import FIRST_SHARE, REMEMBERED, amplitude, listen
 from controller.codes import BLOCK
 from controller.estimate.contact import contact
-from controller.estimate.learning import begin, forces, stiffness
+from controller.estimate.learning import begin, forces, spring, stiffness
 from controller.estimate.motion import drive_velocity
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, begin_anew, note_steps, push
 from controller.limits import allow
 from controller.need import way_of
 from controller.policy import decide
-from controller.vibration import burst, measure, skip
+from controller.vibration import measure, skip
 
 _STEPS_LOOK = 16  # blocks for one look at the resolution, which does not change
 _MOST_BRIDGED_BINS = 640  # 64 ms of bins of 0.1 ms: v_d is then still known from the longer windows
@@ -52,7 +52,8 @@ def step(
     if events & BLOCK:
         block: Record = sensors[0]
         s.block = block.sequence
-        usable = _is_usable(block)
+        s.run, s.guard_state = block.run, block.guard_state
+        usable = _is_usable(p, block)
         s.missing_blocks += gap_blocks if usable else gap_blocks + 1
         if usable:
             if s.missing_blocks > 0:
@@ -61,7 +62,6 @@ def step(
                 s.missing_blocks = 0
             measure(p, s, block.base_accel_mps2)
             listen(p, s)
-            s.burst_mps2 = burst(s, block.mass_accel_mps2)
             force_N = _look(p, s, block)
             decide(p, s, t_ns, force_N, p.block_s)
             amplitude(p, s)
@@ -77,6 +77,7 @@ def step(
     c.mode = s.mode
     c.limit = s.limit
     c.reason = s.reason
+    c.run = s.run
 
     t: Record = trace[0]
     t.sequence = s.steps
@@ -92,7 +93,7 @@ def step(
     t.score = s.score
     t.force_rate = s.force_rate
     t.drive_force_N = force_N
-    t.burst_mps2 = s.burst_mps2
+    t.burst_mps2 = 0.0
     t.drive_velocity_mps = s.drive_velocity_mps
     t.vibration_velocity_mps = s.vibration_velocity_mps
     t.wanted_velocity_mps = s.wanted_velocity_mps
@@ -119,7 +120,8 @@ def _begin(p: Record, s: Record) -> None:
     """What of the memory is not zero at the start."""
     begin(p, s)
     s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
-    s.level = -1
+    s.silent_steps = p.silence_steps  # nothing was ever commanded
+    s.level, s.swing_level = -1, -1
     s.growth = FIRST_SHARE
     s.demodulated_Hz = 0.0
     for way in range(2):
@@ -127,13 +129,35 @@ def _begin(p: Record, s: Record) -> None:
 
 
 @kernel
-def _is_usable(block: Record) -> bool:
-    """Whether every sample is a number: NaN or infinity would stay in the filters for ever, so such a block counts as lost."""
+def _is_usable(p: Record, block: Record) -> bool:
+    """Whether every sample is a number: NaN or infinity would stay in the filters for ever, so such a block counts as lost.
+
+    A channel that the configuration leaves out is not looked at.
+    """
     total = 0.0
     for i in range(block.drive_force_N.shape[0]):
-        total += float(block.drive_force_N[i]) + float(block.drive_position_m[i]) + float(block.mass_position_m[i])
-        total += float(block.mass_accel_mps2[i]) + float(block.base_accel_mps2[i])
+        total += float(block.drive_position_m[i]) + float(block.base_accel_mps2[i])
+        if p.use_force == 1:
+            total += float(block.drive_force_N[i])
+        if p.use_slide_position == 1:
+            total += float(block.mass_position_m[i])
     return math.isfinite(total)
+
+
+@kernel
+def _mean(p: Record, s: Record, block: Record, first: int, samples: int) -> tuple[float, float, float]:
+    """Means of force [N], slide and drive position [m] over some samples; without a force sensor the spring's own force."""
+    force_N, slide_m, drive_m = 0.0, 0.0, 0.0
+    for i in range(first, first + samples):
+        drive_m += float(block.drive_position_m[i])
+        if p.use_force == 1:
+            force_N += float(block.drive_force_N[i])
+        if p.use_slide_position == 1:
+            slide_m += float(block.mass_position_m[i])
+    force_N, slide_m, drive_m = force_N / samples, slide_m / samples, drive_m / samples
+    if p.use_force == 0:
+        force_N = spring(s, drive_m - slide_m)
+    return force_N, slide_m, drive_m
 
 
 @kernel
@@ -150,11 +174,7 @@ def _bridge(p: Record, s: Record, block: Record) -> None:
         slide_m += s.bins[SLIDE, 0, i] / BINS
         drive_m += s.bins[DRIVE, 0, i] / BINS
     samples = min(BINS * p.bin_samples, p.samples_per_block)
-    next_N, next_slide_m, next_drive_m = 0.0, 0.0, 0.0
-    for i in range(samples):
-        next_N += block.drive_force_N[i] / samples
-        next_slide_m += block.mass_position_m[i] / samples
-        next_drive_m += block.drive_position_m[i] / samples
+    next_N, next_slide_m, next_drive_m = _mean(p, s, block, 0, samples)
     apart = bins + 0.5 * BINS + 0.5 * samples / p.bin_samples
     for i in range(bins):
         share = (i + 0.5 + 0.5 * BINS) / apart
@@ -177,14 +197,10 @@ def _look(p: Record, s: Record, block: Record) -> float:
     for _ in range(p.ticks_per_block):
         tick_N = 0.0
         for _ in range(p.bins_per_tick):
-            force_N, slide_m, drive_m = 0.0, 0.0, 0.0
-            for _ in range(p.bin_samples):
-                force_N += float(block.drive_force_N[at])
-                slide_m += float(block.mass_position_m[at])
-                drive_m += float(block.drive_position_m[at])
-                at += 1
-            push(p, s, force_N / p.bin_samples, slide_m / p.bin_samples, drive_m / p.bin_samples, True)
-            tick_N += force_N / p.bin_samples
+            force_N, slide_m, drive_m = _mean(p, s, block, at, p.bin_samples)
+            at += p.bin_samples
+            push(p, s, force_N, slide_m, drive_m, True)
+            tick_N += force_N
         tick_N /= p.bins_per_tick
         total_N += tick_N
         drive_velocity(p, s, tick_s)

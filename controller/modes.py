@@ -3,7 +3,7 @@
 from bridge.kernel import Record, kernel
 from controller.codes import EXCITE, WATCH
 from controller.frequency import cheapest
-from controller.need import way_of
+from controller.need import swing_held, way_of
 
 _RETRY_S = 60.0  # until a vibration that could not help is tried again; doubles
 
@@ -15,7 +15,8 @@ def enter(s: Record, mode: int, reason: int) -> None:
         s.mode = mode
         s.mode_s = 0.0
         s.calm_s = 0.0
-        s.even_s = 0.0
+        s.even_s, s.lead, s.top = 0.0, 0.0, -1.0
+        s.unasked_s, s.wobbles = 0.0, 0
         s.roughness, s.roughness_s = 0.0, 0.0
     s.reason = reason
 
@@ -25,6 +26,7 @@ def excite(p: Record, s: Record, reason: int, ratio: float) -> None:
     """Begin, or go on, to vibrate at least at `ratio`."""
     way = way_of(s)
     s.ratio[way] = max(s.ratio[way], ratio)
+    s.swing = max(s.swing, swing_held(s.ratio[way]))  # from which the ratio falls
     if s.mode != EXCITE:
         s.waiting_s = 0.0
     enter(s, EXCITE, reason)

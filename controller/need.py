@@ -4,10 +4,15 @@ Stick-slip lives at low speed: what is needed at a speed is needed below it, and
 above. So one speed each, for each direction, holds the verdicts; a later verdict that contradicts moves the older one away.
 """
 
+import math
+
 from bridge.kernel import Record, kernel
 
 _STEP = 0.02  # of the ratio, as the edge is a cliff 0.02 to 0.04 wide
-QUIET = 0.2  # share of v_d by which the slide may be off where a vibration becomes weaker
+_MARGIN = 1.5  # of the friction over that which its swing takes
+_PACE = 0.2  # of v_d that the slide may run ahead, or lag, as the ratio changes
+_SLOW_S = 5.0  # settling time of feeds so slow that the ratio need not wait for the spring
+_FASTEST_S = 0.5  # in which the ratio changes by a factor of e, at least
 _EDGE_HELD_S = 30.0  # until an edge is tried again; doubles
 _AROUND = 1.25  # factor up and down in speed for which a verdict holds
 
@@ -53,21 +58,77 @@ def note_needless(s: Record, speed_mps: float) -> None:
 def raise_ratio(p: Record, s: Record, by: float) -> None:
     """The present v_a / v_d was too little: ask for more, and remember where the edge is."""
     way = way_of(s)
-    s.edge_ratio[way] = max(s.edge_ratio[way], s.ratio[way])
-    s.ratio[way] = min(s.ratio[way] + by, p.most_ratio)
+    before = s.ratio[way]
+    s.edge_ratio[way] = max(s.edge_ratio[way], before)
+    s.ratio[way] = min(before + by, p.most_ratio)
+    s.lead += s.ratio[way] / before - 1.0
     s.edge_held_s[way] = min(max(2.0 * s.edge_held_s[way], _EDGE_HELD_S), p.probe_every_max_s)
-    s.calm_s, s.swing = 0.0, 0.0
+    s.calm_s = 0.0
+    s.swing = swing_held(s.ratio[way])
 
 
 @kernel
-def lower_ratio(p: Record, s: Record, tick_s: float, wait_s: float) -> None:
-    """After `wait_s` without stick or slip: a step down, never onto the edge; the edge is forgotten after some time."""
+def grows(ratio: float) -> float:
+    """By how much the mean friction grows with v_s at a v_a / v_s, each over itself."""
+    above = math.sqrt(ratio * ratio - 1.0)
+    return above / (0.5 * math.pi - math.atan(above) + above)
+
+
+@kernel
+def margin(ratio: float) -> float:
+    """Share by which the mean friction at a v_a / v_s is below that at v_a = v_s, beyond which nothing holds the slide."""
+    above = math.sqrt(ratio * ratio - 1.0)
+    more = above - math.atan(above)
+    return more / (0.5 * math.pi + more)
+
+
+@kernel
+def swing_held(ratio: float) -> float:
+    """The swing of friction, over itself, that a ratio is right for."""
+    return margin(ratio) / _MARGIN
+
+
+@kernel
+def settling_s(p: Record, s: Record, force_N: float, speed_mps: float) -> float:
+    """Time in which the spring takes up what a change of v_a does to the mean friction.
+
+    Under vibration the mean friction is that without it times v_s / <|v_r|>, <|v_r|> being the mean relative speed between slide
+    and base. It grows with v_s, by 0.4 F / v_d at a ratio of 1.2, and the spring with the way, by k_d.
+    """
+    return (
+        grows(max(s.ratio[way_of(s)], p.least_ratio))
+        * math.fabs(force_N)
+        / (s.stiffness_N_per_m * max(speed_mps, p.least_feed_mps))
+        + 1e-9
+    )
+
+
+@kernel
+def is_wound_up(s: Record, settle_s: float) -> bool:
+    """Whether the slide has followed evenly: before, it lags because the spring still takes up the friction.
+
+    A feed so slow that the spring takes seconds does not wait for that.
+    """
+    return s.even_s > settle_s or settle_s > _SLOW_S
+
+
+@kernel
+def follow_swing(p: Record, s: Record, tick_s: float, settle_s: float) -> None:
+    """Bring the ratio to what the swing of the slide asks for, never onto a known edge.
+
+    The vibration damps the slide up to v_s = v_a. Friction that swings by a share of itself, while the spring's force stays,
+    is held where the mean friction is below that at v_a = v_s by more than this share.
+    """
     way = way_of(s)
     s.calm_s += tick_s
+    before = s.ratio[way]
     floor = max(p.least_ratio, s.edge_ratio[way] + _STEP) if s.edge_ratio[way] > 0.0 else p.least_ratio
-    if s.ratio[way] > floor and s.calm_s > wait_s and s.swing < QUIET:
-        s.ratio[way] = max(min(s.ratio[way] - _STEP, 0.5 * (s.ratio[way] + floor)), floor)
-        s.calm_s = 0.0
-    elif s.ratio[way] <= floor and s.swing < QUIET and s.calm_s > s.edge_held_s[way] and s.edge_ratio[way] > 0.0:
+    pace = min(_PACE * tick_s / settle_s, tick_s / _FASTEST_S)
+    if swing_held(before) < s.swing:
+        s.ratio[way] = min(before * (1.0 + pace), p.most_ratio)
+    elif is_wound_up(s, settle_s):
+        s.ratio[way] = max(min(before, floor), before * (1.0 - pace))
+    s.lead += s.ratio[way] / before - 1.0
+    if s.calm_s > s.edge_held_s[way] and s.edge_ratio[way] > 0.0 and s.ratio[way] <= floor:
         s.edge_ratio[way] -= _STEP
         s.calm_s = 0.0

@@ -5,6 +5,7 @@ from typing import Any
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.block_numbers import BlockNumbers, Verdict
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
@@ -18,18 +19,24 @@ from controller.core import step
 from controller.records import build
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 
-# Blocks that a late block may be behind, as many as the inbox holds. A block further behind comes from a rig that was restarted.
-_LATEST_BLOCKS = 256
+_ANEW_BLOCKS = 1024  # that count as lost before the first block of a rig that was restarted: every window begins anew
+_MOST_GAP_BLOCKS = 1 << 20  # lost blocks that are counted at once; more do not fit into a trace
+_WRONG_LENGTHS = (
+    3  # blocks in a row of one wrong length from which the rig's blocks have that length, and no clock jumped
+)
+_FASTEST_MPS = 100.0  # of a drive; an announcement beyond it is no velocity
 
 
 class ControllerNode:
     """The controller, stepped frame by frame.
 
-    Raises Fault BAD_MESSAGE for blocks that cannot be read or do not count up, CONFIG for blocks of another length.
+    Raises Fault BAD_MESSAGE for messages that cannot be read, CONFIG for blocks of another length.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
-        self.duplicates = 0
+        self.duplicates = 0  # blocks that came again, or after they were given up
+        self.restarts = 0  # times that the rig began anew
+        self.clock_jump_ns = 0  # of the last block: its t_ns against what its number says
         self.steps = 0
         self.t_ns = 0  # of the last frame
         self._params, self._state = build(config)
@@ -39,9 +46,10 @@ class ControllerNode:
         self._command = COMMAND_LAYOUT.blank()
         self._trace = TRACE_LAYOUT.blank()
         self._lateness_ns = self._trace["lateness_ns"]
-        self._expected = 0
-        self._block_t_ns = 0  # of the last block
+        self._numbers = BlockNumbers()
+        self.block_t_ns = 0  # of the last block
         self._length_checked = False
+        self._wrong_lengths_ns: list[int] = []
         self._operator_events = 0
         self._announced = 0  # the bit ANNOUNCED where announcements came since the last frame
         self.slipped_unmoved = False  # in the last step a slip began while the drive position stood
@@ -57,9 +65,14 @@ class ControllerNode:
         return int(self._trace[0]["limit"]) == wire.NOT_FINITE
 
     @property
+    def strays(self) -> int:
+        """Blocks whose numbers are of no rig that is known."""
+        return self._numbers.strays
+
+    @property
     def last_block(self) -> int:
-        """Number of the last block."""
-        return self._expected - 1
+        """Number of the last block; -1 before the first."""
+        return (self._numbers.expected or 0) - 1
 
     def warm_up(self) -> None:
         """Compile or load the kernels on copies, so that the first answer is not late."""
@@ -84,37 +97,62 @@ class ControllerNode:
     def announcement(self, payload: bytes) -> None:
         """Take what the rig announces of its drive; it is part of the next frame. Raises Fault BAD_MESSAGE."""
         said = ANNOUNCE_LAYOUT.read(payload, ANNOUNCE.name)[0]
+        if not abs(said.drive_velocity_mps) <= _FASTEST_MPS:
+            line = (
+                f"{ANNOUNCE.name}: drive_velocity_mps = {said.drive_velocity_mps:g}: must be at most {_FASTEST_MPS:g}"
+            )
+            raise Fault("BAD_MESSAGE", f"{line} either way; announce m/s")
+        if said.holds_from_ns < said.t_ns:
+            line = f"{ANNOUNCE.name}: holds_from_ns = {said.holds_from_ns}: must not be before t_ns = {said.t_ns}"
+            raise Fault("BAD_MESSAGE", f"{line}; announce what is to come")
         take_announcement(self._state[0], said.holds_from_ns, said.drive_velocity_mps)
         self._announced = ANNOUNCED
 
-    def block(self, payload: bytes) -> Outgoing | None:
-        """Consume a sensor block; return the command that answers it, or None for a block that is late or repeated.
+    def rig_was_away(self) -> None:
+        """The rig left the bus and came back: blocks that count from 0 again are those of a new run."""
+        self._numbers.sender_was_away()
+
+    def block(self, payload: bytes, arrival_ns: int = 0) -> Outgoing | None:
+        """Consume a sensor block; return the command that answers it, or None for a block that is late, repeated or a stranger's.
 
         Send the command first; then `rest` gives the other messages of the step.
         """
         payload = self._layout.canonical(payload, SENSORS.name)
         sequence, t_ns = sequence_and_time(payload, SENSORS.message)
-        if sequence + _LATEST_BLOCKS < self._expected:
-            line = f"{SENSORS.name}: block {sequence} after block {self._expected - 1}: must count up"
-            raise Fault("BAD_MESSAGE", f"{line}; if the rig began anew, restart the controller too")
-        if sequence < self._expected:
+        expected = self._numbers.expected
+        verdict = self._numbers.judge(sequence, arrival_ns)
+        if verdict is Verdict.AGAIN:
             self.duplicates += 1  # late or repeated: the controller has counted this block as a gap already
             return None
-        gap_blocks = sequence - self._expected if self.steps else 0
-        if self.steps and not gap_blocks and not self._length_checked:
-            self._check_length(t_ns - self._block_t_ns)
-        self._expected = sequence + 1
-        self._block_t_ns = self.t_ns = t_ns
-        sensors = self._layout.read(payload, SENSORS.name)
+        if verdict is Verdict.STRAY:
+            return None
+        if verdict is Verdict.ANEW:
+            self.restarts += 1
+            gap_blocks, self.clock_jump_ns = _ANEW_BLOCKS, 0
+        else:
+            lost = sequence - expected if expected is not None and self.steps else 0
+            gap_blocks = min(lost, _MOST_GAP_BLOCKS)
+            if expected is not None:
+                self._check_clock(t_ns - self.block_t_ns, lost)
+        self.block_t_ns = self.t_ns = t_ns
+        sensors = self._layout.record(payload)
         events = BLOCK | (GAP if gap_blocks else 0) | self._operator_events
         return self._step(sensors, events, gap_blocks)
 
-    def _check_length(self, apart_ns: int) -> None:
-        """Raise Fault CONFIG for blocks of another length: rates, filters and slopes count in blocks."""
-        if abs(apart_ns - self._block_ns) > 0.01 * self._block_ns:
+    def _check_clock(self, apart_ns: int, lost: int) -> None:
+        """Compare t_ns with the number of the block.
+
+        Raises Fault CONFIG for blocks of another length: rates, filters and slopes count in blocks.
+        """
+        off_ns = apart_ns - (lost + 1) * self._block_ns
+        self.clock_jump_ns = off_ns if 100 * abs(off_ns) > self._block_ns else 0
+        if self._length_checked or lost:
+            return
+        self._wrong_lengths_ns = [*self._wrong_lengths_ns, apart_ns][-_WRONG_LENGTHS:] if self.clock_jump_ns else []
+        self._length_checked = not self.clock_jump_ns
+        if len(self._wrong_lengths_ns) >= _WRONG_LENGTHS and len(set(self._wrong_lengths_ns)) == 1 and apart_ns > 0:
             line = f"{SENSORS.name}: blocks are {apart_ns * 1e-6:g} ms apart: must be block_s = {self._block_ns * 1e-9:g} s"
             raise Fault("CONFIG", f"{line}; set block_s of rig and controller alike")
-        self._length_checked = True
 
     def stale(self, silent_blocks: int) -> Outgoing:
         """Step without a block, `silent_blocks` periods after the last frame: the command ramps to zero."""

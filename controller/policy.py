@@ -10,6 +10,8 @@ import math
 from bridge.kernel import Record, kernel
 from controller.announced import announced_ahead
 from controller.codes import (
+    ACTIVE,
+    ARMED,
     BLIND,
     CANNOT_HELP,
     DISABLED,
@@ -19,6 +21,8 @@ from controller.codes import (
     HELD,
     MOVING,
     NEEDED_BEFORE,
+    NO_GUARD,
+    NOT_ARMED,
     NOT_ENABLED,
     NOTHING_TO_DO,
     PROBE,
@@ -31,29 +35,41 @@ from controller.codes import (
     WATCH,
 )
 from controller.config import MODES
+from controller.failures import forget_failures, note_failure
 from controller.frequency import cheapest
 from controller.modes import enter, excite, stop_helping, tune_to
 from controller.need import (
-    QUIET,
+    follow_swing,
+    grows,
     is_needed,
     is_needless,
-    lower_ratio,
+    is_wound_up,
     note_needed,
     raise_ratio,
+    settling_s,
+    swing_held,
     way_of,
 )
 from controller.probe import STEADY_S, begin_probe, probe
+from controller.wobble import LEAST_ASKED, slide_mps, slide_noise_mps, windows_for, wobble_factor
 
 TWO_PI = 2.0 * math.pi
 ON_DEMAND, WHILE_MOVING, START_ONLY, SETTLE = range(len(MODES))
 
 _STICK_STEP, _SLIP_STEP = 0.08, 0.4  # by which the ratio rises at a stick, and at a slip or a surge
+_STARTS_S, _WOUND, _AHEAD = 0.2, 0.5, 1.25  # of a move; of the force at which it slides; of the ratio meanwhile
+_BEGINS_S = 0.02  # of a move in which the spring is looked at
+_RISING = 1.05  # held over measured v_d up to which the drive does not slow down
+_ABOVE_SLIDE, _FASTEST = 1.1, 1.6  # v_a over v_s of a slide that is late, up to this share of v_d
 _TURNING_S = 0.05  # that a drive stands at most where it turns
 _STARTING_S = 0.15  # of a vibration in which the contact still lets go of what it held
-_CALM_SHARE = 3.0  # sticks, as long as expected, without an event until the ratio goes down
-_LEAST_CALM_S, _MOST_CALM_S = 0.25, 2.0
-_ROUGH = 0.4  # share of v_d by which the slide is off, from which a vibration becomes stronger before it slips
-_SWING_S = 0.5  # in which a swing is forgotten
+_CALM_SHARE = 6.0  # sticks, as long as expected, without an event until the vibration counts as one that helps
+_LEAST_CALM_S, _MOST_CALM_S = 0.5, 4.0
+_LOOK_STEPS = 16  # blocks for one look at which windows show a swing
+_LEAST_SLIDING = 0.5  # v_s over v_d of a slide whose swing tells something
+_EVEN = 0.1  # share of v_d by which the slide is off where it follows
+# Memory of a swing: two periods of the slowest that the spring does not level out; 10 s at most, as energy is lost meanwhile.
+_PERIODS, _LONGEST_S = 2.0, 10.0
 _SEEING_S = 2.0  # without being blind until it counts as seeing
 _HELPLESS = 3  # events at the limit, at one frequency, until another is tried, then until it cannot help
 _WORSE = 1.1  # roughness with vibration over that without from which the vibration is called worse
@@ -68,13 +84,16 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> N
         s.off_left_s[i] = max(s.off_left_s[i] - block_s, 0.0)
     speed_mps = math.fabs(s.drive_velocity_mps)
     ahead_mps = announced_ahead(s, t_ns, t_ns + round(1e9 * _look_ahead_s(p, s)))
-    s.wanted_speed_mps = max(s.held_mps, speed_mps, math.fabs(ahead_mps))  # at a reversal the spring is still wound up
+    s.wanted_speed_mps = max(speed_mps, s.rising_mps, math.fabs(ahead_mps))
+    sliding_mps = _still_sliding_mps(s, speed_mps)
     if s.moving == 0 and ahead_mps != 0.0:
         s.direction = 1 if ahead_mps > 0.0 else -1
         way = way_of(s)
     _note_roughness(s, speed_mps, block_s)
     if s.stopped == 1:
         enter(s, STOPPED, NOT_ENABLED)
+    elif s.guard_state not in (NO_GUARD, ARMED, ACTIVE):
+        enter(s, DISABLED, NOT_ARMED)
     elif t_ns < p.enabled_from_ns:
         enter(s, DISABLED, NOT_ENABLED)
         if s.slip_began == 1 and s.moving == 1:
@@ -85,7 +104,7 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> N
         if ahead_mps == 0.0:
             _stand(p, s)
     elif s.moving == 0 and s.mode == WATCH and s.reason != SETTLING:
-        s.reason = DRIVE_STANDS
+        s.reason = BLIND if s.blind == 1 else DRIVE_STANDS
 
     ratio = 0.0
     if s.mode == WATCH:
@@ -95,17 +114,47 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> N
     elif s.mode == PROBE:
         probe(p, s, way, speed_mps, block_s)
     if s.mode == EXCITE:
-        # v_d is measured a window late, so a drive that speeds up needs more
-        ratio = s.ratio[way] if s.steady_s > STEADY_S else max(s.ratio[way], p.v_ratio)
+        ratio = _held_ratio(p, s, way, force_N, speed_mps)
+        if s.wobbles == 1:
+            ratio = max(ratio, LEAST_ASKED) * wobble_factor(s)
     elif s.mode == PROBE:
         ratio = s.fade
     s.ratio_now = ratio
     s.wanted_velocity_mps = ratio * (s.settle_mps if s.mode == WATCH else s.wanted_speed_mps)
+    if s.mode == EXCITE:
+        s.wanted_velocity_mps = max(s.wanted_velocity_mps, _ABOVE_SLIDE * sliding_mps)
+
+
+@kernel
+def _still_sliding_mps(s: Record, speed_mps: float) -> float:
+    """Velocity of a slide that is late to follow its drive: a v_a that falls below it does not hold the slide any more."""
+    if s.steady_s > STEADY_S or s.mode != EXCITE or s.mode_s < STEADY_S:
+        return 0.0
+    if s.level < 0:
+        return s.held_mps
+    return min(math.fabs(s.sliding_mps), max(s.held_mps, _FASTEST * speed_mps))
+
+
+@kernel
+def _held_ratio(p: Record, s: Record, way: int, force_N: float, speed_mps: float) -> float:
+    """The ratio in EXCITE. v_d is measured a window late, so a drive that speeds up needs more."""
+    if s.steady_s > STEADY_S or s.held_mps > _RISING * speed_mps:
+        return s.ratio[way]
+    # more of it only where the spring is not wound up yet: a slide that is held by less runs ahead
+    if s.moved_s <= _BEGINS_S:
+        s.wound = 1 if s.direction * force_N >= _WOUND * s.slid_N[way] else 0
+    starts = s.moved_s < _STARTS_S and s.wound == 0
+    return max(s.ratio[way], p.v_ratio) * (_AHEAD if starts else 1.0)
 
 
 @kernel
 def _look_ahead_s(p: Record, s: Record) -> float:
-    """Time that a vibration takes from a command at zero to the amplitude of the largest velocity."""
+    """Time from a command to v_a: of a drive that stands to the largest amplitude, of one that moves the loop delay alone.
+
+    More v_a before its v_d lets go of a slide that is held by less.
+    """
+    if s.moving == 1:
+        return (max(s.loop_delay_steps, 0) + 1) * p.block_s
     largest_m = (
         min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz)) if s.tuned == 1 else p.amplitude_max_m
     )
@@ -134,7 +183,7 @@ def _watch(p: Record, s: Record, way: int, speed_mps: float, ahead_mps: float, b
         if ahead_mps != 0.0 and (p.mode == WHILE_MOVING or is_needed(s, math.fabs(ahead_mps))):
             excite(p, s, NEEDED_BEFORE, 0.0)
         return 0.0
-    if s.reason == DRIVE_STANDS:
+    if s.reason in (DRIVE_STANDS, BLIND):
         s.reason = NOTHING_TO_DO
     steady = s.steady_s > STEADY_S
     if s.slip_began == 1 and steady:
@@ -174,8 +223,14 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
         enter(s, WATCH, NOTHING_TO_DO)
         return
     s.waiting_s = max(s.waiting_s - block_s, 0.0)
+    forget_failures(s, block_s)
     changed = s.steady_s < STEADY_S  # a slide that lags behind, or runs on after, a change of the drive
-    begun = (s.slip_began == 1 or s.stick_began == 1) and not changed
+    # a slide that never slid evenly yet still winds up its spring, but for one that the exciter cannot let go
+    sticks = s.stick_began == 1 and (s.even_s > 0.0 or s.at_limit == 1)
+    begun = (s.slip_began == 1 or sticks) and not changed
+    if s.mode_s > starting_s and s.slip_began == 1 and changed and s.waiting_s == 0.0:
+        s.waiting_s = STEADY_S
+        note_failure(s)
     if s.mode_s > starting_s and begun and s.waiting_s == 0.0:
         if s.slip_began == 1 and s.steady_s > STEADY_S:
             note_needed(s, speed_mps)
@@ -183,17 +238,16 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
         _more(p, s, way, _SLIP_STEP if s.slip_began == 1 else _STICK_STEP)
         if s.mode != EXCITE:
             return
-    if s.level >= 0 and s.mode_s > starting_s and not changed:
-        s.swing = max(s.swing * (1.0 - block_s / _SWING_S), math.fabs(s.fine_mps / speed_mps - 1.0))
-        s.even_s = s.even_s + block_s if s.swing < QUIET else s.even_s
-        wound_up = s.even_s > _SWING_S  # before, the slide lags because the spring still takes up the friction
-        if s.swing > _ROUGH and (wound_up or s.fine_mps > speed_mps) and s.waiting_s == 0.0 and s.at_limit == 0:
-            s.waiting_s = _SWING_S
-            raise_ratio(p, s, _STICK_STEP)
-    calm_s = min(max(_CALM_SHARE * s.expected_stick_s, _LEAST_CALM_S), _MOST_CALM_S)
-    if s.contact == SMOOTH and s.mode_s > starting_s:
-        lower_ratio(p, s, block_s, calm_s)
-    if s.calm_s > 2.0 * calm_s:
+    if changed:
+        s.swing = max(s.swing, swing_held(p.v_ratio))  # another speed: from there down
+        s.even_s, s.lead, s.top = 0.0, 0.0, -1.0
+    settle_s = settling_s(p, s, force_N, speed_mps)
+    s.lead *= max(1.0 - block_s / settle_s, 0.0)
+    if s.level >= 0 and s.mode_s > starting_s and not changed and s.waiting_s == 0.0:
+        _note_swing(p, s, force_N, speed_mps, block_s, settle_s)
+    if s.contact == SMOOTH and s.mode_s > starting_s and s.wobbles == 0 and s.at_limit == 0:
+        follow_swing(p, s, block_s, settle_s)
+    if s.calm_s > min(max(_CALM_SHARE * s.expected_stick_s, _LEAST_CALM_S), _MOST_CALM_S):
         s.helpless = 0
     if p.mode in (WHILE_MOVING, START_ONLY):
         return
@@ -207,12 +261,37 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
 
 
 @kernel
+def _note_swing(p: Record, s: Record, force_N: float, speed_mps: float, block_s: float, settle_s: float) -> None:
+    """Remember the swing of friction that makes v_s swing, but for what the ratio itself or a wobble of it does."""
+    share = min(block_s / min(max(_PERIODS * TWO_PI * settle_s, _LEAST_CALM_S), _LONGEST_S), 1.0)
+    if s.steps % _LOOK_STEPS == 0 or s.swing_level < 0:
+        s.swing_level = windows_for(p, s, speed_mps)
+    if s.swing_level < 0:
+        return
+    off = slide_mps(p, s, s.swing_level, speed_mps) / speed_mps - 1.0 - s.lead
+    noise = 3.0 * slide_noise_mps(p, s, s.swing_level) / speed_mps
+    if is_wound_up(s, settle_s):
+        s.swing *= 1.0 - share
+    if math.fabs(off) < _EVEN + noise:
+        s.even_s += block_s
+        s.slid_N[way_of(s)] = s.direction * force_N
+    if s.wobbles == 1:
+        return
+    s.top = max(s.top * (1.0 - share) if s.top > 0.0 else s.top, off)
+    beyond, middle = max(off, 0.5 * (s.top - off)) - noise, 1.0 + 0.5 * (s.top + off)
+    if beyond > 0.0 and middle > _LEAST_SLIDING:
+        at_slide = max(s.ratio_now / middle, p.least_ratio)
+        s.swing = max(s.swing, beyond / middle * grows(at_slide))
+
+
+@kernel
 def _more(p: Record, s: Record, way: int, by: float) -> None:
     """The vibration does not do: more of it, then another frequency, then none."""
     if s.at_limit == 0 and s.ratio[way] < p.most_ratio:
         raise_ratio(p, s, by)
         return
     s.calm_s = 0.0
+    note_failure(s)
     s.helpless += 1
     if s.helpless == _HELPLESS and p.candidates > 1:
         tune_to(p, s, cheapest(p, s, s.ratio[way] * s.wanted_speed_mps, s.candidate))

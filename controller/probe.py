@@ -1,6 +1,9 @@
-"""The probe: fade the vibration out, no faster than the slide follows, to see whether it is needed at all.
+"""The probe: whether the vibration is needed at all.
 
-A slide that sticks, runs ahead or begins to swing on the way needs it; one that follows down to nothing does not.
+First a wobble of v_a asks whether friction falls with speed (`controller.wobble`). Only where it does not is the vibration faded
+out, no faster than the slide follows. Where the spring takes up the friction too quickly for the question, the fade itself is
+the question: a slide that sticks, runs ahead or begins to swing on the way needs the vibration, one that follows down to
+nothing does not.
 """
 
 import math
@@ -8,32 +11,62 @@ import math
 from bridge.kernel import Record, kernel
 from controller.codes import EXCITE, HELD, NOT_NEEDED, PROBE, SMOOTH, STICK, STILL_NEEDED, WATCH
 from controller.modes import enter, excite
-from controller.need import is_needed, note_needed, note_needless
+from controller.need import is_needed, note_needed, note_needless, settling_s, swing_held
+from controller.wobble import LEAST_ASKED, MOST_ASKED, begin_wobble, can_ask, friction_falls, wobble
 
 STEADY_S = 0.2  # of constant v_d before and during a probe
 _LAST = 1.02  # ratio of a fading vibration down to which the mean friction grows
 _CAUGHT_UP = 0.04  # share of v_d by which the slide may lag when the last part of a fade begins
+_BEHIND = 0.1  # the same when a question begins: before, the spring still takes up the friction
 _LAG, _SWING = 0.5, 0.2  # shares of v_d by which the slide may lag in the first part of a fade, and be off in the last
-# Friction without vibration over that at a ratio of 1.2, less 1: 0.40 with C45 and with PTFE on the paper's rig.
-_FIRST_RATIO, _TAKEN_OFF = 1.2, 0.4
-_LONGEST_RELOAD_S = 0.33
+# Settling time up to which a probe is made: it takes some ten of them, and at feeds far below the speed at which friction falls
+# the fall is too small to be told.
+_SLOWEST_S = 5.0
+_NEARLY = 0.98  # of the ratio at which it is asked
+_ASKED_FASTER = 2.0  # a fade after a wobble that found no fall of friction, over one that has to find out
 
 
 @kernel
 def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float) -> None:
-    """Begin a probe where one is due and the slide slides evenly.
-
-    The spring has to take up what the vibration took off the friction. Where that takes long the slide is stuck for long, and a
-    slide that is stuck beyond its sliding friction can only slip; so no probe is made there.
-    """
+    """Ask where a probe is due and the slide slides evenly; begin the fade after an answer that allows it."""
+    s.unasked_s += p.block_s
+    follows = s.contact == SMOOTH and s.slip_began == 0 and s.steady_s > STEADY_S and s.mode == EXCITE
+    if s.wobbles == 1:
+        if not follows:
+            s.wobbles = 0
+        elif wobble(p, s, speed_mps):
+            if friction_falls(s):
+                _still_needed(p, s, way, speed_mps)
+                s.probe_s[way] = p.probe_every_max_s  # an answer, and no trial that may have failed by chance
+                s.reason = STILL_NEEDED
+            else:
+                _fade(p, s, force_N, _ASKED_FASTER)
+        return
     every_s = max(s.probe_s[way], p.probe_every_s) if is_needed(s, speed_mps) else p.first_probe_s
-    at_first_N = math.fabs(force_N) * math.asin(1.0 / _FIRST_RATIO) / math.asin(1.0 / s.ratio[way])
-    reload_s = _TAKEN_OFF * at_first_N / (s.stiffness_N_per_m * max(speed_mps, p.least_feed_mps))
-    ready = s.contact == SMOOTH and s.calm_s > 0.1 and s.steady_s > STEADY_S
-    if s.mode_s > every_s and ready and reload_s < _LONGEST_RELOAD_S:
-        s.fade = s.ratio[way]
-        s.fade_from_N, s.fade_from_rad = math.fabs(force_N), math.asin(1.0 / s.fade)
-        enter(s, PROBE, HELD)
+    caught_up = s.fine_mps > (1.0 - _BEHIND) * speed_mps
+    if s.unasked_s < every_s or not follows or not caught_up or s.calm_s < 0.1:
+        return
+    longest_s = settling_s(p, s, force_N, speed_mps)
+    if not can_ask(p, longest_s):
+        _fade(p, s, force_N, 1.0)
+    elif s.ratio[way] < _NEARLY * LEAST_ASKED:
+        s.swing = max(s.swing, swing_held(LEAST_ASKED))  # the ratio rises to where it can be asked
+    elif s.ratio[way] < MOST_ASKED and longest_s < _SLOWEST_S:
+        begin_wobble(p, s, speed_mps, longest_s)
+
+
+@kernel
+def _fade(p: Record, s: Record, force_N: float, faster: float) -> None:
+    s.fade, s.fade_from_N = s.ratio_now, math.fabs(force_N)
+    s.fade_per_s = faster * 0.5 / p.probe_fade_s
+    enter(s, PROBE, HELD)
+
+
+@kernel
+def _still_needed(p: Record, s: Record, way: int, speed_mps: float) -> None:
+    note_needed(s, speed_mps)
+    s.probe_s[way] = min(2.0 * max(s.probe_s[way], p.probe_every_s), p.probe_every_max_s)
+    s.unasked_s = 0.0
 
 
 @kernel
@@ -45,11 +78,10 @@ def probe(p: Record, s: Record, way: int, speed_mps: float, block_s: float) -> N
     off = math.fabs(s.fine_mps - speed_mps) > _SWING * speed_mps + 3.0 * s.fine_sigma_mps
     swings = s.level >= 0 and off and (s.fade < _LAST or s.fine_mps > speed_mps)
     if s.contact == STICK or s.slip_began == 1 or swings:
-        note_needed(s, speed_mps)
-        s.probe_s[way] = min(2.0 * max(s.probe_s[way], p.probe_every_s), p.probe_every_max_s)
+        _still_needed(p, s, way, speed_mps)
         excite(p, s, STILL_NEEDED, p.v_ratio)
         return
-    s.fade = _faded(p, s, speed_mps, block_s)
+    s.fade = _faded(s, speed_mps, block_s)
     if s.fade > 0.0:
         s.mode_s = 0.0
     elif s.mode_s > max(p.probe_hold_s, 2.0 * s.expected_stick_s):
@@ -58,22 +90,22 @@ def probe(p: Record, s: Record, way: int, speed_mps: float, block_s: float) -> N
 
 
 @kernel
-def _faded(p: Record, s: Record, speed_mps: float, block_s: float) -> float:
+def _faded(s: Record, speed_mps: float, block_s: float) -> float:
     """The next ratio to v_d of a vibration that fades.
 
-    Down to 1 the mean friction grows as asin(1 / ratio), so the ratio falls as 1 / sin of an angle that grows evenly, at a rate
-    at which the drive's spring takes up the friction with the slide at half of its velocity or more: a slide that needs no
-    vibration follows. Below 1 the friction of such a slide hardly grows any more, but one that needs vibration sticks, or swings.
+    Down to 1 the mean friction grows as 1 / <|v_r|>, the mean relative speed between slide and base, so the ratio falls as the
+    spring takes up the force with the slide at half of its velocity or more: a slide that needs no vibration follows. Below 1
+    the friction of such a slide hardly grows any more, but one that needs vibration sticks, or swings.
     """
-    if s.fade >= _LAST:
-        follows = s.sliding_mps / speed_mps - (1.0 - _LAG)
-        if follows <= 0.0:
-            return s.fade
-        if s.fade == _LAST:
-            return s.fade if math.fabs(s.fine_mps - speed_mps) > _CAUGHT_UP * speed_mps else _LAST - 1e-9
-        angle = math.asin(1.0 / s.fade)
-        friction_N = s.fade_from_N * 0.5 * math.pi / s.fade_from_rad
-        climb_s = friction_N / (_LAG * s.stiffness_N_per_m * speed_mps)
-        angle += 0.5 * math.pi * block_s / max(climb_s, p.probe_fade_s) * min(follows / _LAG, 1.0)
-        return max(1.0 / math.sin(angle), _LAST) if angle < 0.5 * math.pi else _LAST
-    return max(s.fade - 0.5 * block_s / p.probe_fade_s, 0.0)
+    step = s.fade_per_s * block_s
+    if s.fade < _LAST:
+        return max(s.fade - step, 0.0)
+    follows = s.sliding_mps / speed_mps - (1.0 - _LAG)
+    if follows <= 0.0:
+        return s.fade
+    if s.fade == _LAST:
+        return s.fade if math.fabs(s.fine_mps - speed_mps) > _CAUGHT_UP * speed_mps else _LAST - 1e-9
+    above = math.sqrt(s.fade * s.fade - 1.0)
+    per_ratio = above / s.fade / (math.asin(1.0 / s.fade) + above)  # of <|v_r|>, over itself
+    share = _LAG * s.stiffness_N_per_m * speed_mps / s.fade_from_N * block_s * min(follows / _LAG, 1.0)
+    return max(s.fade - min(share / per_ratio, step), _LAST)

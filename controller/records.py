@@ -38,7 +38,13 @@ _PARAMS_FLOATS = (
     *("v_ratio", "amplitude_max_m", "velocity_max_mps", "slew_m_per_step", "frequency_min_Hz", "frequency_max_Hz"),
 )
 _PARAMS_INTS = (
-    *("samples_per_block", "bin_samples", "bins_per_tick", "ticks_per_block", "levels"),
+    *(
+        "samples_per_block",
+        "bin_samples",
+        "bins_per_tick",
+        "ticks_per_block",
+        "levels",
+    ),
     *("use_force", "use_slide_position", "mode", "enabled_from_ns", "candidates", "bands"),
     *("silence_steps", "settle_steps", "loud_steps"),
 )
@@ -70,10 +76,12 @@ STATE = np.dtype(
         ("drive_velocity_mps", "f8"),
         ("drive_velocity_sigma_mps", "f8"),
         ("held_mps", "f8"),  # |v_d|, rises at once, falls slowly
+        ("rising_mps", "f8"),  # |v_d|, ahead of its windows where it grows
         ("steady_mps", "f8"),
         ("steady_s", "f8"),  # since v_d last changed
         ("moved_s", "f8"),  # since the drive started or turned
         ("stood_s", "f8"),
+        ("rested", "i8"),  # 1 where the slide must have stood when the drive started or turned
         ("measured", "i8"),
         ("moving", "i8"),
         ("direction", "i8"),
@@ -106,13 +114,17 @@ STATE = np.dtype(
         ("taught", "f8"),
         ("taught_ratio", "f8"),
         ("taught_square", "f8"),
+        ("relaxed_m", "f8"),  # elongation at which the spring holds nothing, for a rig without a force sensor
+        ("shortest_m", "f8"),
+        ("longest_m", "f8"),
+        ("stretched", "i8"),  # 1 once an elongation was seen
+        ("dragged", "i8", (_WAYS,)),  # 1 once the slide slid that way
         ("peak_N", "f8"),  # highest force of this stick
         ("slip_from_N", "f8"),  # highest force before the last slip without vibration; 0 once the next stick began
         ("swing_N", "f8", (_WAYS,)),  # fall of the force in a slip
         ("breakaway_N", "f8", (_WAYS,)),
         ("sliding_N", "f8", (_WAYS,)),
         # vibration
-        ("burst_mps2", "f8"),
         ("phase_rad", "f8"),
         ("in_phase_mps2", "f8"),
         ("quadrature_mps2", "f8"),
@@ -129,10 +141,24 @@ STATE = np.dtype(
         ("even_s", "f8"),  # with little of it, in this mode
         ("fade", "f8"),  # ratio of a vibration that fades
         ("fade_from_N", "f8"),
-        ("fade_from_rad", "f8"),
+        ("fade_per_s", "f8"),
+        ("unasked_s", "f8"),  # of vibration since the last probe or wobble
+        ("wobbles", "i8"),  # whether v_a wobbles
+        ("wobble_level", "i8"),  # windows that show the answer
+        ("wobble_s", "f8"),
+        ("wobble_period_s", "f8"),
+        ("wobble_a", "f8", (3,)),  # v_a: in step, a quarter of a period later, mean
+        ("wobble_v", "f8", (3,)),  # v_s, likewise
+        ("lead", "f8"),  # share of v_d by which the slide is ahead because the ratio rises
+        ("swing_level", "i8"),  # windows that show a swing; -1 for none
+        ("wound", "i8"),  # whether the spring was wound up at the begin of this move
+        ("slid_N", "f8", (_WAYS,)),  # force at which the vibrated slide followed
+        ("top", "f8"),  # largest share of v_d by which it was ahead, forgotten in time; -1 for a slide that stands
         ("settle_left_s", "f8"),
         ("settle_mps", "f8"),
         ("helpless", "i8"),
+        ("failed", "i8"),  # times that the most vibration did not do
+        ("failed_left_s", "f8"),  # until that is forgotten
         ("roughness", "f8"),
         ("roughness_s", "f8"),
         ("rough_with", "f8", (_WAYS,)),
@@ -159,7 +185,8 @@ STATE = np.dtype(
         ("sent_m", "f8", (REMEMBERED,)),
         ("was_wanted_mps", "f8", (REMEMBERED,)),
         ("expected_mps", "f8"),
-        ("noise_mps", "f8"),
+        ("noise_mps", "f8"),  # of the base that stands still, mean
+        ("noise_steps", "i8"),  # that it is known from
         ("silent_steps", "i8"),
         ("listening", "i8"),
         ("onset_steps", "i8"),
@@ -167,7 +194,6 @@ STATE = np.dtype(
         ("loud_steps", "i8"),
         ("cut_steps", "i8"),
         ("loop_delay_steps", "i8"),  # -1 while unknown
-        ("delay_jitter_steps", "f8"),
         ("at_limit", "i8"),
         ("weak_s", "f8"),  # for which the piezo was too weak; below 0: for which it was not
         # limits
@@ -184,6 +210,8 @@ STATE = np.dtype(
         # bookkeeping
         ("steps", "i8"),
         ("block", "i8"),
+        ("run", "u8"),
+        ("guard_state", "i8"),
         ("missing_blocks", "i8"),  # lost blocks since the last usable block
     ],
     align=True,

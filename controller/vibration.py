@@ -1,8 +1,6 @@
-"""The vibration as the accelerometers measure it: the delivered v_a, and the slide's own acceleration without it."""
+"""The vibration as the accelerometer of the base measures it: the delivered v_a."""
 
 import math
-
-import numpy as np
 
 from bridge.kernel import Record, kernel
 
@@ -68,15 +66,3 @@ def _velocity(p: Record, frequency_Hz: float, in_phase_mps2: float, quadrature_m
 def skip(p: Record, s: Record, blocks: int) -> None:
     """Turn the demodulator's phase through lost blocks, during which the exciter went on."""
     s.phase_rad = (s.phase_rad + TWO_PI * s.allowed_Hz * p.block_s * blocks) % TWO_PI
-
-
-@kernel
-def burst(s: Record, mass_accel_mps2: Record) -> float:
-    """Rms of the slide's acceleration over the block [m/s2]; 0 while vibrating, when it shows the exciter."""
-    if s.allowed_m > 0.0:
-        return 0.0
-    total = 0.0
-    for i in range(mass_accel_mps2.shape[0]):
-        value = np.float64(mass_accel_mps2[i])  # numba's float() of a float32 stays one
-        total += value * value
-    return math.sqrt(total / mass_accel_mps2.shape[0])

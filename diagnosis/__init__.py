@@ -9,6 +9,7 @@ evidence/      a folder of measured runs, read strictly
 features/      a run as numbers that do not depend on the instants of its slips
 model/         prediction of one run under the commands of that run, as its sensors would show it
 gap/           measured features against predicted features, in noise floors
+relations/     relations between channels as regressions over all samples, without a simulation
 hypotheses/    nuisances, effects in every form, and the points where their fits start
 fits/          refits: one, many at once, the search over all
 verdict/       whether there is a gap, which effect closes it, how sure that is, and the check on held-out runs

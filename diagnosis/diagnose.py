@@ -1,6 +1,7 @@
 """The whole way from an evidence to a diagnosis.
 
-Fit the baseline, look for a gap, find the effects, check them on held-out runs, put the answer together.
+Search the relations between channels, fit the baseline, look for a gap, find the effects, check them on held-out runs and against
+the relations, put the answer together.
 """
 
 import time
@@ -12,8 +13,12 @@ from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import PIEZO_EFFECTS, Problem
 from diagnosis.hypotheses.trials import trials
 from diagnosis.processes import one_thread
+from diagnosis.relations.answer import relations_of
+from diagnosis.relations.decide import decision_of
 from diagnosis.report.assemble import assembled
+from diagnosis.report.relations_block import in_a_line, with_relations
 from diagnosis.result import Diagnosis
+from diagnosis.verdict.by_relations import Closed, in_view_of
 from diagnosis.verdict.confirmation import borne_out
 from diagnosis.verdict.judge import Verdict, although_outside
 from diagnosis.verdict.selection import Contest, Progress
@@ -37,16 +42,26 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
 def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     began = time.monotonic()
     runs = prepare(evidence)
+    relations = relations_of(evidence.rig, runs)
+    decision = decision_of(relations)
+    if told := in_a_line(decision):
+        progress(told, 0.02)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
     tried = trials(problem)
     contest = Contest(retuned_rig(evidence, problem, progress, jobs), tried, jobs)
     contest.decide(progress)
     held_out = [run for run in runs if run.holdout]
     outcome = borne_out(contest, Problem(evidence.rig, held_out) if held_out else None, jobs)
-    verdict = with_vibration_findings(outcome.verdict, evidence.runs)
+    nearest = outcome.gone or outcome.verdict.runner_up
+    closes = (
+        outcome.held_out.closed_by(nearest).shrinkage if outcome.held_out is not None and nearest is not None else None
+    )
+    verdict = in_view_of(outcome.verdict, decision, [*contest.singles, *contest.pairs], Closed(nearest, closes))
+    verdict = with_vibration_findings(verdict, evidence.runs)
     outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
     progress(f"verdict: {outcome.verdict.kind}", 0.8)
-    return assembled(evidence, runs, contest, outcome, tried, began, jobs)
+    done = assembled(evidence, runs, contest, outcome, tried, began, jobs)
+    return with_relations(done, evidence.rig, runs, relations, decision)
 
 
 def with_vibration_findings(verdict: Verdict, runs: Sequence[Run]) -> Verdict:

@@ -18,6 +18,8 @@ from joblib.externals.loky import BrokenProcessPool
 
 from bridge.faults import Fault
 from bridge.files import shown
+from bridge.wire import certificates
+from bridge.wire.bus_config import is_loopback
 from diagnosis.evidence.folder import Evidence, load_evidence
 from diagnosis.evidence.manifest import MANIFEST
 from diagnosis.result import Diagnosis
@@ -67,24 +69,29 @@ def real_diagnose(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosi
 
 
 def diagnose_many(
-    sources: Iterable[EvidenceFolder], jobs: int, cluster: str = "", diagnose: Diagnose = real_diagnose
+    sources: Iterable[EvidenceFolder],
+    jobs: int,
+    cluster: str = "",
+    diagnose: Diagnose = real_diagnose,
+    certs: str = "",
 ) -> Generator[FolderResult]:
     """Yield the result of every source, in the order in which they finish.
 
     A folder that cannot be diagnosed, or that kills its worker again and again, yields a fault and stops no other folder. Closing
     the generator, or Ctrl-C, ends the local workers; a cluster drops the folders that it has not begun.
 
-    Raises Fault NO_PEER or CONFIG for the cluster.
+    Raises Fault NO_PEER, CONFIG or NOT_SECURE for the cluster.
 
     Args:
         sources: from `find_sources`.
         jobs: processes on this computer; without effect with `cluster`.
         cluster: address of a Dask scheduler; empty: none.
         diagnose: a function at the top level of a module, so that it can be sent to a worker.
+        certs: folder of the certificates for a cluster at tls://; empty: the user's own.
 
     """
     waiting = {source.name: source for source in sources}
-    with _workers(jobs, cluster) as workers:
+    with _workers(jobs, cluster, certs) as workers:
         while waiting:
             try:
                 for outcome in workers.pool(workers.dispatched)(
@@ -128,8 +135,31 @@ class _Workers(NamedTuple):
     breakdowns: tuple[type[Exception], ...]  # the exceptions that are raised when a worker has died for good
 
 
+def _cluster_security(cluster: str, certs: str) -> Any:
+    """Dask's `Security` for a scheduler at tls://; None for one of this computer alone.
+
+    Whoever owns a scheduler, or stands between it and us, runs code here and there. Raises Fault NOT_SECURE for any other.
+    """
+    scheme, _, place = cluster.partition("://")
+    if scheme == "tcp":
+        if is_loopback(f"tcp/{place}"):
+            return None
+        line = f"--cluster {cluster}: others can reach it: must be an address of this computer alone, or tls://"
+        remedy = "make certificates with `stickslip certs FOLDER`, start scheduler and workers with cluster.pem and cluster.key"
+        raise Fault("NOT_SECURE", f"{line}; {remedy}, and use --cluster tls://{place} --certs FOLDER")
+    from distributed.security import Security  # noqa: PLC0415
+
+    own = certificates.checked(certificates.CLUSTER, certificates.folder(certs))
+    return Security(
+        tls_ca_file=str(own.authority),
+        tls_client_cert=str(own.certificate),
+        tls_client_key=str(own.key),
+        require_encryption=True,
+    )
+
+
 @contextmanager
-def _workers(jobs: int, cluster: str) -> Generator[_Workers]:
+def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
     if not cluster:
         config = {"backend": "loky", "n_jobs": jobs, "initializer": _leave_interrupt_to_parent}
         yield _Workers(partial(_pool, config), 2 * jobs, (BrokenProcessPool,))
@@ -141,8 +171,9 @@ def _workers(jobs: int, cluster: str) -> Generator[_Workers]:
         raise Fault("CONFIG", line) from None
     if not re.fullmatch(r"(tcp|tls)://.+:\d+", cluster):  # Dask would try for 10 s, and say so with a traceback
         raise Fault("CONFIG", f"--cluster {cluster}: must be tcp://HOST:PORT; write for example tcp://127.0.0.1:8786")
+    security = _cluster_security(cluster, certs)
     try:
-        client: Any = Client(cluster, timeout=_CLUSTER_WAIT_S, set_as_default=False)
+        client: Any = Client(cluster, timeout=_CLUSTER_WAIT_S, set_as_default=False, security=security)
     except (OSError, ValueError) as error:
         line = f"--cluster {cluster}: no Dask scheduler answers ({error}); write for example tcp://127.0.0.1:8786"
         raise Fault("NO_PEER", line) from None

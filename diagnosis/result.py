@@ -1,4 +1,4 @@
-"""The answer of a diagnosis, and its JSON form (`diagnosis/1`, a fixed contract)."""
+"""The answer of a diagnosis, and its JSON form (`diagnosis/2`, a fixed contract)."""
 
 from pathlib import PurePath
 from typing import Any, Literal, NamedTuple
@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bridge.log.finding import Finding
 
 Floats = npt.NDArray[np.floating[Any]]
-FORMAT = "diagnosis/1"
+FORMAT = "diagnosis/2"
 PARAMETERS = "parameters alone"  # the baseline among what is compared on the held-out runs
 
 
@@ -103,10 +103,62 @@ class Picture(NamedTuple):
     curves: tuple[Curve, ...]
 
 
+class Share(NamedTuple):
+    """Share of what a relation shows on the held-out runs: the mean square that the baseline leaves there is 1."""
+
+    signal: str  # spring relation, motion relation, drive relation, exciter, base
+    what: str  # a cause, "noise" or "unexplained"
+    share: float
+    interval_90: tuple[float, float] | None  # None for noise
+    null_90: (
+        float | None
+    )  # what the same noise without that cause would show in 9 of 10; None for noise and unexplained
+
+
+class Remainder(NamedTuple):
+    """What no known cause explains, where it is largest."""
+
+    share: float | None  # of that relation on the held-out runs; None without such runs
+    where: str  # the relation
+    what: str  # over which variable, or in bursts; empty where nothing stands out
+    size: float  # rms
+    noise: float  # rms
+    unit: str
+
+
+class RelationRow(NamedTuple):
+    """One relation between channels, on the fitted runs; sizes are rms in `unit`."""
+
+    relation: str
+    unit: str
+    described: float  # what the rig as described leaves
+    refitted: float  # what the rig without effects leaves, refitted
+    left: float  # with the causes of the relation
+    noise: float
+    causes: tuple[str, ...]
+
+
+class LeftOut(NamedTuple):
+    """A relation that the channels do not allow."""
+
+    relation: str
+    why: str
+
+
+class RelationNumber(NamedTuple):
+    """A number of the rig table as one relation alone shows it."""
+
+    name: str
+    relation: str
+    described: float
+    refitted: float
+    interval_90: tuple[float, float]
+
+
 class Diagnosis(NamedTuple):
     """The whole answer of a diagnosis."""
 
-    verdict: Literal["effect", "no-gap", "unexplained"]
+    verdict: Literal["effect", "partly", "no-gap", "unexplained"]
     effects: tuple[str, ...]
     summary: tuple[str, ...]  # the answer in plain words, the first sentence first
     candidates: tuple[Candidate, ...]  # most probable first; every effect of the library, none and unexplained
@@ -119,6 +171,11 @@ class Diagnosis(NamedTuple):
     pictures: tuple[Picture, ...]
     compared_features: int  # number of compared features of the fitted runs, over which every chi2 is a sum
     elapsed_s: float
+    shares: tuple[Share, ...] = ()
+    remainder: Remainder | None = None
+    relations: tuple[RelationRow, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    numbers: tuple[RelationNumber, ...] = ()
 
 
 def _name(run: str) -> str:
@@ -127,7 +184,7 @@ def _name(run: str) -> str:
 
 
 def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The JSON object of the contract `diagnosis/1`; the pictures are left out.
+    """The JSON object of the contract `diagnosis/2`; the pictures are left out.
 
     A run goes by the name of its file without the suffix.
     """
@@ -152,6 +209,11 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "findings": [finding._asdict() for finding in diagnosis.findings],
         "compared_features": diagnosis.compared_features,
         "elapsed_s": round(diagnosis.elapsed_s, 2),
+        "shares": [{**one._asdict(), "interval_90": _listed(one.interval_90)} for one in diagnosis.shares],
+        "remainder": None if diagnosis.remainder is None else diagnosis.remainder._asdict(),
+        "relations": [{**one._asdict(), "causes": list(one.causes)} for one in diagnosis.relations],
+        "left_out": [one._asdict() for one in diagnosis.left_out],
+        "numbers": [{**one._asdict(), "interval_90": list(one.interval_90)} for one in diagnosis.numbers],
     }
 
 

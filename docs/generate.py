@@ -11,11 +11,13 @@ from typer.testing import CliRunner
 
 from bridge.config import Strict
 from bridge.faults import FAULTS
+from bridge.wire.event_codes import EVENTS, LETTERS
 from bridge.wire.words import words
 from cockpit import cli
 from cockpit.run.scenario import Scenario
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest import Manifest
+from docs import zenoh_files
 from plant.effects.library import EFFECTS
 from plant.effects.row import Form
 from plant.pairs import PAIRS
@@ -40,6 +42,10 @@ _FAULTS_INTRO = (
 _WORDS_INTRO = """\
 What the numbers of the columns `mode`, `state`, `reason` and `limit` of a log and of its tables mean.
 `stickslip explain reason` prints a column, `stickslip explain PIEZO_WEAK` a word."""
+_LETTERS_SAID = "; ".join(f"{letter}, {said}" for letter, said in LETTERS.items() if letter)
+_EVENTS_INTRO = f"""\
+What plant, controller and recorder say on the bus and in a log. The letter is that of NAMUR NE 107: {_LETTERS_SAID}.
+A run with an event of letter F is not good. `stickslip explain GAP` prints one, `stickslip explain event` all of them."""
 _FILES_INTRO = """\
 Keys of the TOML files, with their defaults and ranges. A misspelt key or a value out of range is an error that names file,
 key, rule and remedy. Units are in the names."""
@@ -190,6 +196,11 @@ def _faults() -> list[str]:
         ("column", "number", "word", "meaning"),
         ([f"`{one.column}`", str(one.number), f"`{one.word}`", one.help] for one in words()),
     )
+    lines += ["## Events", "", _EVENTS_INTRO, ""]
+    lines += _table(
+        ("code", "from", "NE 107", "meaning"),
+        ([f"`{one.code}`", one.sources, one.letter, one.help] for one in EVENTS.values()),
+    )
     return lines
 
 
@@ -289,6 +300,8 @@ def main() -> None:
     """Write the pages."""
     for name, text in pages().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
+    for name, text in zenoh_files.configurations().items():
+        (zenoh_files.FOLDER / name).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

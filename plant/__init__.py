@@ -24,12 +24,13 @@ pairs, effects          the friction pairs; the effects that a real rig has and 
 records                 the derived numbers (`PARAMS`) and all memory (`STATE`)
 contact, piezo          one step of friction and slide; the motion of the base
 core                    one block of contact, drive, piezo and analogue filters: `advance`, `advance_disturbed` with effects
-four_rigs*              the same for four rigs at once, in vector registers; one step of them
+four_rigs*              the same for four or eight rigs at once, in vector registers; one step of them
 sensors                 the digital half of the channels
 loop_delay              commands on their way to the exciter
 step                    one whole block with its messages
 simulate                a run without bus and sensors
 stability               the slider linearised around steady sliding
 inputs                  the drive's velocity, what is announced of it, noise and delays, block by block
+received                the commands that mean something
 node, app               the rig as a participant of the bus; the process
 """

@@ -1,24 +1,31 @@
 """The plant process: the rig on the bus, paced to the wall clock or in lockstep with the controller."""
 
-import collections
+import secrets
 import threading
 import time
-from typing import Any
 
 from bridge.faults import Fault
+from bridge.guard.codes import RESET, STOP
+from bridge.guard.latch import StopLatch
+from bridge.guard.tell import Teller
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
-from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, PLANT_EVENT, SENSORS
+from bridge.wire.complaints import Complaints
+from bridge.wire.payloads import parsed
+from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, OPERATOR, PLANT_EVENT, SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from plant.config import RigConfig
 from plant.node import PlantNode
+from plant.received import Commands
 
 PEER_TIMEOUT_S = 30.0  # a first start compiles the controller's kernels
 _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
 _GOODBYE_S = 3.0  # longest wait for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
+_LONGEST_FADE_BLOCKS = 1000  # an exciter that does not come to rest within them never will
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
+_LINKS_S = 0.5  # for links to be made again: clients dial every 20 ms
+_PAUSE_NS = 250_000_000  # a block that is due and leaves so much later: this process stood still
 
 
 def run(
@@ -30,17 +37,26 @@ def run(
     wait_for: list[str],
     lockstep: bool,
     stop: threading.Event,
+    arm: bool,
+    latch: StopLatch | None,
 ) -> int:
     """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set; how many blocks.
 
-    Raises Fault ENDPOINT_BUSY, NO_PEER, LOCKSTEP_STALLED, BAD_MESSAGE.
+    Args:
+        arm: start ARMED, as a simulated rig may whose scenario says so.
+        latch: where a person's stop is kept over restarts; None: nowhere, as in a run of `stickslip run`.
+
+    Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
+
     """
-    node = PlantNode(rig, seed)
+    why_not = latch.can_be_set() if latch is not None else ""
+    run_number = 1 if lockstep else secrets.randbits(63) | 1  # in lockstep the same run gives the same log
+    node = PlantNode(rig, seed, run_number, arm and not why_not, latch is not None and latch.is_set)
     node.warm_up()
     blocks = round(duration_s / rig.solver.block_s) if duration_s > 0 else 2**62
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
-        process = _Process(node, bus)
+        process = _Process(node, bus, latch)
         # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -50,9 +66,13 @@ def run(
         bus.announce()
         wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
         process.event("START", granted)
+        if why_not:
+            process.event(
+                "STATE_FOLDER", f"{why_not}: a stop cannot be kept over a restart, so nothing is armed by itself"
+            )
         advance = process.lockstep if lockstep else process.realtime
         advance(blocks, stop)
-        process.event("END", f"blocks={node.block}")
+        process.end()
         bus.wait_until_alone(_GOODBYE_S)  # this process relays the messages of the others, so it leaves last
     return node.block
 
@@ -68,20 +88,27 @@ def wait_for_peers(bus: Bus, endpoint: str, roles: list[str], stop: threading.Ev
 
 
 class _Process:
-    def __init__(self, node: PlantNode, bus: Bus) -> None:
+    def __init__(self, node: PlantNode, bus: Bus, latch: StopLatch | None) -> None:
         self._node = node
+        self._latch = latch
+        self._teller = Teller()
+        self._words = Inbox(16)
         self._bus = bus
-        self._commands: collections.deque[Received] = collections.deque(maxlen=64)
+        self._complaints = Complaints(self.event)
+        self._commands = Commands(self._complaints)
         self._answers = Inbox(64)
         self._events = 0
+        self._paused = ""  # what is to be told of a pause
+        self._paused_told_s = 0.0
         self._send_sensors = bus.publisher(SENSORS)
         self._send_applied = bus.publisher(APPLIED)
         self._send_announce = bus.publisher(ANNOUNCE)
         self._send_event = bus.publisher(PLANT_EVENT)
         bus.listen(COMMAND, self._receive)
+        bus.listen(OPERATOR, self._words.push)
 
     def _receive(self, received: Received) -> None:
-        self._commands.append(received)
+        self._commands.push(received)
         self._answers.push(received)
 
     def event(self, code: str, text: str) -> None:
@@ -91,50 +118,112 @@ class _Process:
         self._events += 1
         self._send_event(event.SerializeToString())
 
+    def end(self) -> None:
+        """Say that the run is over, and leave the bus as a rig: only both together end the other processes."""
+        self._complaints.tell_when_due(all_of_it=True)
+        self.event("END", f"blocks={self._node.block}")
+        self._bus.withdraw()
+
+    def _note_pause(self, late_ns: int) -> None:
+        """Note that this rig stood still: told when the links that lapsed meanwhile stand again."""
+        self._paused = f"this rig stood still for {late_ns * 1e-9:.2f} s; the blocks that were due followed at once"
+        self._paused_told_s = time.monotonic() + _LINKS_S
+
     def _announce(self) -> None:
         for message in self._node.announcements:
             self._send_announce(message.payload)
 
+    def _obey(self) -> None:
+        """Take the words of persons that came since the last block; what cannot be read is told and ignored."""
+        while (received := self._words.get_nowait()) is not None:
+            try:
+                said = parsed(wire.Operator, received.payload, OPERATOR.name)
+                name = wire.Operator.Action.Name(said.action)
+            except (Fault, ValueError) as error:
+                self.event("OPERATOR", f"ignored: {error}")
+                continue
+            self._node.obey(said.action)
+            self.event("OPERATOR", f"{name} by {said.who or 'somebody'}")
+            if self._latch is not None and said.action in (STOP, RESET):
+                # in a thread, as a slow disk must not hold up the fade
+                threading.Thread(target=self._keep_word, args=(said.action, said.who), name="latch").start()
+
+    def _keep_word(self, word: int, who: str) -> None:
+        if self._latch is None:
+            return
+        try:
+            if word == STOP:
+                self._latch.set(who)
+            else:
+                self._latch.clear()
+        except OSError as error:
+            self.event("STATE_FOLDER", f"{self._latch.path}: {error.strerror}: the word does not outlast a restart")
+
+    def _tell(self) -> None:
+        for code, text in self._teller.news(self._node.applied):
+            self.event(code, text)
+
     def realtime(self, blocks: int, stop: threading.Event) -> None:
-        """Advance one block a period under the newest command; after `stop`, until the vibration has faded."""
+        """Advance one block a period under the newest command; on every way out the vibration fades to zero first."""
+        try:
+            self._advance_to(blocks, stop)
+        finally:
+            self._fade_out()
+
+    def _fade_out(self) -> None:
+        node, pacer = self._node, realtime.Pacer(self._node.block_ns)
+        node.let_go()
+        for tick in range(_LONGEST_FADE_BLOCKS):
+            if node.at_rest:
+                return
+            late_ns = pacer.wait(tick)
+            sensors, applied = node.advance([], 0, 0, late_ns)
+            self._send_sensors(sensors.payload)
+            self._send_applied(applied.payload)
+            self._tell()
+
+    def _advance_to(self, blocks: int, stop: threading.Event) -> None:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         sent_ns = [0] * _ROUND_TRIPS_KEPT
-        fading = 0
         tick = 0
-        while node.block < blocks:
+        late_before_ns = 0
+        while node.block < blocks and not stop.is_set():
             late_ns = pacer.wait(tick)
             tick += 1
+            self._obey()
             commands: list[bytes] = []
             round_trip_ns = 0
             late_commands = 0
-            while self._commands:
-                received = self._commands.popleft()
+            for received, answered in self._commands.take(node.block):
                 commands.append(received.payload)
-                answered = int(COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0].block)
-                if 0 < node.block - answered <= _ROUND_TRIPS_KEPT:
+                if node.block - answered <= _ROUND_TRIPS_KEPT:
                     round_trip_ns = received.arrival_ns - sent_ns[answered % _ROUND_TRIPS_KEPT]
                     late_commands += round_trip_ns > _LATE_NS
-            if stop.is_set():
-                node.let_go()
-                commands = []
-                fading += 1
             sensors, applied = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
             self._announce()
             self._send_sensors(sensors.payload)
             self._send_applied(applied.payload)
-            if fading and (node.at_rest or fading > 1000):
-                return
+            self._tell()
+            self._complaints.tell_when_due()
+            if late_ns - late_before_ns > _PAUSE_NS:
+                self._note_pause(late_ns)
+            late_before_ns = late_ns
+            if self._paused and time.monotonic() > self._paused_told_s:
+                self.event("PAUSED", self._paused)
+                self._paused = ""
 
     def lockstep(self, blocks: int, stop: threading.Event) -> None:
         """Advance block by block; each block waits for the command that answers the block before."""
         node = self._node
         commands: list[bytes] = []
         while node.block < blocks and not stop.is_set():
+            self._obey()
             sensors, applied = node.advance(commands)
             self._announce()
             self._send_sensors(sensors.payload)
             self._send_applied(applied.payload)
+            self._tell()
             commands = [self._answer(node.block - 1, stop)]
 
     def _answer(self, block: int, stop: threading.Event) -> bytes:
@@ -142,8 +231,7 @@ class _Process:
         while time.monotonic() < until_s and not stop.is_set():
             received = self._answers.get(0.1)
             if received is not None:
-                command: Any = COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0]
-                if command.block == block:
+                if self._commands.answered(received, block + 1) == block:
                     return received.payload
             elif not self._bus.alive("controller"):
                 raise Fault("PEER_DIED", f"the controller left the bus; block {block} got no answer")

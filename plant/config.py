@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, in_short, read_toml, validate
+from bridge.guard.config import GuardConfig
 from plant.drive_config import DriveConfig, NotNegative, Positive
 from plant.effects.library import checked
 from plant.effects.sensors import LONGEST_DELAY
@@ -156,6 +157,7 @@ class RigConfig(Strict):
     sensors: SensorsConfig = SensorsConfig()
     solver: SolverConfig = SolverConfig()
     loop: LoopConfig = LoopConfig()
+    guard: GuardConfig = GuardConfig()
     effects: dict[str, dict[str, float | str]] = Field(default={}, description="[effects.NAME]; none: the ideal rig.")
 
     # before pydantic, which gives two errors for a value that is neither a number nor a word

@@ -1,4 +1,4 @@
-"""Four rigs through one run in the time of two (`make bench`): a refit asks for one run of many slightly different rigs.
+"""Four or eight rigs through one run side by side (`make bench`): a refit asks for one run of many slightly different rigs.
 
 They get the same commands in the same steps, so that `four_rigs_step` does each step for all of them at once. What its loops
 cannot hold, a sine of the place or a power of an age, has loops of its own here, which run only where a rig has such an effect.
@@ -19,7 +19,7 @@ from plant.effects.friction import level
 from plant.effects.friction_memory import ageing_N
 from plant.effects.piezo import heat_share, load_share
 from plant.effects.waves import TWO_PI
-from plant.four_rigs_step import LANES
+from plant.four_rigs_step import LANES, Width
 from plant.piezo import delivered_share
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -27,6 +27,7 @@ Floats = npt.NDArray[np.floating[Any]]
 
 @kernel
 def advance_lanes(
+    width: Width,
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],
     block_s: float,
@@ -39,21 +40,22 @@ def advance_lanes(
     entry_age_s: Floats,
     out: Floats,
 ) -> None:
-    """Take `LANES` rigs through one run.
+    """Take as many rigs as `width` is long through one run.
 
     Args:
+        width: of `NARROW` or of `LANES` numbers, whose values do not matter.
         params, state: records of `plant.records`, one a rig; the state is where the run begins.
         block_s: length of a block, over which the commands hold.
         drive, frequency_Hz, amplitude_m, steps: of the run, [blocks].
         entry_blocks: where each slide is put where its spring has a given force, [entries];
-        entry_force_N, entry_age_s: that force, and the age of the contact or NaN where it slides on, [entries, LANES].
+        entry_force_N, entry_age_s: that force, and the age of the contact or NaN where it slides on, [entries, rigs].
         out: filled with the means over every block of the five signals CHANNELS, then with how much the accelerations of mass
-            and base shake within a block, rms, [LANES, 7, blocks].
+            and base shake within a block, rms, [rigs, 7, blocks].
 
     """
     w = np.zeros(at.ROWS * LANES)
-    ripples = sags = settles = lags = ages = varies = False
-    for i in range(LANES):
+    ripples = sags = settles = lags = ages = varies = rough = False
+    for i in range(len(width)):
         p: Record = params[i]
         s: Record = state[i]
         w[at.M + i], w[at.K_D + i], w[at.H_D + i], w[at.K_T + i] = p.m, p.k_d, p.h_d, p.k_t
@@ -93,12 +95,16 @@ def advance_lanes(
         w[at.FORCE + i], w[at.FRAME + i], w[at.FRAME_V + i] = s.drive_N, s.frame_m, s.frame_mps
         w[at.BASE + i], w[at.BASE_V + i], w[at.ARM + i] = s.base_m, s.base_mps, s.arm_N
         w[at.AGE + i], w[at.V_LAG + i] = s.age_s, s.v_lag
+        w[at.CELL_M + i], w[at.CELL + i] = 1.0, math.inf
+        if p.roughness_ratio != 0.0 and not _varies(p):  # else `level` has it, too
+            w[at.ROUGH + i], w[at.CELL_M + i] = p.roughness_ratio, p.roughness_length_m
         ripples = ripples or p.ripple_ratio != 0.0 or p.ripple_per_N != 0.0
         sags = sags or w[at.SAG_PER_N + i] != 0.0
         settles = settles or p.drift_settling_s > 0.0
         lags = lags or p.lag_s > 0.0 or p.lag_dead_s > 0.0 or p.lag_distance_m > 0.0
         ages = ages or p.age_growth_N != 0.0
         varies = varies or _varies(p)
+        rough = rough or w[at.ROUGH + i] != 0.0
     t_s = state[0].t_s
     travelled_m = 0.0
     phi = vibrating_s = amplitude_before_m = dt_before = 0.0
@@ -106,7 +112,7 @@ def advance_lanes(
     entry = 0
     for block in range(len(drive)):
         if entry < len(entry_blocks) and entry_blocks[entry] == block:
-            _enter(w, params, drive[block], entry_force_N[entry], entry_age_s[entry])
+            _enter(w, width, params, drive[block], entry_force_N[entry], entry_age_s[entry])
             entry += 1
         samples = steps[block]
         dt = block_s / samples
@@ -126,7 +132,7 @@ def advance_lanes(
         peak_mps = target_m * omega
         peak_mps2 = peak_mps * omega
         base_mps = base_mid_mps = base_mps2 = 0.0
-        for i in range(LANES):
+        for i in range(len(width)):
             p = params[i]
             share = delivered_share(p, frequency_Hz[block]) if vibrating else 1.0
             if p.sag_settling_s > 0.0:
@@ -149,32 +155,34 @@ def advance_lanes(
                 cos_phi = cos_mid * cos_half - sin_mid * sin_half
                 sin_phi = sin_mid * cos_half + cos_mid * sin_half
             if ripples:
-                for i in range(LANES):
+                for i in range(len(width)):
                     even_m = state[i].even_m + travelled_m + 0.5 * dt * drive[block]
                     w[at.DRIVE + i] = drive[block] * unevenness(params[i], t_s + 0.5 * dt, even_m, w[at.FORCE + i])
             if settles:
-                for i in range(LANES):
+                for i in range(len(width)):
                     w[at.SETTLED + i] = -w[at.SETTLING + i] * at.gone(
                         (w[at.BEFORE_S + i] + t_s) * w[at.PER_SETTLING_S + i]
                     )
             if sags:
-                for i in range(LANES):
+                for i in range(len(width)):
                     w[at.DELIVERED + i] = w[at.SHARE + i] * load_share(w[at.SAG_PER_N + i], w[at.FORCE + i])
-            at.approach(w, dt, t_s, base_mps)
+            at.approach(w, width, dt, t_s, base_mps)
             if varies:
-                for i in range(LANES):
+                for i in range(len(width)):
                     if _varies(params[i]):
                         at_m = w[at.X + i] - w[at.BASE + i]
                         load = (w[at.LOAD_SIN + i], w[at.LOAD_COS + i])
                         w[at.LEVEL + i] = level(params[i], t_s, at_m, w[at.V_R_NOW + i], *load)
+            if rough:
+                at.roughen(w, width, params)
             if lags:
-                at.lag(w, params, state, dt, t_s)
+                at.lag(w, width, params, state, dt, t_s)
             if ages:
-                for i in range(LANES):
+                for i in range(len(width)):
                     p = params[i]
                     w[at.AGE + i] = (w[at.AGE + i] + dt) / (1.0 + math.fabs(w[at.V_R_NOW + i]) / p.age_length_m * dt)
                     w[at.AGED + i] = ageing_N(p, w[at.AGE + i]) if p.age_growth_N != 0.0 else 0.0
-            at.slide(w, dt, z_dt, base_mid_mps, base_mps2)
+            at.slide(w, width, dt, z_dt, base_mid_mps, base_mps2)
             z_dt = dt
             t_s += dt
             travelled_m += dt * drive[block]
@@ -182,7 +190,7 @@ def advance_lanes(
         if vibrating:
             phi = (phi + omega * dt * samples) % TWO_PI
             vibrating_s += block_s
-        for i in range(LANES):
+        for i in range(len(width)):
             for row in range(5):
                 out[i, row, block] = w[at.SUM_FORCE + row * LANES + i] / samples
             for row in range(2):
@@ -193,14 +201,14 @@ def advance_lanes(
 
 @kernel
 def _varies(p: Record) -> bool:
-    """Whether the friction's level depends on the place, or on chance."""
-    return p.position_ratio != 0.0 or p.roughness_ratio != 0.0 or (p.load_ratio != 0.0 and p.load_seed >= 0.0)
+    """Whether the friction's level depends on the place or the time by more than a rough surface and waves."""
+    return p.position_ratio != 0.0 or (p.load_ratio != 0.0 and p.load_seed >= 0.0)
 
 
 @kernel
-def _enter(w: Floats, params: npt.NDArray[Any], drive_mps: float, force_N: Floats, age_s: Floats) -> None:
-    """Put every slide where its spring has a force [LANES], stuck where the age [LANES] is a number."""
-    for i in range(LANES):
+def _enter(w: Floats, width: Width, params: npt.NDArray[Any], drive_mps: float, force_N: Floats, age_s: Floats) -> None:
+    """Put every slide where its spring has a force [rigs], stuck where the age [rigs] is a number."""
+    for i in range(len(width)):
         p: Record = params[i]
         w[at.FRAME + i], w[at.FRAME_V + i] = force_N[i] * p.frame_m_per_N, 0.0
         w[at.BASE + i], w[at.BASE_V + i] = force_N[i] * p.base_m_per_N, 0.0

@@ -1,4 +1,4 @@
-"""One step of four rigs, whose numbers lie side by side: all of them in one array, in rows of `LANES` at constant places.
+"""One step of four or eight rigs side by side, whose numbers are in one array, in rows of `LANES` at constant places.
 
 What makes vectors of it: loops over the lanes alone, without a branch and with no call but to plain arithmetic; an exponential of
 additions and multiplications. What a step waits for is the way from one velocity to the next: two exponentials and two divisions
@@ -13,17 +13,20 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import Record, has_wide_vectors, kernel
 from plant.effects.drive import spring_law_N
 from plant.effects.friction_memory import late_mps
-from plant.effects.waves import TWO_PI, with_second
+from plant.effects.waves import TWO_PI, lattice_value, noise_in_cell, with_second
 
 Floats = npt.NDArray[np.floating[Any]]
-# A register of AVX2. Eight take 1.9 times as long as four, and most questions are of few rigs: one in 58 % of the 372 calls of a
-# diagnosis without a gap, four at most in 76 %.
-LANES: Final = 4
+# As many numbers as there are rigs: a kernel is compiled for the length of it, as for a type.
+Width = tuple[int, ...]
+# Rigs at once: a register of AVX2 holds four, one of AVX-512 eight. With AVX2 eight rigs take 1.9 times as long as four, so there
+# is one width; with AVX-512 questions of up to four rigs stay narrow.
+NARROW: Final = 4
+LANES: Final = 8 if has_wide_vectors() else NARROW
 # The rows, by the place of their first number. Of the rig:
-ROWS: Final = 81
+ROWS: Final = 87
 _AT = range(0, ROWS * LANES, LANES)
 M, K_D, H_D, K_T, PER_K_T, H_T, H_V, F_C, F_S, PER_V_S, TAIL, AT_ONCE = _AT[:12]
 SLACK, YIELD, HARDENING, KNEE, KNEE_RATIO, RELAXING = _AT[12:18]
@@ -38,8 +41,10 @@ X, V, Z, V_R, G, S_D, FORCE, FRAME, FRAME_V, BASE, BASE_V, ARM = _AT[46:58]
 AGE, V_LAG, LOAD_SIN, LOAD_COS = _AT[58:62]
 # what one loop of a step leaves for the next:
 DRIVE, PULL, HELD, HELD_STEP, FREE, DELIVERED, V_R_NOW, LEVEL, SETTLED, V_G, LATE_FALL, AGED = _AT[62:74]
+# a rough surface: its ratio, the length of a cell of its lattice, where the slide is in cells, its cell, the noise at both ends
+ROUGH, CELL_M, AT_CELL, CELL, CELL_BEGIN, CELL_END = _AT[74:80]
 # sums over a block: the five signals, then the squares of the accelerations of mass and base
-SUM_FORCE, SUM_MASS, SUM_BASE, SUM_X, SUM_S_D, SUM_MASS_2, SUM_BASE_2 = _AT[74:81]
+SUM_FORCE, SUM_MASS, SUM_BASE, SUM_X, SUM_S_D, SUM_MASS_2, SUM_BASE_2 = _AT[80:87]
 _ROUNDS: Final = 6755399441055744.0  # 1.5 * 2^52: what is added to it becomes a whole number, in its last bits
 
 
@@ -68,9 +73,9 @@ def _spring_N(w: Floats, i: int, extension_m: float) -> float:
 
 
 @kernel
-def approach(w: Floats, dt: float, t_s: float, base_mps: float) -> None:
+def approach(w: Floats, width: Width, dt: float, t_s: float, base_mps: float) -> None:
     """The drive's force in the middle of the step, the velocity over the base, the friction's level."""
-    for i in range(LANES):
+    for i in range(len(width)):
         # the drive's force in the middle of the step
         anchor_mps = w[DRIVE + i] - w[FRAME_V + i]
         extension_m = w[S_D + i] - w[FRAME + i] - w[X + i]
@@ -94,10 +99,10 @@ def approach(w: Floats, dt: float, t_s: float, base_mps: float) -> None:
 
 
 @kernel
-def slide(w: Floats, dt: float, z_dt: float, base_mid_mps: float, base_mps2: float) -> None:
+def slide(w: Floats, width: Width, dt: float, z_dt: float, base_mid_mps: float, base_mps2: float) -> None:
     """One step of contact, slide, base and frame, as `plant.contact` and `plant.core` do it."""
     per_s = 1.0 / dt
-    for i in range(LANES):
+    for i in range(len(width)):
         # the steady friction at this velocity
         v, v_r, z = w[V + i], w[V_R_NOW + i], w[Z + i]
         backward = w[KINETIC_BACKWARD + i] if v_r < 0.0 else 0.0
@@ -189,9 +194,31 @@ def set_steps(w: Floats, p: Record, i: int, dt: float) -> None:
 
 
 @kernel
-def lag(w: Floats, params: npt.NDArray[Any], state: npt.NDArray[Any], dt: float, t_s: float) -> None:
+def roughen(w: Floats, width: Width, params: npt.NDArray[Any]) -> None:
+    """The friction's level on a rough surface, by noise as `plant.effects.waves` has it, with its sines once a cell."""
+    entered = 0
+    for i in range(len(width)):
+        at = (w[X + i] - w[BASE + i]) / w[CELL_M + i]
+        w[AT_CELL + i] = at
+        entered += math.floor(at) != w[CELL + i]
+    if entered > 0:
+        for i in range(len(width)):
+            p: Record = params[i]
+            cell = math.floor(w[AT_CELL + i])
+            if p.roughness_ratio != 0.0 and cell != w[CELL + i]:
+                w[CELL_BEGIN + i] = lattice_value(cell, p.roughness_seed)
+                w[CELL_END + i] = lattice_value(cell + 1.0, p.roughness_seed)
+            w[CELL + i] = cell
+    for i in range(len(width)):
+        noise = noise_in_cell(w[AT_CELL + i] - w[CELL + i], w[CELL_BEGIN + i], w[CELL_END + i])
+        rough = max(1.0 + w[ROUGH + i] * noise, 0.0)
+        w[LEVEL + i] = max(w[LEVEL + i] * rough, 0.01)
+
+
+@kernel
+def lag(w: Floats, width: Width, params: npt.NDArray[Any], state: npt.NDArray[Any], dt: float, t_s: float) -> None:
     """The velocity that the friction still goes by, where it lags."""
-    for i in range(LANES):
+    for i in range(len(width)):
         p: Record = params[i]
         v_r = w[V_R_NOW + i]
         if p.lag_distance_m > 0.0:

@@ -1,10 +1,15 @@
 """The rig as a participant of the bus: commands in, sensor blocks and the applied vibration out."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from bridge.faults import Fault
+from bridge.guard.codes import LEAVE
+from bridge.guard.core import accept
+from bridge.guard.senses import expect_drive
+from bridge.guard.states import obey
 from bridge.kernel_cache import compile_once
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
@@ -13,7 +18,7 @@ from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
 from plant.inputs import Inputs, RigInputs
-from plant.records import NO_COMMAND, TRUTH, build
+from plant.records import NO_COMMAND, TRUTH, build, guard_records
 from plant.step import step
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
@@ -26,14 +31,18 @@ class PlantNode:
     Args:
         config: the rig file.
         seed: seed of the sensor noise; the same seed gives the same bytes.
+        run: number that each command must carry.
+        arm: start ARMED, as only a simulated rig may.
+        stop_kept: start in FAULT, as a person's stop of an earlier run holds.
 
     """
 
-    def __init__(self, config: RigConfig, seed: int) -> None:
+    def __init__(self, config: RigConfig, seed: int, run: int = 1, arm: bool = False, stop_kept: bool = False) -> None:
         self.block_ns = round(config.solver.block_s * 1e9)
         self.block = 0  # number of the next block
         self._config = config
         self._params, self._state = build(config)
+        self._guard_params, self._guard_state = guard_records(config, run, arm, stop_kept)
         self._inputs = RigInputs(config, seed)
         samples = config.solver.samples_per_block
         self._analogue = np.empty((len(CHANNELS), samples))
@@ -53,23 +62,30 @@ class PlantNode:
         compile_once("the plant", self._step_copies)
 
     def _step_copies(self) -> None:
+        guard = self._guard_state.copy()
+        accept(self._guard_params[0], guard[0], self._command[0])
+        expect_drive(guard[0], 0.0)
+        obey(guard[0], LEAVE)
         step(
-            self._params, self._state.copy(), 0.0, self._command, 0, 0, self._drawn.noise[0], 0, 0, 0,
+            self._params, self._state.copy(), self._guard_params, guard, 0.0, self._command, 0, 0, self._drawn.noise[0], 0, 0, 0,
             self._analogue, self.truth, sensor_block(self._drawn.noise.shape[2]).blank(), APPLIED_LAYOUT.blank(),
         )  # fmt: skip
 
     def advance(
         self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
     ) -> tuple[Outgoing, Outgoing]:
-        """Advance one block under the newest of `commands`; return the sensor block and the applied vibration.
+        """Advance one block under the newest of `commands` that the guard accepts; return sensor block and applied vibration.
 
         Send `announcements` before them.
 
         Raises Fault BAD_MESSAGE when the command cannot be read, CONFIG when the state becomes NaN or infinite, so that the
         rig cannot be stepped.
         """
-        if commands:
-            self._command = COMMAND_LAYOUT.read(commands[-1], COMMAND.name)
+        accepted = 0
+        for payload in commands:
+            command = COMMAND_LAYOUT.read(payload, COMMAND.name)
+            if accept(self._guard_params[0], self._guard_state[0], command[0]):
+                self._command, accepted = command, accepted + 1
         at = self.block % _BATCH_BLOCKS
         if at == 0:
             self._drawn = self._inputs.draw(_BATCH_BLOCKS)
@@ -79,19 +95,32 @@ class PlantNode:
         self.announcements = [
             Outgoing(ANNOUNCE, announce[row : row + 1].tobytes()) for row in range(first, self._announced)
         ]
+        for row in range(first, self._announced):
+            expect_drive(self._guard_state[0], announce[row].drive_velocity_mps)
         step(
-            self._params, self._state, velocity_mps[at], self._command, len(commands), int(delay_blocks[at]), noise[at],
-            commands_late, round_trip_ns, late_ns, self._analogue, self.truth, self._sensors, self._applied,
+            self._params, self._state, self._guard_params, self._guard_state, velocity_mps[at], self._command, accepted,
+            int(delay_blocks[at]), noise[at], commands_late, round_trip_ns, late_ns, self._analogue, self.truth,
+            self._sensors, self._applied,
         )  # fmt: skip
         if not math.isfinite(self.truth[_VELOCITY, -1]):  # NaN anywhere in the state reaches the velocity within a step
             raise no_number(self._config, self.block)
         self.block += 1
         return Outgoing(SENSORS, self._sensors.tobytes()), Outgoing(APPLIED, self._applied.tobytes())
 
+    def obey(self, word: int) -> bool:
+        """Take a person's word (`wire.Operator.Action`), or LEAVE of `bridge.guard.codes`; whether it changed the state."""
+        return bool(obey(self._guard_state[0], word))
+
+    @property
+    def applied(self) -> Any:
+        """What was applied in the last block, a record of `Applied`."""
+        return self._applied[0]
+
     def let_go(self) -> None:
-        """Forget the commands in force and on their way, so that the vibration fades to zero at the piezo's own rate."""
+        """Forget the commands in force and on their way, and leave: the vibration fades to zero at the exciter's own rate."""
         self._state["command_block"] = NO_COMMAND
         self._state["line_count"] = 0
+        self.obey(LEAVE)
 
     @property
     def at_rest(self) -> bool:

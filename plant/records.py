@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bridge.guard.records import Exciter
+from bridge.guard.records import build as build_guard
 from bridge.kernel import record
 from plant.config import RigConfig, SensorsConfig
 from plant.effects.library import EFFECTS
@@ -49,7 +51,7 @@ PARAMS = np.dtype(
     + [
         (name, "i8")
         for name in (
-            *("samples_per_block", "steps_per_sample", "steps_per_stick_sample", "block_ns", "command_timeout_blocks"),
+            *("samples_per_block", "steps_per_sample", "steps_per_stick_sample", "block_ns"),
             *("disturbed", "elasto_plastic", "force_driven"),
         )
     ],
@@ -114,7 +116,6 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     for name in ("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio"):
         p[name] = getattr(piezo, name)
     p.block_ns = round(solver.block_s * 1e9)
-    p.command_timeout_blocks = round(piezo.command_timeout_s / solver.block_s)
     sample_s = solver.block_s / solver.samples_per_block
     stiffest_per_s = math.sqrt((p.k_t + p.k_d) / p.m)
     p.steps_per_stick_sample = min(max(math.ceil(stiffest_per_s * sample_s / _STICK_STEP_RAD), 1), p.steps_per_sample)
@@ -135,6 +136,23 @@ def build(config: RigConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     state[0].frequency_Hz = p.frequency_max_Hz
     state[0].command_block = NO_COMMAND
     return params, state
+
+
+def guard_records(
+    config: RigConfig, run: int, arm: bool, stop_kept: bool = False
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Parameters and memory of the rig's guard; the arguments besides the rig are those of `bridge.guard.records.build`."""
+    piezo, solver = config.piezo, config.solver
+    exciter = Exciter(
+        piezo.amplitude_max_m,
+        piezo.frequency_min_Hz,
+        piezo.frequency_max_Hz,
+        piezo.amplitude_slew_m_per_s,
+        solver.block_s,
+        solver.samples_per_block,
+        piezo.command_timeout_s,
+    )
+    return build_guard(config.guard, exciter, run, arm, stop_kept)
 
 
 def _add_effects(p: Any, config: RigConfig) -> None:

@@ -1,14 +1,13 @@
 """One block of the rig as the bus sees it: a command in, a sensor block and a message of the applied vibration out."""
 
-import math
 from typing import Any
 
 import numpy.typing as npt
 
+from bridge.guard.core import allow, look
 from bridge.kernel import Record, kernel
 from plant.core import advance, advance_disturbed
 from plant.loop_delay import receive, send
-from plant.records import NO_COMMAND
 from plant.sensors import digitise
 
 
@@ -16,6 +15,8 @@ from plant.sensors import digitise
 def step(
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],
+    guard_params: npt.NDArray[Any],
+    guard_state: npt.NDArray[Any],
     drive_velocity_mps: float,
     command: npt.NDArray[Any],
     commands: int,
@@ -33,6 +34,7 @@ def step(
 
     Args:
         params, state: one record each of `plant.records.PARAMS` and `STATE`.
+        guard_params, guard_state: one record each of `bridge.guard.records`; the guard has accepted `command`.
         drive_velocity_mps: held over the block.
         command, commands: the newest command, and the number of commands since the last block; at 0 `command` is not read.
         delay_blocks: blocks that this command takes to the exciter besides.
@@ -47,18 +49,21 @@ def step(
     if commands > 0:
         send(s, command[0], delay_blocks)
     receive(s)
-    fresh = s.command_block != NO_COMMAND and 0 <= s.block - s.command_block <= p.command_timeout_blocks
-    usable = fresh and math.isfinite(s.commanded_Hz) and math.isfinite(s.commanded_m)
-    frequency_Hz, amplitude_m = (s.commanded_Hz, s.commanded_m) if usable else (s.frequency_Hz, 0.0)
+    gp: Record = guard_params[0]
+    g: Record = guard_state[0]
+    allow(gp, g, s.command_block, s.commanded_Hz, s.commanded_m)
     if p.disturbed:
-        advance_disturbed(params, state, drive_velocity_mps, frequency_Hz, amplitude_m, analogue, truth)
+        advance_disturbed(params, state, drive_velocity_mps, g.frequency_Hz, g.amplitude_m, analogue, truth)
     else:
-        advance(params, state, drive_velocity_mps, frequency_Hz, amplitude_m, analogue, truth)
+        advance(params, state, drive_velocity_mps, g.frequency_Hz, g.amplitude_m, analogue, truth)
     t_ns = (s.block + 1) * p.block_ns
     block: Record = sensors[0]
     block.sequence = s.block
     block.t_ns = t_ns
     digitise(p, analogue, noise, block)
+    look(gp, g, block)
+    block.run = gp.run
+    block.guard_state = g.state
     a: Record = applied[0]
     a.sequence = s.block
     a.t_ns = t_ns
@@ -66,8 +71,14 @@ def step(
     a.amplitude_m = s.amplitude_m
     a.command_block = s.command_block
     a.commands = commands
-    a.fallback = 0 if usable else 1
+    a.fallback = 1 - g.fresh
     a.round_trip_ns = round_trip_ns
     a.late_ns = late_ns
     a.commands_late = commands_late
+    a.guard_state = g.state
+    a.cause = g.cause
+    a.guard_limit = g.limit
+    a.commands_refused = g.refused
+    g.refused = 0
+    a.heat_share = g.heat
     s.block += 1

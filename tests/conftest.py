@@ -1,6 +1,10 @@
 """Shared by all tests."""
 
+import atexit
+import os
+import shutil
 import signal
+import tempfile
 
 import pytest
 from hypothesis import settings
@@ -12,6 +16,9 @@ settings.register_profile("stickslip", deadline=None, derandomize=True)
 settings.load_profile("stickslip")
 # a suite that a script starts with `&` inherits an ignored SIGINT, and so would all that the tests start: Ctrl-C is tested
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# where rigs leave their passwords: a folder that is gone afterwards, with a short name as in a login
+os.environ["XDG_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="stickslip-tests-")
+atexit.register(shutil.rmtree, os.environ["XDG_RUNTIME_DIR"], ignore_errors=True)
 _NIGHTLY_S = 1800.0  # a whole diagnosis beside other work
 _REALTIME_S = 120.0  # nobody waits longer for a process: one that hangs is known soon
 

@@ -60,16 +60,16 @@ def write(path: Path, tables: Tables, run: RunData, blocks: int = 40) -> None:
     """Write messages in the order of their rows, a chunk every `blocks` of them."""
     log = RunLog(path, lockstep=True)
     for name, fields in run.headers.items():
-        log._writer.add_metadata(name, fields)
+        log._add_table(name, fields)
     for event in run.events:
-        if event.code == "START":
+        if event.code in {"START", "GUARD"}:  # both before the first block
             log.write(BY_NAME["event/plant"], event.SerializeToString())
     whole = {name: with_tags(name, table) for name, table in tables.items()}
     for start in range(0, max(len(table) for table in tables.values()), blocks):
         for name, table in whole.items():
             for record in table[start : start + blocks]:
                 log._add(BY_NAME[name], record.tobytes(), int(record["sequence"]), int(record["t_ns"]))
-        log._writer.flush()
+        log.flush()
     for event in run.events:
         if event.code == "END":
             log.write(BY_NAME["event/" + event.source], event.SerializeToString())

@@ -19,8 +19,13 @@ from diagnosis.result import (
     Estimate,
     Experiment,
     Gap,
+    LeftOut,
     Picture,
+    RelationNumber,
+    RelationRow,
+    Remainder,
     RigNumber,
+    Share,
     Shrinkage,
 )
 
@@ -141,6 +146,15 @@ def diagnosis() -> Diagnosis:
         pictures=(picture(), picture("residual")),
         compared_features=640,
         elapsed_s=21.0,
+        shares=(
+            Share("spring relation", "drive-backlash", 0.73, (0.61, 0.92), 0.12),
+            Share("spring relation", "noise", 0.25, None, None),
+            Share("spring relation", "unexplained", 0.02, (0.0, 0.05), None),
+        ),
+        remainder=Remainder(0.02, "spring relation", "over the extension", 0.046, 0.012, "N"),
+        relations=(RelationRow("spring relation", "N", 0.8, 0.3, 0.05, 0.012, ("drive-backlash",)),),
+        left_out=(LeftOut("base", "run-01.parquet has no base_accel_mps2"),),
+        numbers=(RelationNumber("drive_stiffness_N_per_m", "spring relation", 20000.0, 11697.0, (11650.0, 11744.0)),),
     )
 
 

@@ -2,7 +2,9 @@
 
 library, live            what every log begins with; whether one is being recorded
 mcap_chunks, runlog      writing in small chunks, so that a kill costs at most one chunk
+storage                  the files of a log: which they are, what is done where one fails, whether a byte was changed
 block_rows               the messages of many blocks as the bytes of a chunk
+screen                   which messages go into a log
 recorder                 the process that writes every message on the bus
 log_reader, logfile      reading without seeking, whole or cut; its topics as arrays
 chunk_messages           where the messages are in the bytes of chunks

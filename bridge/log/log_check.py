@@ -2,21 +2,26 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
-from bridge.files import check_file
 from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
+from bridge.log.in_charge import ChargeWatch
 from bridge.log.log_reader import LogReader
-from bridge.log.logfile import STREAMING, Piece, block_period_ns, iter_pieces
+from bridge.log.logfile import STREAMING, Piece, block_period_ns, check_log_file, iter_pieces
 from bridge.log.metadata import configuration_of, is_number, number_of
+from bridge.log.schema_check import schema_findings
 from bridge.log.signal_range import Signal, SignalLook
+from bridge.log.storage.chain import Chain, chain_findings
+from bridge.log.storage.parts import chain_of_log
 from bridge.log.topic_watch import TopicWatch
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.event_codes import EVENTS, FAILURE, MAINTENANCE, OUTSIDE
 from bridge.wire.messages import CHANNELS
 from bridge.wire.payloads import READABLE_VERSIONS, parsed
 from bridge.wire.topics import BY_NAME
@@ -25,6 +30,7 @@ LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the nex
 # Share of late messages from which a rig does not keep up. Smaller: every desktop is late now and then; larger: a slow controller
 # passes.
 LATE_SHARE = 0.01
+_MOST_EVENTS = 10  # of one source and code that are told one by one: a storm of them must not fill the memory
 _DEAD_S = 1.0  # a longer stretch of equal values is a dead sensor, as a live one has noise
 # the ends of a sensor's range in the rig's configuration; an acceleration's is the same both ways
 _RANGES = {
@@ -44,10 +50,12 @@ class LogCheck(NamedTuple):
     messages: dict[str, int]  # by streaming topic
     seconds: float  # of sensor blocks
     late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
+    chain: Chain  # whether the bytes are those that were written
 
     def as_dict(self) -> dict[str, Any]:
         """The result as an object for `--json`."""
-        return self._asdict() | {"findings": [finding.as_dict() for finding in self.findings]}
+        findings = [finding.as_dict() for finding in self.findings]
+        return self._asdict() | {"findings": findings, "chain": self.chain.as_dict()}
 
 
 class _Pass:
@@ -59,7 +67,9 @@ class _Pass:
         self.late = {"applied": 0, "trace": 0}
         self.period_ns = 0.0
         self.samples_per_block = 1
-        self.events: list[wire.Event] = []
+        self.charge = ChargeWatch()
+        self.events: list[wire.Event] = []  # at most 10 of a source and a code
+        self.event_counts: Counter[tuple[str, str]] = Counter()
         self.unknown: dict[str, int] = {}
 
     def add(self, piece: Piece) -> None:
@@ -72,11 +82,17 @@ class _Pass:
                     signal.add(records[name].ravel())
             counted = piece.topic in {"sensors", "applied"}
             self.topics[piece.topic].add(records, piece.log_time_ns, self.period_ns if counted else 0.0)
+            if piece.topic in {"applied", "command", "trace"}:
+                getattr(self.charge, piece.topic)(records)
             if piece.topic in self.late:
                 field = "late_ns" if piece.topic == "applied" else "lateness_ns"
                 self.late[piece.topic] += int((records[field] > LATE_NS).sum())
         elif piece.topic.startswith("event/"):
-            self.events += [parsed(wire.Event, payload, "/" + piece.topic) for payload in piece.payloads]
+            for payload in piece.payloads:
+                event = parsed(wire.Event, payload, "/" + piece.topic)
+                self.event_counts[event.source, event.code] += 1
+                if self.event_counts[event.source, event.code] <= _MOST_EVENTS:
+                    self.events.append(event)
         elif piece.topic not in BY_NAME:
             self.unknown[piece.topic] = self.unknown.get(piece.topic, 0) + len(piece.payloads)
 
@@ -86,14 +102,18 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
 
     `progress` is called with the share of the log that was read, 0 to 1.
     """
-    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+    check_log_file(path)
     reader = LogReader(path)
     seen = _Pass()
     for piece in iter_pieces(reader):
         seen.add(piece)
         if progress is not None:
             progress(reader.position_bytes / max(reader.size_bytes, 1))
-    findings = _of_file(path, reader, seen)
+    chain = chain_of_log(path)
+    findings = chain_findings(chain, path.name)
+    findings += _of_file(path, reader, seen)
+    findings += schema_findings(reader)
+    findings += seen.charge.result().findings()
     for watch in seen.topics.values():
         findings += watch.findings()
     findings += _of_configurations(reader)
@@ -108,7 +128,7 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
             findings.append(Finding("late", where, text, seen.late[where[1:]]))
     messages = {name: watch.messages for name, watch in seen.topics.items()}
     seconds = messages["sensors"] * seen.period_ns / 1e9
-    return LogCheck(str(path), findings, messages, seconds, shares)
+    return LogCheck(str(path), findings, messages, seconds, shares, chain)
 
 
 def _sample_s(seen: _Pass) -> float:
@@ -165,11 +185,20 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
         found.append(Finding("empty", path.name, "holds no sensor block"))
     for event in seen.events:
         dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
-        if event.code in {"DROPPED", "PLANT_LOST", "STALE"}:
+        # a gap is a finding of its topic already
+        if (
+            event.code in EVENTS
+            and event.code != "GAP"
+            and EVENTS[event.code].letter in {FAILURE, OUTSIDE, MAINTENANCE}
+        ):
             found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", event.text))
         elif dropped and int(dropped[1]):
             text = f"the {event.source} dropped {counted(int(dropped[1]), 'message')} because it was too slow"
             found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
+    for (source, code), times in seen.event_counts.items():
+        if times > _MOST_EVENTS and code in EVENTS and EVENTS[code].letter in {FAILURE, OUTSIDE, MAINTENANCE}:
+            text = f"{counted(times - _MOST_EVENTS, 'more event', 'more events')} of this kind"
+            found.append(Finding(code.lower().replace("_", "-"), f"/event/{source}", text, times - _MOST_EVENTS))
     plant_codes = [event.code for event in seen.events if event.source == "plant"]
     if reader.damage.closed and "START" in plant_codes and "END" not in plant_codes:
         found.append(Finding("no-end", "/event/plant", "the plant began its run and never ended it"))

@@ -22,11 +22,17 @@ from mcap.records import Channel, Chunk, Header, Metadata, Schema
 from bridge.faults import Fault
 from bridge.log.chunk_messages import Chunked, Messages, messages_of
 from bridge.log.damage import Damage
-from bridge.log.library import MAGIC, READABLE
+from bridge.log.library import HEAD, MAGIC, READABLE
+from bridge.log.storage.parts import OF_FILES, parts_of
 from bridge.wire.topics import TOPICS
 
-_HEAD = struct.Struct("<BQ")
 _LARGEST_RECORD_BYTES = 1 << 30
+# Uncompressed, of one chunk. Every writer of such logs ends a chunk at some MB at most; larger ones are made to fill a memory.
+_LARGEST_CHUNK_BYTES = 1 << 26
+# Uncompressed bytes of all chunks for a byte of the log, and what any log may have besides. Data that compress to nothing, as
+# zeros, still cost 16 bytes of index a message, so that not even a block of 200 samples of zeros reaches 200.
+_LARGEST_RATIO = 200
+_ANYWAY_BYTES = 1 << 24
 _FOOTER_BYTES = 20
 # Every chunk of this project holds "zstd" 28 bytes into its content (after two times, a size and a checksum), which is 37 bytes
 # into its record.
@@ -49,11 +55,19 @@ class _Packed(NamedTuple):
 
 
 class LogReader:
-    """One pass over a log. `damage` is complete after the pass; `metadata` and `channels` grow during it."""
+    """One pass over a log, all of its files. `damage` is complete after the pass; `metadata` and `channels` grow during it.
 
-    def __init__(self, path: Path) -> None:
+    Args:
+        path: the first file; the files that go on from it are read too.
+        alone: read no other file.
+
+    """
+
+    def __init__(self, path: Path, alone: bool = False) -> None:
         self.path = path
+        self.alone = alone
         self.damage = Damage(0, 0, closed=False)
+        self._claimed_bytes = 0  # uncompressed size of the chunks so far
         self.header: Header | None = None
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
@@ -89,24 +103,36 @@ class LogReader:
     def _chunks(self) -> Iterator[Chunked]:
         """Every chunk that is not damaged, uncompressed."""
         try:
-            # the next chunk is uncompressed while the caller works on the present one
-            with self.path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as beside:
-                self.size_bytes = self.path.stat().st_size
-                ready: _Packed | None = None
-                for packed in self._packed(file, beside):
-                    if ready is not None:
-                        yield from self._taken_out(ready)
-                    ready = packed
-                if ready is not None:
-                    yield from self._taken_out(ready)
+            paths = [self.path] if self.alone else parts_of(self.path)
+            sizes_bytes = [path.stat().st_size for path in paths]
+            self.size_bytes = sum(sizes_bytes)
+            before_bytes = 0
+            closed = True
+            for path, size_bytes in zip(paths, sizes_bytes, strict=True):
+                self.damage = self.damage._replace(closed=False)
+                yield from self._of_file(path, size_bytes, before_bytes)
+                closed &= self.damage.closed
+                before_bytes += size_bytes
+                self.position_bytes = before_bytes
+            self.damage = self.damage._replace(closed=closed)
         except OSError as error:
             raise Fault(
                 "BAD_LOG", f"{self.path}: cannot be read: {error.strerror}; give the path of a .mcap file"
             ) from None
-        self.position_bytes = self.size_bytes
         self._must_have_header()
 
-    def _taken_out(self, packed: _Packed) -> Iterator[Chunked]:
+    def _of_file(self, path: Path, size_bytes: int, before_bytes: int) -> Iterator[Chunked]:
+        # the next chunk is uncompressed while the caller works on the present one
+        with path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as beside:
+            ready: _Packed | None = None
+            for packed in self._packed(file, beside, size_bytes):
+                if ready is not None:
+                    yield from self._taken_out(ready, before_bytes)
+                ready = packed
+            if ready is not None:
+                yield from self._taken_out(ready, before_bytes)
+
+    def _taken_out(self, packed: _Packed, before_bytes: int) -> Iterator[Chunked]:
         """A chunk; nothing, but for the count, where it is damaged."""
         data = _checked(packed.chunk, packed.unpacked.result)
         if data is None:
@@ -114,32 +140,33 @@ class LogReader:
             return
         self._must_have_header()
         self._learn_channels(data)
-        self.position_bytes = packed.end_bytes
+        self.position_bytes = before_bytes + packed.end_bytes
         yield Chunked(data, packed.indexes)
 
-    def _packed(self, file: IO[bytes], beside: ThreadPoolExecutor) -> Iterator[_Packed]:
+    def _packed(self, file: IO[bytes], beside: ThreadPoolExecutor, size_bytes: int) -> Iterator[_Packed]:
         """Every chunk, while it is uncompressed."""
         if file.read(len(MAGIC)) != MAGIC:
-            line = f"{self.path}: {self.size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
+            line = f"{self.path}: {size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
             raise Fault("BAD_LOG", line)
         whole_bytes = len(MAGIC)
         packed: _Packed | None = None
         while not self.damage.closed:
-            record = _next(file, self.size_bytes - whole_bytes)
+            record = _next(file, size_bytes - whole_bytes)
             is_chunk = record is not None and _is_chunk(*record)
             if packed is not None and (record is None or is_chunk or record[0] != Opcode.MESSAGE_INDEX):
                 yield packed  # now that all of its indexes were read
                 packed = None
             if record is None:
-                start = self._after_damage(file, whole_bytes)
+                start = self._after_damage(file, whole_bytes, size_bytes)
                 if start is None:
                     break
                 whole_bytes = file.seek(start)
                 continue
             opcode, content = record
-            whole_bytes += _HEAD.size + len(content)
+            whole_bytes += HEAD.size + len(content)
             if is_chunk:
                 chunk = _opened(content)
+                self._refuse_a_bomb(chunk)
                 packed = _Packed(chunk, beside.submit(_unpacked, chunk), [], whole_bytes)
             elif opcode == Opcode.FOOTER and len(content) == _FOOTER_BYTES:
                 self.damage = self.damage._replace(closed=True)
@@ -148,13 +175,30 @@ class LogReader:
             else:
                 self._learn(opcode, content)
         if not self.damage.closed:
-            self._count(cut_bytes=self.size_bytes - whole_bytes)
+            self._count(cut_bytes=size_bytes - whole_bytes)
 
     def _count(self, cut_bytes: int = 0, bad_chunks: int = 0, bad_records: int = 0) -> None:
         now = self.damage
         self.damage = Damage(
             now.cut_bytes + cut_bytes, now.bad_chunks + bad_chunks, now.closed, now.bad_records + bad_records
         )
+
+    def _refuse_a_bomb(self, chunk: Chunk | None) -> None:
+        """Raise Fault BAD_LOG for chunks that claim more than a run of their size can hold; nothing was uncompressed then."""
+        if chunk is None or chunk.compression != "zstd":
+            return
+        self._claimed_bytes += chunk.uncompressed_size
+        most_bytes = _ANYWAY_BYTES + _LARGEST_RATIO * self.size_bytes
+        told = f"{self.path}: {self.size_bytes / 1e3:.0f} kB"
+        if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
+            rule = f"must be at most {_LARGEST_CHUNK_BYTES / 1e6:.0f} MB"
+            told += f": holds a chunk of {chunk.uncompressed_size / 1e6:.0f} MB: {rule}"
+        elif self._claimed_bytes > most_bytes:
+            rule = f"must be at most {most_bytes / 1e6:.0f} MB for a log of its size"
+            told += f": would unpack to more than {self._claimed_bytes / 1e6:.0f} MB: {rule}"
+        else:
+            return
+        raise Fault("BAD_LOG", f"{told}; it was made to fill the memory or is damaged: do not trust it")
 
     def _must_have_header(self) -> None:
         if self.header is None:
@@ -163,14 +207,14 @@ class LogReader:
             )
             raise Fault("BAD_LOG", line)
 
-    def _after_damage(self, file: IO[bytes], from_bytes: int) -> int | None:
+    def _after_damage(self, file: IO[bytes], from_bytes: int, size_bytes: int) -> int | None:
         """Start of the next whole chunk after bytes that cannot be read; None when there is none."""
-        start = _next_chunk(file, from_bytes + 1, self.size_bytes)
+        start = _next_chunk(file, from_bytes + 1, size_bytes)
         if start is not None:
             self._count(bad_records=1)
             return start
-        if self.size_bytes - from_bytes > len(MAGIC):
-            file.seek(self.size_bytes - len(MAGIC))
+        if size_bytes - from_bytes > len(MAGIC):
+            file.seek(size_bytes - len(MAGIC))
             if file.read() == MAGIC:  # only the index is damaged; everything before it was read
                 self._count(bad_records=1)
                 self.damage = self.damage._replace(closed=True)
@@ -189,7 +233,8 @@ class LogReader:
                 self.channels[channel.id] = channel
             elif opcode == Opcode.METADATA:
                 metadata = Metadata.read(stream)
-                self.metadata[metadata.name] = dict(metadata.metadata)
+                if metadata.name not in OF_FILES:
+                    self.metadata[metadata.name] = dict(metadata.metadata)
         except _UNREADABLE:
             self._count(bad_records=1)
         if opcode == Opcode.HEADER and self.header is not None and self.header.library not in READABLE:
@@ -201,9 +246,9 @@ class LogReader:
 
     def _learn_channels(self, data: bytes) -> None:
         at = 0
-        while at + _HEAD.size <= len(data) and data[at] in {Opcode.SCHEMA, Opcode.CHANNEL}:
-            opcode, length = _HEAD.unpack_from(data, at)
-            at += _HEAD.size
+        while at + HEAD.size <= len(data) and data[at] in {Opcode.SCHEMA, Opcode.CHANNEL}:
+            opcode, length = HEAD.unpack_from(data, at)
+            at += HEAD.size
             self._learn(opcode, data[at : at + length])
             at += length
 
@@ -232,18 +277,18 @@ def _next(file: IO[bytes], left_bytes: int) -> tuple[int, bytes] | None:
         left_bytes: from the present place in the file to its end.
 
     """
-    head = file.read(_HEAD.size)
-    if len(head) < _HEAD.size:
+    head = file.read(HEAD.size)
+    if len(head) < HEAD.size:
         return None
-    opcode, length = _HEAD.unpack(head)
-    if opcode == 0 or opcode > Opcode.DATA_END or length > min(left_bytes - _HEAD.size, _LARGEST_RECORD_BYTES):
+    opcode, length = HEAD.unpack(head)
+    if opcode == 0 or opcode > Opcode.DATA_END or length > min(left_bytes - HEAD.size, _LARGEST_RECORD_BYTES):
         return None
     return opcode, file.read(length)
 
 
 def _next_chunk(file: IO[bytes], from_bytes: int, size: int) -> int | None:
     """Start of the first whole chunk with a right checksum at or after `from_bytes`; None when there is none."""
-    mark_offset = _HEAD.size + _MARK_AT
+    mark_offset = HEAD.size + _MARK_AT
     at = from_bytes
     while at < size:
         file.seek(at)
@@ -264,6 +309,8 @@ def _next_chunk(file: IO[bytes], from_bytes: int, size: int) -> int | None:
 def _uncompressed(content: bytes) -> bytes | None:
     """The records of a chunk; None when its checksum or its size is wrong."""
     chunk = _opened(content)
+    if chunk is None or chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
+        return None
     return _checked(chunk, lambda: _unpacked(chunk))
 
 

@@ -1,8 +1,10 @@
 """A run log, whole or cut: its topics as arrays, at once or chunk by chunk."""
 
 import contextlib
+import os
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +17,8 @@ from bridge.log.chunk_messages import Bytes, Messages
 from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
 from bridge.log.metadata import configuration_of
+from bridge.log.storage.chain import Chain
+from bridge.log.storage.parts import chain_of_log, later_names
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, Layout, Records, sensor_block
 from bridge.wire.payloads import parsed
@@ -107,10 +111,10 @@ def _readable(topic: str, payloads: list[bytes]) -> list[int]:
 
 def block_period_ns(sensors: Records) -> float:
     """Time between two sensor blocks [ns], from their numbers and times; 1 ms where these do not show it."""
-    numbers = np.diff(sensors["sequence"].astype(np.int64))
-    forward = numbers > 0
+    numbers, steps_ns = np.diff(sensors["sequence"].astype(np.int64)), np.diff(sensors["t_ns"])
+    forward = (numbers > 0) & (steps_ns > 0)  # a clock that stands shows no period
     if forward.any():
-        return float(np.median(np.diff(sensors["t_ns"])[forward] / numbers[forward]))
+        return float(np.median(steps_ns[forward] / numbers[forward]))
     if len(sensors) and sensors["t_ns"][0] > 0:
         return float(sensors["t_ns"][0]) / (float(sensors["sequence"][0]) + 1.0)
     return 1e6
@@ -137,6 +141,7 @@ class RunData(NamedTuple):
     events: list[wire.Event]
     headers: dict[str, dict[str, str]]  # by role: schema_version, configuration, versions
     damage: Damage
+    chain: Chain  # whether the bytes are those that were written
 
     def configuration(self, role: str) -> dict[str, Any]:
         """The configuration of `role`, every default included. Raises Fault BAD_LOG when the log has none."""
@@ -170,9 +175,21 @@ class _Stack:
 
 
 def read_run(path: Path) -> RunData:
-    """Read a log, whole or cut, into memory. Raises Fault BAD_LOG when the file is not a run log of this project."""
-    check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
-    reader = LogReader(path)
+    """Read a log, whole or cut, all of its files, into memory. Raises Fault BAD_LOG when it is not a run log of this project."""
+    check_log_file(path)
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        chain = beside.submit(chain_of_log, path)
+        return _read(LogReader(path), path, chain)
+
+
+def check_log_file(path: Path) -> None:
+    """Raise Fault BAD_LOG when `path` is no file; of a lost first file of a log it names the next."""
+    later = [] if os.path.lexists(path) else later_names(path)
+    there = f"{later[0].name} beside it seems to be a later part of that log; " if later else ""
+    check_file(path, "BAD_LOG", f"{there}give the path of a run log, .mcap")
+
+
+def _read(reader: LogReader, path: Path, chain: "Future[Chain]") -> RunData:
     # joined as bytes: numpy would join the fields of the records and drop the tags between them
     stored = {name: _Stack() for name in STREAMING}
     dtypes: dict[str, np.dtype[Any]] = {name: layout.dtype for name, layout in _LAYOUTS.items()}
@@ -197,4 +214,5 @@ def read_run(path: Path) -> RunData:
         events=events,
         headers=reader.metadata,
         damage=reader.damage,
+        chain=chain.result(),
     )

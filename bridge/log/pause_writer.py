@@ -1,7 +1,6 @@
 """Writing the machine's pauses into the log that is being recorded, in the time of its run."""
 
 import time
-from collections.abc import Callable
 
 from bridge.log.pause_events import CORE_PAUSE, NOT_WATCHED, PAUSE, WATCH, in_words
 from bridge.log.runlog import RunLog
@@ -42,17 +41,16 @@ class RunClock:
 
 
 class PauseWriter:
-    """Writes the pauses that a watch sees into a log, and sends them to whoever follows the run on the bus.
+    """Writes the pauses that a watch sees into a log.
 
     Args:
-        log: the log.
-        send: sends an event of the recorder on the bus.
+        log: the log, which sends its events on the bus.
         watch: the timers.
 
     """
 
-    def __init__(self, log: RunLog, send: Callable[[bytes], None], watch: PauseWatch) -> None:
-        self._log, self._send, self._watch = log, send, watch
+    def __init__(self, log: RunLog, watch: PauseWatch) -> None:
+        self._log, self._watch = log, watch
         self._clock = RunClock()
         self._heard = 0
         self._refused = ""
@@ -91,4 +89,4 @@ class PauseWriter:
             self._tell(WATCH, NOT_WATCHED + self._refused)
 
     def _tell(self, code: str, text: str, t_ns: int | None = None) -> None:
-        self._send(self._log.add_event(code, text, t_ns).SerializeToString())
+        self._log.add_event(code, text, t_ns)

@@ -45,11 +45,13 @@ def export(
     from_s: float = -np.inf,
     until_s: float = np.inf,
     progress: Callable[[float], None] | None = None,
+    overwrite: bool = False,
 ) -> Exported:
     """Write streaming topics of a log as tables: a row for each sample of the sensors, a row for each message of other topics.
 
     `to` ends in .parquet, .csv or .mat. With several topics, .parquet and .csv get a file for each topic, FILE.TOPIC.parquet.
     Only rows with from_s <= t_s < until_s are written. `progress` is called with the share of the log that was read, 0 to 1.
+    A table that is there is replaced with `overwrite` only.
 
     Raises Fault BAD_LOG, BAD_MESSAGE, BAD_TABLE, CONFIG, LOG_WRITE; nothing unfinished is left behind.
     """
@@ -57,6 +59,9 @@ def export(
     check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
     for file in _files(to, topics).values():
         refuse_to_lose([path], "the log", "--to", file)
+        if file.is_file() and not overwrite:
+            line = f"--to {file}: is there already, and would be lost; choose another name, or add --overwrite"
+            raise Fault("CONFIG", line)
     reader = LogReader(path)
     owners: list[TableWriter | MatFile] = []
     finished = False

@@ -5,7 +5,6 @@ import json
 import re
 import subprocess
 import sys
-import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +15,6 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import scipy.io
 from nptdms import TdmsFile
-from scipy.io.matlab import MatReadError
 
 from bridge.faults import Fault
 from bridge.files import check_file
@@ -28,6 +26,7 @@ pa.enable_signal_handlers(False)
 Floats = npt.NDArray[np.float64]
 _HOW = "`stickslip log import` reads it with a map that has, under [source],"
 _SHOWN = 60  # characters of a line in an error
+_LONGEST_REASON = 200  # characters of what a library says
 SUFFIXES = (".csv", ".parquet", ".mat", ".tdms")
 
 
@@ -77,10 +76,10 @@ def read_table(path: Path, dialect: Dialect | None = None) -> Table:
     except NotImplementedError:  # what scipy raises for the HDF5 of MATLAB v7.3
         line = f"{path.name}: a MATLAB v7.3 file: must be v5 to v7; save it in MATLAB with -v7"
         raise Fault("BAD_TABLE", line) from None
-    except (
-        pa.ArrowException, MatReadError, zlib.error, OSError, ValueError, KeyError, TypeError, IndexError, EOFError,
-    ) as error:  # fmt: skip
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+    except Fault:
+        raise
+    except Exception as error:
+        reason = str(error).splitlines()[0][:_LONGEST_REASON] if str(error).strip() else type(error).__name__
         line = f"{path.name}: cannot be read as {path.suffix[1:]}: {reason}; take another copy, or export it again"
         raise Fault("BAD_TABLE", line) from None
 

@@ -1,6 +1,6 @@
 """Tables written in batches of rows: Parquet, CSV and MATLAB v5. A file appears under its name only when it is whole."""
 
-import shutil
+import contextlib
 from pathlib import Path
 from typing import IO, Any, Protocol
 
@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 
+from bridge.files import Replacement, folder_beside, replacing
 from bridge.tables.matfile import ColumnStruct, file_head, text_struct
 from bridge.units import unit_of
 
@@ -34,10 +35,6 @@ class TableWriter(Protocol):
         ...
 
 
-def _part(path: Path) -> Path:
-    return path.with_name(path.name + ".part")
-
-
 def _schema(columns: Columns) -> Any:
     fields = [
         pa.field(name, pa.from_numpy_dtype(values.dtype), nullable=False, metadata={"unit": unit_of(name)})
@@ -51,6 +48,7 @@ class ArrowTable:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._new: Replacement | None = None
         self._writer: Any = None
         self._schema: Any = None
         self._waiting: list[Columns] = []
@@ -71,13 +69,14 @@ class ArrowTable:
         self._waiting, self._waiting_rows = [], 0
         if self._writer is None:
             self._schema = _schema(columns)
+            self._new = Replacement(self.path)
             if self.path.suffix == ".csv":
                 options = pa_csv.WriteOptions(quoting_style="none")
-                self._writer = pa_csv.CSVWriter(str(_part(self.path)), self._schema, write_options=options)
+                self._writer = pa_csv.CSVWriter(self._new.file, self._schema, write_options=options)
             else:
                 # no dictionaries, as samples hardly ever repeat
                 self._writer = pq.ParquetWriter(
-                    str(_part(self.path)), self._schema, compression="zstd", compression_level=1, use_dictionary=False
+                    self._new.file, self._schema, compression="zstd", compression_level=1, use_dictionary=False
                 )
         batch = pa.record_batch([pa.array(values) for values in columns.values()], schema=self._schema)
         self._writer.write_batch(batch)
@@ -85,15 +84,16 @@ class ArrowTable:
     def finish(self) -> list[Path]:
         """Write the waiting rows, close the file, and return its path; an empty list without rows."""
         self._flush()
-        if self._writer is None:
+        if self._writer is None or self._new is None:
             return []
         self._writer.close()
-        _part(self.path).replace(self.path)
+        self._new.finish()
         return [self.path]
 
     def discard(self) -> None:
         """Remove the unfinished file."""
-        _part(self.path).unlink(missing_ok=True)
+        if self._new is not None:
+            self._new.discard()
 
 
 class MatFile:
@@ -101,8 +101,8 @@ class MatFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._folder = path.with_name(path.name + ".columns")
-        self._folder.mkdir(exist_ok=True)
+        self._ending = contextlib.ExitStack()
+        self._folder = self._ending.enter_context(folder_beside(path))
         self._structs: dict[str, ColumnStruct] = {}
         self._units: dict[str, dict[str, str]] = {}
 
@@ -118,11 +118,9 @@ class MatFile:
         if not self._structs:
             self.discard()
             return []
-        part = _part(self.path)
-        with part.open("wb") as out:
+        with replacing(self.path) as out:
             self._write(out)
-        part.replace(self.path)
-        self._folder.rmdir()
+        self._ending.close()
         return [self.path]
 
     def _write(self, out: IO[bytes]) -> None:
@@ -135,8 +133,7 @@ class MatFile:
         """Remove the unfinished file and its columns."""
         for struct in self._structs.values():
             struct.close()
-        shutil.rmtree(self._folder, ignore_errors=True)
-        _part(self.path).unlink(missing_ok=True)
+        self._ending.close()
 
 
 class MatTable:

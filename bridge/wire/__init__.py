@@ -4,6 +4,9 @@ stickslip.proto, stickslip_pb2   the messages, and the module that `make proto` 
 payloads, messages               the messages from and to bytes; as NumPy records, equal to the byte
 words                            modes, states, reasons and limits explained
 topics                           sender, rate and message of every topic
-zenoh_link                       publishers, inboxes and presence over Zenoh
+zenoh_link, inbox                publishers, presence and bounded inboxes over Zenoh
+bus_config, session              where the processes meet; the settings of their sessions
+access, loopback_users, certificates   what each role may do, and how it proves who it is
+complaints, block_numbers        what is wrong with messages, told sparsely; which numbers to believe
 realtime                         priority and core of a real-time process
 """

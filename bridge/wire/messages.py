@@ -15,6 +15,7 @@ from google.protobuf.message import DecodeError, Message
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.payloads import refuse_oversized
 
 NO_BLOCK = 2**64 - 1
 # the sensors of a rig, in the order of the wire
@@ -104,6 +105,7 @@ class Layout:
         """The same message with every field written, in order. Raises Fault BAD_MESSAGE naming `topic`."""
         if self.is_canonical(payload):
             return payload
+        refuse_oversized(payload, self.message, topic)
         message = self.message()
         try:
             message.ParseFromString(payload)
@@ -125,7 +127,11 @@ class Layout:
 
     def read(self, payload: bytes, topic: str) -> Records:
         """One record from the bytes of one message. Raises Fault BAD_MESSAGE naming `topic`."""
-        return np.frombuffer(bytearray(self.canonical(payload, topic)), self.dtype)
+        return self.record(self.canonical(payload, topic))
+
+    def record(self, canonical: bytes) -> Records:
+        """One record from the bytes of one message that is known to be canonical."""
+        return np.frombuffer(bytearray(canonical), self.dtype)
 
 
 COMMAND = Layout(wire.Command)

@@ -24,6 +24,44 @@ class ContactState(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     SLIP: _ClassVar[ContactState]
     SMOOTH: _ClassVar[ContactState]
 
+class GuardState(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    NO_GUARD: _ClassVar[GuardState]
+    DISARMED: _ClassVar[GuardState]
+    CHECKING: _ClassVar[GuardState]
+    READY: _ClassVar[GuardState]
+    ARMED: _ClassVar[GuardState]
+    ACTIVE: _ClassVar[GuardState]
+    FAULT: _ClassVar[GuardState]
+
+class Cause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    NO_CAUSE: _ClassVar[Cause]
+    POWER_UP: _ClassVar[Cause]
+    ARMED_BY_SCENARIO: _ClassVar[Cause]
+    ARMED_BY_PERSON: _ClassVar[Cause]
+    DISARMED_BY_PERSON: _ClassVar[Cause]
+    RESET_BY_PERSON: _ClassVar[Cause]
+    CHECK_PASSED: _ClassVar[Cause]
+    VIBRATION_BEGAN: _ClassVar[Cause]
+    VIBRATION_ENDED: _ClassVar[Cause]
+    RUN_ENDED: _ClassVar[Cause]
+    STOP_BY_PERSON: _ClassVar[Cause]
+    STOP_KEPT: _ClassVar[Cause]
+    COMMAND_LOST: _ClassVar[Cause]
+    OVERTRAVEL: _ClassVar[Cause]
+    DRIVE_MAX: _ClassVar[Cause]
+    DRIVE_RATIO: _ClassVar[Cause]
+    LOUD: _ClassVar[Cause]
+    BAND: _ClassVar[Cause]
+    HEAT: _ClassVar[Cause]
+    DUTY: _ClassVar[Cause]
+    SLEW_RATE: _ClassVar[Cause]
+    SENSOR_FROZEN: _ClassVar[Cause]
+    SENSOR_NOT_FINITE: _ClassVar[Cause]
+    EXCITER_SILENT: _ClassVar[Cause]
+    EXCITER_WILD: _ClassVar[Cause]
+
 class Limit(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     NO_LIMIT: _ClassVar[Limit]
@@ -54,6 +92,7 @@ class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     START_OF_MOVE: _ClassVar[Reason]
     SETTLING: _ClassVar[Reason]
     NEEDED_BEFORE: _ClassVar[Reason]
+    NOT_ARMED: _ClassVar[Reason]
 DISABLED: Mode
 WATCH: Mode
 EXCITE: Mode
@@ -65,6 +104,38 @@ STANDSTILL: ContactState
 STICK: ContactState
 SLIP: ContactState
 SMOOTH: ContactState
+NO_GUARD: GuardState
+DISARMED: GuardState
+CHECKING: GuardState
+READY: GuardState
+ARMED: GuardState
+ACTIVE: GuardState
+FAULT: GuardState
+NO_CAUSE: Cause
+POWER_UP: Cause
+ARMED_BY_SCENARIO: Cause
+ARMED_BY_PERSON: Cause
+DISARMED_BY_PERSON: Cause
+RESET_BY_PERSON: Cause
+CHECK_PASSED: Cause
+VIBRATION_BEGAN: Cause
+VIBRATION_ENDED: Cause
+RUN_ENDED: Cause
+STOP_BY_PERSON: Cause
+STOP_KEPT: Cause
+COMMAND_LOST: Cause
+OVERTRAVEL: Cause
+DRIVE_MAX: Cause
+DRIVE_RATIO: Cause
+LOUD: Cause
+BAND: Cause
+HEAT: Cause
+DUTY: Cause
+SLEW_RATE: Cause
+SENSOR_FROZEN: Cause
+SENSOR_NOT_FINITE: Cause
+EXCITER_SILENT: Cause
+EXCITER_WILD: Cause
 NO_LIMIT: Limit
 RANGE: Limit
 SLEW: Limit
@@ -90,9 +161,10 @@ MOVING: Reason
 START_OF_MOVE: Reason
 SETTLING: Reason
 NEEDED_BEFORE: Reason
+NOT_ARMED: Reason
 
 class SensorBlock(_message.Message):
-    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m")
+    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     DRIVE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
@@ -100,6 +172,8 @@ class SensorBlock(_message.Message):
     BASE_ACCEL_MPS2_FIELD_NUMBER: _ClassVar[int]
     MASS_POSITION_M_FIELD_NUMBER: _ClassVar[int]
     DRIVE_POSITION_M_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    GUARD_STATE_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     drive_force_N: _containers.RepeatedScalarFieldContainer[float]
@@ -107,10 +181,12 @@ class SensorBlock(_message.Message):
     base_accel_mps2: _containers.RepeatedScalarFieldContainer[float]
     mass_position_m: _containers.RepeatedScalarFieldContainer[float]
     drive_position_m: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ...) -> None: ...
+    run: int
+    guard_state: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ..., run: _Optional[int] = ..., guard_state: _Optional[int] = ...) -> None: ...
 
 class Command(_message.Message):
-    __slots__ = ("sequence", "t_ns", "block", "frequency_Hz", "amplitude_m", "mode", "limit", "reason")
+    __slots__ = ("sequence", "t_ns", "block", "frequency_Hz", "amplitude_m", "mode", "limit", "reason", "run")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     BLOCK_FIELD_NUMBER: _ClassVar[int]
@@ -119,6 +195,7 @@ class Command(_message.Message):
     MODE_FIELD_NUMBER: _ClassVar[int]
     LIMIT_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     block: int
@@ -127,10 +204,11 @@ class Command(_message.Message):
     mode: int
     limit: int
     reason: int
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., mode: _Optional[int] = ..., limit: _Optional[int] = ..., reason: _Optional[int] = ...) -> None: ...
+    run: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., block: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., mode: _Optional[int] = ..., limit: _Optional[int] = ..., reason: _Optional[int] = ..., run: _Optional[int] = ...) -> None: ...
 
 class Applied(_message.Message):
-    __slots__ = ("sequence", "t_ns", "frequency_Hz", "amplitude_m", "command_block", "commands", "fallback", "round_trip_ns", "late_ns", "commands_late")
+    __slots__ = ("sequence", "t_ns", "frequency_Hz", "amplitude_m", "command_block", "commands", "fallback", "round_trip_ns", "late_ns", "commands_late", "guard_state", "cause", "guard_limit", "commands_refused", "heat_share")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
@@ -141,6 +219,11 @@ class Applied(_message.Message):
     ROUND_TRIP_NS_FIELD_NUMBER: _ClassVar[int]
     LATE_NS_FIELD_NUMBER: _ClassVar[int]
     COMMANDS_LATE_FIELD_NUMBER: _ClassVar[int]
+    GUARD_STATE_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
+    GUARD_LIMIT_FIELD_NUMBER: _ClassVar[int]
+    COMMANDS_REFUSED_FIELD_NUMBER: _ClassVar[int]
+    HEAT_SHARE_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     frequency_Hz: float
@@ -151,7 +234,12 @@ class Applied(_message.Message):
     round_trip_ns: int
     late_ns: int
     commands_late: int
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ...) -> None: ...
+    guard_state: int
+    cause: int
+    guard_limit: int
+    commands_refused: int
+    heat_share: float
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., command_block: _Optional[int] = ..., commands: _Optional[int] = ..., fallback: _Optional[int] = ..., round_trip_ns: _Optional[int] = ..., late_ns: _Optional[int] = ..., commands_late: _Optional[int] = ..., guard_state: _Optional[int] = ..., cause: _Optional[int] = ..., guard_limit: _Optional[int] = ..., commands_refused: _Optional[int] = ..., heat_share: _Optional[float] = ...) -> None: ...
 
 class Trace(_message.Message):
     __slots__ = ("sequence", "t_ns", "block", "events", "gap_blocks", "state", "mode", "reason", "limit", "slips", "score", "force_rate", "drive_force_N", "burst_mps2", "drive_velocity_mps", "vibration_velocity_mps", "wanted_velocity_mps", "wanted_amplitude_m", "wanted_frequency_Hz", "time_to_slip_s", "lateness_ns", "announcements", "surges", "sliding_velocity_mps", "window_s", "velocity_ratio", "drive_stiffness_N_per_m", "drive_stiffness_sigma", "breakaway_force_N", "sliding_force_N", "loop_delay_s", "exciter_gain")
@@ -294,9 +382,13 @@ class Operator(_message.Message):
         NOTHING: _ClassVar[Operator.Action]
         STOP: _ClassVar[Operator.Action]
         RESET: _ClassVar[Operator.Action]
+        ARM: _ClassVar[Operator.Action]
+        DISARM: _ClassVar[Operator.Action]
     NOTHING: Operator.Action
     STOP: Operator.Action
     RESET: Operator.Action
+    ARM: Operator.Action
+    DISARM: Operator.Action
     ACTION_FIELD_NUMBER: _ClassVar[int]
     WHO_FIELD_NUMBER: _ClassVar[int]
     action: Operator.Action

@@ -4,7 +4,14 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-_COLUMNS = {"Mode": "mode", "ContactState": "state", "Reason": "reason", "Limit": "limit"}  # by enum
+_COLUMNS = {
+    "Mode": "mode",
+    "ContactState": "state",
+    "Reason": "reason",
+    "Limit": "limit",
+    "GuardState": "guard_state",
+    "Cause": "cause",
+}  # by enum
 
 
 class Word(NamedTuple):

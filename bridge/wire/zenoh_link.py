@@ -6,51 +6,29 @@ connection dials. Receiving threads copy bytes into bounded queues and do nothin
 
 import contextlib
 import ctypes
-import json
-import os
-import queue
 import threading
 import time
 import uuid
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Any, Self
 
-# Zenoh reads this when it is imported. One thread in place of five: a message hops from thread to thread on its way otherwise.
-os.environ.setdefault(
-    "ZENOH_RUNTIME",
-    "(rx: (worker_threads: 1), net: (handover: rx), acc: (handover: rx), tx: (handover: rx), app: (handover: rx))",
-)
-import zenoh
-from pydantic import Field, field_validator
-
-from bridge.config import Strict
 from bridge.faults import Fault
+from bridge.wire import loopback_users
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.payloads import parsed
+from bridge.wire.bus_config import BusConfig
+from bridge.wire.inbox import Inbox, Received
+from bridge.wire.payloads import largest_bytes, parsed
+from bridge.wire.session import DIAL_S, rig_security, role_security, session_config, zenoh
 from bridge.wire.topics import Topic
 
+__all__ = ["Bus", "BusConfig", "Inbox", "Received"]
+
 _CONNECT_S = 30.0  # time to wait for the plant; a first start compiles before it listens, which can take more than 10 s
-_DIAL_S = 2.0  # largest duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
-
-
-class BusConfig(Strict):
-    """Address and key prefix of the bus of one rig."""
-
-    endpoint: Annotated[str, Field(pattern=r"^tcp/.+:\d{1,5}$")] = "tcp/127.0.0.1:7447"
-    prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
-
-    @property
-    def port(self) -> int:
-        """The port of the endpoint."""
-        return int(self.endpoint.rpartition(":")[2])
-
-    @field_validator("endpoint")
-    @classmethod
-    def _port_exists(cls, endpoint: str) -> str:
-        if not 1 <= int(endpoint.rpartition(":")[2]) <= 65535:
-            raise ValueError(f"{endpoint!r}: the port must be from 1 to 65535; choose another, for example 7447")
-        return endpoint
+# One attempt to dial without a password: a rig that begins makes one, and only the next attempt has it.
+_WITHOUT_PASSWORD_S = 0.2
+_ROLES = frozenset({"plant", "controller", "recorder"})  # which have a token each
+_MOST_CLAIMS = 64  # of controllers that start at once; more are a flood, and one rival is enough to yield
 
 
 _of_thread = threading.local()
@@ -66,98 +44,37 @@ def _keep_thread_state() -> None:
         _of_thread.kept = True
 
 
-class Received(NamedTuple):
-    """One received message."""
-
-    topic: Topic
-    payload: bytes
-    arrival_ns: int  # time.perf_counter_ns
-
-
-class Inbox:
-    """A bounded queue between a receiving thread and a loop; a message that does not fit is dropped and counted.
-
-    A `patient` inbox waits instead, which blocks the sender. It is for lockstep, where no message may be lost and none is late.
-    """
-
-    def __init__(self, limit: int, patient: bool = False) -> None:
-        self.dropped = 0
-        self._patient = patient
-        self._limit = limit
-        self._queue: queue.SimpleQueue[Received] = queue.SimpleQueue()
-
-    def push(self, received: Received) -> None:
-        """Add a message; called by receiving threads."""
-        while self._patient and self._queue.qsize() >= self._limit:
-            time.sleep(0.001)
-        if self._queue.qsize() >= self._limit:
-            self.dropped += 1
-        else:
-            self._queue.put(received)
-
-    def keep(self, received: Received) -> None:
-        """Add a message that is never dropped; for rare messages that must not be missed."""
-        self._queue.put(received)
-
-    def get(self, timeout_s: float) -> Received | None:
-        """The oldest message, or None when none came within `timeout_s`."""
-        try:
-            return self._queue.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
-
-    def get_nowait(self) -> Received | None:
-        """The oldest message, or None."""
-        try:
-            return self._queue.get_nowait()
-        except queue.Empty:
-            return None
-
-
-def session_config(config: BusConfig, hub: bool, lockstep: bool, dial_s: float = _DIAL_S) -> zenoh.Config:
-    """The settings of a session; `hub` is the session that listens, any other dials for `dial_s`."""
-    settings: dict[str, Any] = {
-        "mode": "peer" if hub else "client",
-        "listen/endpoints": [config.endpoint] if hub else [],
-        "connect/endpoints": [] if hub else [config.endpoint],
-        "connect/timeout_ms": 0 if hub else round(dial_s * 1e3),
-        "connect/exit_on_failure": not hub,
-        "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        # Time [ms] after which a silent peer is dropped. Too long: puts wait for a frozen process. Too short: a computer that
-        # pauses for as long closes the link and makes it again, which loses messages (docs/method/bridge.md).
-        "transport/link/tx/lease": 10_000 if lockstep else 100,
-        "transport/link/tx/keep_alive": 4,
-        # Depth of the queues, 2 by default. Too small: late answers; counted: docs/method/bridge.md.
-        "transport/link/tx/queue/size/real_time": 16,
-        "transport/link/tx/queue/size/data": 16,
-        "transport/shared_memory/enabled": False,
-    }
-    result = zenoh.Config()
-    for key, value in settings.items():
-        result.insert_json5(key, json.dumps(value))
-    return result
-
-
 def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
+    security = rig_security(config)
     try:
-        return zenoh.open(session_config(config, hub=True, lockstep=lockstep))
+        session = zenoh.open(session_config(config, hub=True, lockstep=lockstep, security=security))
     except zenoh.ZError as error:
         line = f"{config.endpoint}: cannot listen there: must be free, and an address of this machine ({_brief(error)})"
         raise Fault("ENDPOINT_BUSY", f"{line}; end what holds it or choose another --endpoint") from None
+    return session
 
 
-def _dialled(config: BusConfig, lockstep: bool, stop: threading.Event, patience_s: float) -> zenoh.Session:
+def _dialled(config: BusConfig, role: str, lockstep: bool, stop: threading.Event, patience_s: float) -> zenoh.Session:
     until_s = time.monotonic() + patience_s
     while not stop.is_set():
+        security = role_security(config, role)  # anew each time: the rig may make it meanwhile
+        dial_s = min(DIAL_S if security else _WITHOUT_PASSWORD_S, patience_s)
         try:
-            return zenoh.open(session_config(config, False, lockstep, min(_DIAL_S, patience_s)))
+            return zenoh.open(session_config(config, False, lockstep, dial_s, security))
         except zenoh.ZError:
             if time.monotonic() > until_s:
                 line = f"{config.endpoint}: no plant answers there after {patience_s:g} s"
-                raise Fault("NO_PEER", f"{line}; start `stickslip plant` with this --endpoint") from None
+                raise Fault("NO_PEER", f"{line}; {_remedy(config, bool(security))}") from None
     raise Fault("NO_PEER", f"{config.endpoint}: no plant answered there before the stop")
+
+
+def _remedy(config: BusConfig, known: bool) -> str:
+    start = "start `stickslip plant` with this --endpoint"
+    if config.encrypted:
+        return f"{start}, and compare the certificates of both sides: one authority, and the host's name in that of the rig"
+    return (
+        start if known else f"{start}; one of another user of this machine lets nobody in who cannot read its password"
+    )
 
 
 class Bus:
@@ -173,20 +90,30 @@ class Bus:
     ) -> None:
         """Listen as the plant; any other role dials the plant for `patience_s` or until `stop` is set.
 
-        Raises Fault ENDPOINT_BUSY, NO_PEER.
+        What is neither controller, recorder nor operator is a viewer, who may only listen.
+
+        Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE.
         """
         self._config = config
         self._role = role
         self._lockstep = lockstep
         self._keep: list[Any] = []
+        self._token: Any = None
         self._alive: set[str] = set()
+        self._came: dict[str, int] = {}
         self._claims: set[str] = set()
         self._alive_changed = threading.Condition()
         zenoh.init_log_from_env_or("off")
         self._session = (
             _listening(config, lockstep)
             if role == "plant"
-            else _dialled(config, lockstep, stop or threading.Event(), patience_s)
+            else _dialled(
+                config,
+                role if role in loopback_users.ROLES else "viewer",
+                lockstep,
+                stop or threading.Event(),
+                patience_s,
+            )
         )
         self._keep.append(
             self._session.liveliness().declare_subscriber(
@@ -207,17 +134,21 @@ class Bus:
         return f"{self._config.prefix}/{name}"
 
     def _on_alive(self, sample: Any) -> None:
-        self._keep_up(self._alive, sample)
+        role = str(sample.key_expr).rsplit("/", 1)[-1]
+        if role in _ROLES:  # whoever else announces itself is nobody that anyone waits for
+            self._keep_up(self._alive, role, sample)
 
     def _on_claim(self, sample: Any) -> None:
-        self._keep_up(self._claims, sample)
+        claim = str(sample.key_expr).rsplit("/", 1)[-1]
+        if len(self._claims) < _MOST_CLAIMS or claim in self._claims:
+            self._keep_up(self._claims, claim, sample)
 
-    def _keep_up(self, names: set[str], sample: Any) -> None:
-        """Add the last part of a token's key to `names`, or remove it when the token has gone."""
-        name = str(sample.key_expr).rsplit("/", 1)[-1]
+    def _keep_up(self, names: set[str], name: str, sample: Any) -> None:
+        """Add the name of a token to `names`, or remove it when the token has gone."""
         with self._alive_changed:
             if sample.kind == zenoh.SampleKind.PUT:
                 names.add(name)
+                self._came[name] = self._came.get(name, 0) + 1
             else:
                 names.discard(name)
             self._alive_changed.notify_all()
@@ -242,10 +173,14 @@ class Bus:
 
     def listen(self, topic: Topic, receive: Callable[[Received], None]) -> None:
         """Call `receive` for every message of `topic`, on a receiving thread: `receive` must only store the message."""
+        most = largest_bytes(topic.message)
 
         def on_sample(sample: Any) -> None:
             _keep_thread_state()
-            receive(Received(topic, sample.payload.to_bytes(), time.perf_counter_ns()))
+            payload = sample.payload.to_bytes()
+            if len(payload) > most:  # enough of it that whoever parses it refuses it for its length
+                payload = payload[: most + 1]
+            receive(Received(topic, payload, time.perf_counter_ns()))
 
         handler = zenoh.handlers.Callback(on_sample, indirect=False)
         self._keep.append(self._session.declare_subscriber(self._key(topic.name), handler))
@@ -268,8 +203,8 @@ class Bus:
         missing = set(roles)
         while missing and time.monotonic() < until_s and not stop.is_set():
             for reply in self._session.get(self._key("header/*"), timeout=0.5):
-                if reply.ok is not None:
-                    header = parsed(wire.Header, reply.ok.payload.to_bytes(), "header")
+                header = _header(reply)
+                if header is not None and header.role in missing:
                     found[header.role] = header
                     missing.discard(header.role)
             if missing:
@@ -278,7 +213,13 @@ class Bus:
 
     def announce(self) -> None:
         """Announce that this role is ready: its subscriptions are in place and its kernels are compiled."""
-        self._keep.append(self._session.liveliness().declare_token(self._key(f"alive/{self._role}")))
+        self._token = self._session.liveliness().declare_token(self._key(f"alive/{self._role}"))
+
+    def withdraw(self) -> None:
+        """Take the announcement back: this role ends, though its session still relays what the others say."""
+        if self._token is not None:
+            self._token.undeclare()
+            self._token = None
 
     def claim(self) -> tuple[str, Callable[[], set[str]]]:
         """Announce that this process wants its role. Returns its claim, and a function that returns the claims of others."""
@@ -299,6 +240,15 @@ class Bus:
         with self._alive_changed:
             return role in self._alive
 
+    def came(self, role: str) -> int:
+        """How many times `role` has announced itself; more than once: it was away, or the link to it was."""
+        with self._alive_changed:
+            return self._came.get(role, 0)
+
+    def linked(self) -> bool:
+        """Whether the link to the rig stands; only of a session that dialled."""
+        return bool(self._session.info.peers_zid() or self._session.info.routers_zid())
+
     def wait_for(self, roles: Iterable[str], timeout_s: float) -> set[str]:
         """Wait until all `roles` are on the bus, and return the roles that are missing after `timeout_s`."""
         wanted = set(roles)
@@ -310,6 +260,17 @@ class Bus:
         """Wait until no other role is on the bus, at most `timeout_s`."""
         with self._alive_changed:
             self._alive_changed.wait_for(lambda: self._alive <= {self._role}, timeout_s)
+
+
+def _header(reply: Any) -> wire.Header | None:
+    """The header in a reply; None for rubbish, and for one of another role than the key it answers for."""
+    if reply.ok is None:
+        return None
+    with contextlib.suppress(Fault):
+        header = parsed(wire.Header, reply.ok.payload.to_bytes(), "header")
+        if str(reply.ok.key_expr).endswith(f"/header/{header.role}"):
+            return header
+    return None
 
 
 def _brief(error: Exception) -> str:

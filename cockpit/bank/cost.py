@@ -35,7 +35,7 @@ def _steps(
 def step_cost_ratio() -> float:
     """Time of a step over time of a block of a vibrated rig, the least of several runs of each in turns."""
     scenario = load_scenario("from-the-start", [])
-    loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller)
+    loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
     sensors = loop.advance(_BLOCKS).sensors
     samples = scenario.rig.solver.samples_per_block
     drive_mps, frequency_Hz, amplitude_m = np.full(_BLOCKS, 5e-4), np.full(_BLOCKS, 2600.0), np.full(_BLOCKS, 3.7e-8)

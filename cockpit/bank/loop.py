@@ -6,6 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.guard.config import Level
+from bridge.guard.core import accept
+from bridge.guard.senses import expect_drive
 from bridge.kernel import unlocked_kernel
 from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, TRACE, Records, sensor_block
 from cockpit.bank.rules import step as rule_step
@@ -16,7 +19,7 @@ from plant.config import RigConfig
 from plant.inputs import RigInputs
 from plant.loop_delay import whole_blocks
 from plant.piezo import base_velocity_mps, delivered_share
-from plant.records import TRUTH
+from plant.records import TRUTH, guard_records
 from plant.records import build as plant_records
 from plant.simulate import held_velocity
 from plant.step import step as plant_step
@@ -29,6 +32,8 @@ Pair = tuple[npt.NDArray[Any], npt.NDArray[Any]]  # parameters and memory, one r
 def advance_with_truth(
     plant_params: npt.NDArray[Any],
     plant_state: npt.NDArray[Any],
+    guard_params: npt.NDArray[Any],
+    guard_state: npt.NDArray[Any],
     velocity_mps: npt.NDArray[Any],
     noise: npt.NDArray[np.float64],
     by_rule: bool,
@@ -54,7 +59,7 @@ def advance_with_truth(
     """Advance a rig and what controls it, in place; return how many blocks were done.
 
     Args:
-        plant_params, plant_state, params, state, rule_params, rule_state: one record each.
+        plant_params, plant_state, guard_params, guard_state, params, state, rule_params, rule_state: one record each.
         velocity_mps: of the drive, [blocks + ahead_blocks]: `CONSTANT` looks ahead.
         noise: standard normal numbers, [blocks, 5, samples].
         by_rule: whether a rule of `cockpit.bank.rules` stands in for the controller.
@@ -73,9 +78,15 @@ def advance_with_truth(
     blocks, said = noise.shape[0], 0
     for i in range(blocks):
         rows = truth[:, i * samples : (i + 1) * samples]
+        came = answered if i == 0 else 1
+        if came == 1 and not accept(guard_params[0], guard_state[0], commands[i]):
+            came = 0
+        first, said = said, said + announcements[i]
+        for row in range(first, said):
+            expect_drive(guard_state[0], announce[row].drive_velocity_mps)
         plant_step(
-            plant_params, plant_state, velocity_mps[i], commands[i : i + 1], answered if i == 0 else 1, delay_blocks[i],
-            noise[i], 0, 0, 0, analogue, rows, sensors, applied,
+            plant_params, plant_state, guard_params, guard_state, velocity_mps[i], commands[i : i + 1], came,
+            delay_blocks[i], noise[i], 0, 0, 0, analogue, rows, sensors, applied,
         )  # fmt: skip
         if not math.isfinite(rows[_VELOCITY, samples - 1]):
             return i
@@ -91,9 +102,8 @@ def advance_with_truth(
             rule_step(rule_params, rule_state, sensors, sensors[0].t_ns, next_mps, gain[i], answer, traces[i : i + 1])
         else:
             events = BLOCK
-            for _ in range(announcements[i]):
-                take_announcement(state[0], announce[said].holds_from_ns, announce[said].drive_velocity_mps)
-                said += 1
+            for row in range(first, said):
+                take_announcement(state[0], announce[row].holds_from_ns, announce[row].drive_velocity_mps)
                 events |= ANNOUNCED
             controller_step(params, state, sensors, events, 0, sensors[0].t_ns, answer, traces[i : i + 1])
     return blocks
@@ -135,6 +145,10 @@ class JudgedLoop:
         self._rig, self._hum, self._by_rule = rig, hum, by_rule
         self._inputs, self._velocity_mps = RigInputs(rig, seed), held_velocity(rig)
         self._plant, self._subject, self._rule = plant_records(rig), subject, rule
+        # a rival is judged by what it does, and not by what a guard lets it do
+        free = Level(alarm=1e12, abort=1e12)
+        guard = rig.guard.model_copy(update={"loud_ratio": free}) if by_rule else rig.guard
+        self._guard = guard_records(rig.model_copy(update={"guard": guard}), 1, arm=True)
         samples = rig.solver.samples_per_block
         self._ahead_blocks = 1 + whole_blocks(rig.loop.delay_s, rig.solver.block_s)
         self._analogue = np.empty((len(CHANNELS), samples))
@@ -163,9 +177,9 @@ class JudgedLoop:
         traces, truth = TRACE.blank(blocks), np.empty((len(TRUTH), blocks * samples))
         v_a_mps, frequency_Hz, gain = (np.empty(blocks) for _ in range(3))
         done = advance_with_truth(
-            *self._plant, velocity_mps, noise, self._by_rule, *self._subject, *self._rule, delay_blocks, announcements,
-            announce, self._ahead_blocks, min(self.block, 1), self._analogue, self._sensors, self._applied,
-            commands, traces, truth, v_a_mps, frequency_Hz, gain,
+            *self._plant, *self._guard, velocity_mps, noise, self._by_rule, *self._subject, *self._rule,
+            delay_blocks, announcements, announce, self._ahead_blocks, min(self.block, 1), self._analogue, self._sensors,
+            self._applied, commands, traces, truth, v_a_mps, frequency_Hz, gain,
         )  # fmt: skip
         self.block += done
         self._last_command = commands[done : done + 1]

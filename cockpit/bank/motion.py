@@ -128,7 +128,8 @@ def _stick(
     p: Record, s: Record, sliding_mps: float, window_s: float, newest: int, events: npt.NDArray[np.float64], found: int
 ) -> int:
     """Begin and end of sticks, by what slides in the contact: the slide without the give of the bristles."""
-    if s.moving == 1 and sliding_mps < _SLIDES * s.speed_mps:
+    # a drive that is slower than what counts as motion drags its slide as well, at the end of a stroke
+    if s.speed_mps > 0.0 and sliding_mps < _SLIDES * s.speed_mps:
         s.dragged_s = s.now_s
     s.low_s = s.low_s + p.sample_s if s.moving == 1 and sliding_mps < _STICKS * s.speed_mps else 0.0
     if s.stuck == 0:

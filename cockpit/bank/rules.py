@@ -204,6 +204,7 @@ def step(
     c.sequence = s.steps
     c.t_ns = t_ns
     c.block = block.sequence
+    c.run = block.run
     c.frequency_Hz = s.frequency_Hz if s.frequency_Hz > 0.0 else p.candidate_Hz[0]
     c.amplitude_m = s.amplitude_m
     c.mode = mode

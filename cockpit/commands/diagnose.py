@@ -13,7 +13,9 @@ import typer
 
 from bridge.faults import FAULTS, Fault
 from bridge.files import write_json
+from bridge.plain import plain
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
+from cockpit.commands.options import Certs
 from cockpit.run.child_process import end_like_ctrl_c, report
 from cockpit.run.writable import JSON, PAGE, RIG, check_output, check_output_folder, writing
 
@@ -33,6 +35,7 @@ class _Wishes(NamedTuple):
     apply: Path | None
     jobs: int
     cluster: str
+    certs: str
 
     @property
     def json_file(self) -> Path | None:
@@ -57,8 +60,12 @@ def diagnose(
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
     cluster: Annotated[
-        str, typer.Option(help="Dask scheduler, e.g. tcp://127.0.0.1:8786; its workers read the folders themselves.")
+        str,
+        typer.Option(
+            help="Dask scheduler, e.g. tcp://127.0.0.1:8786, or tls://HOST:8786; its workers read the folders themselves."
+        ),
     ] = "",
+    certs: Certs = None,
     as_json: Json = None,
 ) -> None:
     """Say what makes a rig differ from its description: the effect, how sure, how much of the gap it closes."""
@@ -70,7 +77,7 @@ def diagnose(
         from diagnosis.evidence.manifest import check_folder
 
         end_like_ctrl_c()
-        wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster)
+        wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""))
         sources = find_sources(evidence)
         one = all(path.resolve() == sources[0].folder for path in evidence)
         _check_destinations(wishes, one, sources)
@@ -128,8 +135,11 @@ def _diagnose_one(source: "EvidenceFolder", wishes: _Wishes) -> int:
         ("", wishes.json_file, lambda path: write_json(path, to_json(diagnosis))),
         ("report     ", wishes.report, lambda path: write_report(diagnosis, source.name, path)),
     ]
-    if wishes.apply is not None and diagnosis.verdict == "unexplained":
-        _tell(wishes, "rig file   not written: nothing explains the gap, there is no effect to apply")
+    if wishes.apply is not None and diagnosis.verdict in ("unexplained", "partly"):
+        why = (
+            "nothing explains the gap" if diagnosis.verdict == "unexplained" else "only a part of the gap is explained"
+        )
+        _tell(wishes, f"rig file   not written: {why}, there is no effect to apply")
     else:
         wanted.append(("rig file   ", wishes.apply, lambda path: write_rig(diagnosis, evidence, path)))
     refused: list[Fault] = []
@@ -159,7 +169,7 @@ def _told(refused: list[Fault]) -> int:
 
 def _tell(wishes: _Wishes, line: str) -> None:
     """On stdout, but where the JSON goes there."""
-    print(line, file=sys.stderr if wishes.as_json == STDOUT else sys.stdout)
+    print(plain(line), file=sys.stderr if wishes.as_json == STDOUT else sys.stdout)
 
 
 def _result(
@@ -169,7 +179,7 @@ def _result(
 
     if not wishes.cluster:
         return many.real_diagnose(evidence, progress, wishes.jobs)
-    with closing(many.diagnose_many([source], 1, wishes.cluster, many.real_diagnose)) as outcomes:
+    with closing(many.diagnose_many([source], 1, wishes.cluster, many.real_diagnose, wishes.certs)) as outcomes:
         outcome = next(outcomes)
     if outcome.diagnosis is None:
         raise Fault(*(outcome.fault or ("PEER_DIED", "")))
@@ -186,7 +196,7 @@ def _diagnose_many(sources: list["EvidenceFolder"], wishes: _Wishes) -> int:
     reports = _report_names([source.name for source in sources])
     with (
         watched() as progress,
-        closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, many.real_diagnose)) as outcomes,
+        closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, many.real_diagnose, wishes.certs)) as outcomes,
     ):
         for outcome in outcomes:
             name = outcome.source.name

@@ -6,14 +6,16 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from bridge import units
+from bridge.plain import plain, say
 from diagnosis.report import words
+from diagnosis.report.relation_words import number_lines, relation_lines
 from diagnosis.result import to_json
 
 if TYPE_CHECKING:
     from diagnosis.diagnose_many import FolderResult
     from diagnosis.result import Diagnosis
 
-MANY_FORMAT = "diagnoses/1"
+MANY_FORMAT = "diagnoses/2"
 _SHOWN_CANDIDATES = 3
 
 
@@ -30,6 +32,8 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
             numbers.append(f"{units.times(gap.with_effect)} with {' and '.join(diagnosis.effects)}")
         shrinkage = "" if gap.shrinkage is None else f"; {words.closed_in_words(gap.shrinkage)} of the gap closed"
         lines.append(f"gap        {', '.join(numbers)}; perfect is {units.times(gap.floor)}{shrinkage}")
+    for label, block in (("relations", relation_lines(diagnosis)), ("numbers", number_lines(diagnosis))):
+        lines += [f"{'' if i else label:<10} {line}" for i, line in enumerate(block)]
     lines.append(f"next       {after.what} {after.why}")
     files: dict[tuple[str, str], list[str]] = {}
     for finding in diagnosis.findings:
@@ -71,7 +75,7 @@ def watched() -> Generator[Callable[[str, float], None]]:
         def to_file(text: str, _share: float) -> None:
             nonlocal last
             if text != last:
-                print(text, file=sys.stderr, flush=True)
+                say(text)
             last = text
 
         yield to_file
@@ -86,7 +90,7 @@ def watched() -> Generator[Callable[[str, float], None]]:
         def to_terminal(text: str, share: float) -> None:
             nonlocal last
             if text != last:
-                bar.console.print(text, markup=False, highlight=False)
+                bar.console.print(plain(text), markup=False, highlight=False)
             last = text
             bar.update(task, completed=share)
 

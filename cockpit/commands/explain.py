@@ -1,10 +1,11 @@
-"""`stickslip explain`: what a fault code, an exit status or a word of the controller means."""
+"""`stickslip explain`: what a fault code, an exit status, an event or a word of the controller means."""
 
 from typing import Annotated, NamedTuple
 
 import typer
 
 from bridge.faults import FAULTS, Fault
+from bridge.wire.event_codes import EVENTS, LETTERS, EventCode
 from bridge.wire.words import Word, words
 from cockpit.commands.json_option import Json, carry_out, tell
 
@@ -31,6 +32,12 @@ class Meaning(NamedTuple):
         return f"{self.fault} (exit status {self.exit_status})\n{self.help}"
 
 
+def _event_in_words(one: EventCode) -> str:
+    """A line for a person."""
+    letter = f" [{one.letter}, {LETTERS[one.letter].partition(':')[0]}]" if one.letter else ""
+    return f"event  {one.code:<14}  from the {one.sources}{letter}: {one.help}"
+
+
 def _in_words(one: Word) -> str:
     """A line for a person."""
     return f"{one.column:<6} {one.number:>2}  {one.word:<14}  {one.help}"
@@ -40,13 +47,13 @@ def explain(
     code: Annotated[
         str,
         typer.Argument(
-            help="For example ENDPOINT_BUSY, an exit status, PIEZO_WEAK, or a column of a log: mode, state, reason, limit; "
-            "all of them if left out."
+            help="For example ENDPOINT_BUSY, an exit status, PIEZO_WEAK, GAP, or a column of a log: mode, state, reason, limit, "
+            "event; all of them if left out."
         ),
     ] = "",
     as_json: Json = None,
 ) -> None:
-    """Say what a fault code or an exit status means and what to do, or what a mode, state, reason or limit in a log means."""
+    """Say what a fault code, exit status or event means and what to do, or a mode, state, reason or limit in a log."""
 
     def work() -> None:
         meanings = [Meaning(status, None, said) for status, said in _NO_FAULTS.items()]
@@ -55,16 +62,20 @@ def explain(
         if not code:
             meanings.sort(key=lambda one: (one.exit_status, one.fault or ""))
             lines = [f"{one.exit_status:>3}  {one.fault or one.help}" for one in meanings]
-            tell(as_json, [*meanings, *logged], [*lines, "", *map(_in_words, logged)])
+            told = [*map(_in_words, logged), "", *map(_event_in_words, EVENTS.values())]
+            tell(as_json, [*meanings, *logged, *EVENTS.values()], [*lines, "", *told])
             return
         wanted = [one for one in meanings if code.upper() in {one.fault, str(one.exit_status)}]
         of_a_log = [one for one in logged if code.upper() in {one.word, one.column.upper()}]
-        if not wanted and not of_a_log:
+        events = [one for one in EVENTS.values() if code.upper() in {one.code, "EVENT"}]
+        if not (wanted or of_a_log or events):
             statuses = ", ".join(map(str, sorted({one.exit_status for one in meanings})))
-            line = f"{code}: is no fault code, exit status or word of a log; known: {', '.join(FAULTS)}; exit statuses {statuses}"
+            line = f"{code}: is no fault code, exit status, event or word of a log; known: {', '.join(FAULTS)}; "
+            line += f"exit statuses {statuses}"
             columns = ", ".join(dict.fromkeys(one.column for one in logged))
-            raise Fault("CONFIG", f"{line}; columns of a log {columns}")
+            raise Fault("CONFIG", f"{line}; columns of a log {columns}; events {', '.join(EVENTS)}")
         paragraphs = ["\n\n".join(one.in_words() for one in wanted)] if wanted else []
-        tell(as_json, [*wanted, *of_a_log], [*paragraphs, *map(_in_words, of_a_log)])
+        lines = [*paragraphs, *map(_in_words, of_a_log), *map(_event_in_words, events)]
+        tell(as_json, [*wanted, *of_a_log, *events], lines)
 
     carry_out(work, as_json)

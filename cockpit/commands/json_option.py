@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from bridge.faults import Fault
 from bridge.files import JSON, refuse_to_replace, strict_json, write_json
+from bridge.plain import plain
 from cockpit.run.child_process import guarded, report
 from cockpit.run.writable import check_output, writing
 
@@ -106,7 +107,7 @@ def tell(as_json: Path | None, result: Any, words: Iterable[str], indent: int | 
         with writing(as_json):  # before anything is printed, which ends where nobody reads on
             write_json(as_json, result)
     for line in words:
-        print(line)
+        print(plain(line))
 
 
 def _check(as_json: Path | None) -> None:

@@ -77,6 +77,7 @@ def log_export(
     ] = "",
     start: Annotated[str, typer.Option("--from", help="From this time of the run on, e.g. 12.5s.")] = "",
     end: Annotated[str, typer.Option("--until", help="Up to this time of the run, e.g. 20s.")] = "",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace tables that are there.")] = False,
     as_json: Json = None,
 ) -> None:
     """Write a log as tables, sensors one row a sample, others one row a message; exit status 1: no row, or a damaged log."""
@@ -91,7 +92,7 @@ def log_export(
         check_output("--to", to, TABLE)
         names = [name.strip() for name in topic.split(",")] if topic else STREAMING
         with watched_share(f"exporting {path.name}", quiet=as_json == STDOUT) as progress:
-            written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress)
+            written = export(path, to, list(dict.fromkeys(names)), from_s, until_s, progress, overwrite)
         words = [f"{name:<8} {counted(rows, 'row')}" for name, rows in written.rows.items()]
         nothing = "nothing to write: no message of these topics in this time; a table that is there stays as it is"
         words += [str(file) for file in written.files] or [nothing]
@@ -137,6 +138,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
 
     def work() -> int:
         from bridge.log.log_check import check_log
+        from bridge.log.storage.chain import chain_in_words
         from bridge.wire.topics import BY_NAME
 
         with watched_share(f"checking {path.name}", quiet=as_json == STDOUT) as progress:
@@ -146,7 +148,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
         )
         late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())
         words = f"{path}: {counted(len(check.findings), 'finding')}; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
-        tell(as_json, check, [*(finding.in_words() for finding in check.findings), words])
+        tell(as_json, check, [*(finding.in_words() for finding in check.findings), chain_in_words(check.chain), words])
         return 1 if check.findings else 0
 
     carry_out(work, as_json)

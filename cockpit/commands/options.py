@@ -1,5 +1,6 @@
 """Options that several commands have, as typer wants them; a bar for those that take a while."""
 
+import json
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -17,6 +18,15 @@ Settings = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed of the sensor noise; the same seed gives the same run.")]
 Endpoint = Annotated[str | None, typer.Option(help="Where the processes meet, e.g. tcp/127.0.0.1:7447.")]
+Certs = Annotated[
+    Path | None,
+    typer.Option(
+        "--certs", help="Folder that `stickslip certs` made, for tls/; ~/.config/stickslip/certificates if not given."
+    ),
+]
+Insecure = Annotated[
+    bool, typer.Option("--insecure", help="Listen at a tcp/ endpoint that others reach, and ask nobody for a password.")
+]
 Prefix = Annotated[str | None, typer.Option(help="First part of every key on the bus.")]
 Lockstep = Annotated[
     bool,
@@ -27,7 +37,14 @@ LogFile = Annotated[Path | None, typer.Option("--log", help="Where the log goes;
 DEFAULT_SCENARIO = "paper-c45-c45"
 
 
-def as_settings(settings: list[str], seed: int | None, endpoint: str | None, prefix: str | None) -> list[str]:
+def as_settings(
+    settings: list[str],
+    seed: int | None,
+    endpoint: str | None,
+    prefix: str | None,
+    certs: Path | None = None,
+    insecure: bool = False,
+) -> list[str]:
     """What the options say, as settings of a scenario."""
     result = list(settings)
     if seed is not None:
@@ -36,6 +53,10 @@ def as_settings(settings: list[str], seed: int | None, endpoint: str | None, pre
         result.append(f'bus.endpoint="{endpoint}"')
     if prefix is not None:
         result.append(f'bus.prefix="{prefix}"')
+    if certs is not None:
+        result.append(f"bus.certificates={json.dumps(str(certs.absolute()), ensure_ascii=False)}")
+    if insecure:
+        result.append("bus.insecure=true")
     return result
 
 

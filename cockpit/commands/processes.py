@@ -1,4 +1,4 @@
-"""`stickslip plant`, `controller`, `record`, `stop` and `status`: one process of a run; a person's word to it and look at it."""
+"""`stickslip plant`, `controller` and `record`: one process of a run."""
 
 from typing import Annotated, NamedTuple
 
@@ -8,8 +8,10 @@ from bridge.faults import Fault
 from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import (
     DEFAULT_SCENARIO,
+    Certs,
     ChildOf,
     Endpoint,
+    Insecure,
     Lockstep,
     LogFile,
     Prefix,
@@ -41,19 +43,14 @@ class Recorded(NamedTuple):
     log: str
 
 
-class Taken(NamedTuple):
-    """A word that a controller took."""
-
-    endpoint: str
-    taken: str  # the word, and whose it was
-
-
 def plant(
     scenario: ScenarioName = DEFAULT_SCENARIO,
     settings: Settings = [],  # noqa: B006
     seed: Seed = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
+    certs: Certs = None,
+    insecure: Insecure = False,
     lockstep: Lockstep = False,
     wait_for: Annotated[str, typer.Option(help="Roles that must be on the bus before the first block.")] = "controller",
     child: ChildOf = 0,
@@ -62,10 +59,11 @@ def plant(
     """Serve the stand-in rig of a scenario on the bus."""
 
     def work() -> None:
+        from bridge.guard.latch import StopLatch
         from cockpit.run.scenario import header, load_scenario, refuse_what_takes_no_clock
         from plant.app import run as serve
 
-        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs, insecure))
         roles = [role for role in wait_for.split(",") if role]
         if unknown := set(roles) - {"controller", "recorder"}:
             raise Fault(
@@ -76,7 +74,20 @@ def plant(
         if not (lockstep or child):
             warn_without_priority()
         described = header(made, "plant", lockstep)
-        blocks = serve(made.rig, made.seed, made.duration_s, made.bus, described, roles, lockstep, stop_event(child))
+        # a run of `stickslip run` is over with its processes, and so is a stop in it
+        latch = None if child or lockstep else StopLatch(made.rig.name)
+        blocks = serve(
+            made.rig,
+            made.seed,
+            made.duration_s,
+            made.bus,
+            described,
+            roles,
+            lockstep,
+            stop_event(child),
+            made.arm,
+            latch,
+        )
         served = Served("plant", made.bus.endpoint, lockstep, blocks)
         tell(as_json, served, [served.in_words()])
 
@@ -89,6 +100,7 @@ def controller(
     seed: Seed = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
+    certs: Certs = None,
     lockstep: Lockstep = False,
     child: ChildOf = 0,
     as_json: Json = None,
@@ -99,7 +111,7 @@ def controller(
         from cockpit.run.scenario import header, load_scenario, refuse_what_takes_no_clock
         from controller.app import run as control
 
-        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs))
         if not lockstep:
             refuse_what_takes_no_clock(made)
         if not (lockstep or child):
@@ -117,6 +129,7 @@ def record(
     seed: Seed = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
+    certs: Certs = None,
     lockstep: Lockstep = False,
     log: LogFile = None,
     child: ChildOf = 0,
@@ -129,7 +142,7 @@ def record(
         from cockpit.run.run import about_run, keep_aside, log_path
         from cockpit.run.scenario import load_scenario
 
-        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs))
         path = log_path(log, made.name)
         check_output("--log", path, LOG)
 
@@ -139,47 +152,7 @@ def record(
                 keep_aside(path)
 
         about, stop = about_run(made, lockstep), stop_event(child)
-        record_all(path, made.bus, ["plant", "controller"], about, lockstep, stop, ready)
+        record_all(path, made.bus, ["plant", "controller"], about, lockstep, stop, ready, made.log.rotation)
         tell(as_json, Recorded(str(path)), [f"log      {path}"])
-
-    carry_out(work, as_json)
-
-
-def operator_stop(
-    reset: Annotated[bool, typer.Option("--reset", help="Let the controller work again after a stop.")] = False,
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    as_json: Json = None,
-) -> None:
-    """Tell a running controller to ramp the vibration down and keep it down, until --reset; exit status 4: nobody obeyed."""
-
-    def work() -> None:
-        from bridge.wire import stickslip_pb2 as wire
-        from cockpit.run.operator import tell as say
-        from cockpit.run.scenario_file import load_bus
-
-        bus = load_bus(scenario, as_settings([], None, endpoint, prefix))
-        taken = say(bus, wire.Operator.RESET if reset else wire.Operator.STOP)
-        tell(as_json, Taken(bus.endpoint, taken), [f"taken    {taken}"])
-
-    carry_out(work, as_json)
-
-
-def status(
-    scenario: ScenarioName = DEFAULT_SCENARIO,
-    endpoint: Endpoint = None,
-    prefix: Prefix = None,
-    as_json: Json = None,
-) -> None:
-    """Say what goes on at a rig now, within a second; exit status 1: nobody controls it, 4: no rig answers."""
-
-    def work() -> int:
-        from cockpit.run.scenario_file import load_bus
-        from cockpit.run.status import look
-
-        seen = look(load_bus(scenario, as_settings([], None, endpoint, prefix)))
-        tell(as_json, seen, seen.in_words())
-        return 0 if seen.controlled else 1
 
     carry_out(work, as_json)

@@ -6,10 +6,11 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
-from bridge.files import check_file, refuse_to_lose
+from bridge.files import refuse_to_lose
+from bridge.plain import plain
 from bridge.units import counted
 from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
-from cockpit.commands.options import DEFAULT_SCENARIO, Endpoint, Prefix, as_settings
+from cockpit.commands.options import DEFAULT_SCENARIO, Certs, Endpoint, Insecure, Prefix, as_settings
 from cockpit.run.child_process import stop_event
 from cockpit.run.writable import LOG, check_output
 
@@ -47,17 +48,20 @@ def replay_command(
     ] = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
+    certs: Certs = None,
+    insecure: Insecure = False,
     as_json: Json = None,
 ) -> None:
     """Feed a log to today's controller: the same bits (exit 0), or the first difference or a damaged log (exit 1)."""
 
     def work() -> int:
+        from bridge.log.logfile import check_log_file
         from cockpit.run import replay as replaying
 
         from_s = replaying.time_s(f"--from {start}", start, "12.5s")
         if not to_bus:
             paced = {"--speed": speed is not None, "--all": everything, "--wait": wait}
-            meeting = {"--endpoint": endpoint is not None, "--prefix": prefix is not None}
+            meeting = {"--endpoint": endpoint is not None, "--prefix": prefix is not None, "--certs": certs is not None}
             _only_with("--to-bus, which plays the log on the bus", paced | meeting)
         if not closed_loop:
             _only_with("--closed-loop, whose new run goes there", {"--log": log is not None})
@@ -65,7 +69,7 @@ def replay_command(
         if closed_loop:
             check_output("--log", out, LOG)
         for path in logs:  # before the work on the others
-            check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+            check_log_file(path)
         if to_bus:
             for option, given in (
                 ("--closed-loop", closed_loop),
@@ -78,7 +82,7 @@ def replay_command(
             from cockpit.run.log_to_bus import publish_log
             from cockpit.run.scenario_file import load_bus
 
-            bus = load_bus(DEFAULT_SCENARIO, as_settings([], None, endpoint, prefix))
+            bus = load_bus(DEFAULT_SCENARIO, as_settings([], None, endpoint, prefix, certs, insecure))
             roles = ["controller", "recorder"] if wait else []
             stop = stop_event()
             for path in logs:
@@ -102,7 +106,7 @@ def replay_command(
         for path in logs:
             replayed.append(replaying.replay_log(path, from_s, settings))
             if as_json != STDOUT:
-                print("\n".join(replayed[-1].in_words()), flush=True)  # the next log may be a bad one
+                print(plain("\n".join(replayed[-1].in_words())), flush=True)  # the next log may be a bad one
         tell(as_json, replayed, [])
         return 0 if all(one.identical and not one.damage for one in replayed) else 1
 

@@ -7,7 +7,9 @@ import typer
 from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import (
     DEFAULT_SCENARIO,
+    Certs,
     Endpoint,
+    Insecure,
     Lockstep,
     LogFile,
     Prefix,
@@ -29,6 +31,8 @@ def run(
     seed: Seed = None,
     endpoint: Endpoint = None,
     prefix: Prefix = None,
+    certs: Certs = None,
+    insecure: Insecure = False,
     lockstep: Lockstep = False,
     in_process: Annotated[
         bool, typer.Option("--in-process", help="Lockstep in one process, without a bus: fastest.")
@@ -43,7 +47,7 @@ def run(
         from cockpit.run.scenario_file import rig_setting
 
         other = [rig_setting(rig)] if rig is not None else []
-        changed = [*other, *as_settings(settings, seed, endpoint, prefix)]
+        changed = [*other, *as_settings(settings, seed, endpoint, prefix, certs, insecure)]
         with stopped_once():
             came = run_scenario(scenario, changed, lockstep, in_process, log)
             tell(as_json, came.as_dict(), came.in_words())

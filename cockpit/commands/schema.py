@@ -21,7 +21,7 @@ class Named(NamedTuple):
 
 def schema(
     name: Annotated[
-        str, typer.Argument(help="For example rig or diagnosis-1; a list of all of them if left out.")
+        str, typer.Argument(help="For example rig or diagnosis-2; a list of all of them if left out.")
     ] = "",
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write NAME.json there, or all of them if no NAME is given.")

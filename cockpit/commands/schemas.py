@@ -223,11 +223,12 @@ def _log_recover() -> dict[str, Any]:
 
 
 def _explain() -> dict[str, Any]:
+    from bridge.wire.event_codes import EventCode
     from bridge.wire.words import Word
     from cockpit.commands.explain import Meaning
     from cockpit.commands.json_types import schema_of
 
-    return schema_of(list[Meaning | Word])
+    return schema_of(list[Meaning | Word | EventCode])
 
 
 def _reproduce() -> dict[str, Any]:
@@ -260,8 +261,8 @@ TOML = (
     Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
 )
 JSON = (
-    Format("diagnosis-1", "`stickslip diagnose FOLDER --json`, diagnosis/1.", _diagnosis),
-    Format("diagnoses-1", "`stickslip diagnose --json` of several folders, diagnoses/1.", _diagnoses),
+    Format("diagnosis-2", "`stickslip diagnose FOLDER --json`, diagnosis/2.", _diagnosis),
+    Format("diagnoses-2", "`stickslip diagnose --json` of several folders, diagnoses/2.", _diagnoses),
     Format("blind-scores-2", "`stickslip blind score --json` and `blind pool --json`, blind-scores/2.", _blind_scores),
     Format("fault", "Any command that fails with JSON on stdout.", _fault),
     Format("run-result", "`stickslip run --json`.", _run),
@@ -269,7 +270,12 @@ JSON = (
     Format("controller-result", "`stickslip controller --json`.", _result_of("cockpit.commands.processes", "Served")),
     Format("record-result", "`stickslip record --json`.", _result_of("cockpit.commands.processes", "Recorded")),
     Format("status-result", "`stickslip status --json`.", _result_of("cockpit.run.status", "Status")),
-    Format("stop-result", "`stickslip stop --json`.", _result_of("cockpit.commands.processes", "Taken")),
+    Format(
+        "word-result",
+        "`stickslip arm --json`, and the same of disarm, stop and reset.",
+        _result_of("cockpit.run.operator", "Obeyed"),
+    ),
+    Format("certs-result", "`stickslip certs --json`.", _result_of("cockpit.run.authority", "Made")),
     Format("replay-result", "`stickslip replay --json`.", _result_of("cockpit.run.replay", "Replayed", many=True)),
     Format(
         "closed-loop-result", "`stickslip replay --closed-loop --json`.", _result_of("cockpit.run.replay", "Compared")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bridge.files import replacing
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.verdict import RunVerdict, headline, judge_run
@@ -54,7 +55,8 @@ def plot_run(path: Path, out: Path) -> RunVerdict:
     lower.set_ylim(bottom=0.0)
     lower.set_xlabel("time [s]")
     lower.legend(handles=lower.lines, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
-    figure.savefig(out, dpi=110)
+    with replacing(out) as file:
+        figure.savefig(file, dpi=110, format=out.suffix.lower().removeprefix("."))
     return verdict
 
 

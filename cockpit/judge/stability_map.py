@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
+from bridge.files import replacing
 from plant.config import RigConfig
 
 if TYPE_CHECKING:
@@ -125,7 +126,8 @@ def _draw(rig: RigConfig, result: MapResult, out: Path) -> None:
     _draw_without_vibration(left, rig, result)
     _draw_with_vibration(right, rig, result)
     figure.suptitle(result.answer, fontsize=13, color=_INK)
-    figure.savefig(out, dpi=120)
+    with replacing(out) as file:
+        figure.savefig(file, dpi=120, format=out.suffix.lower().removeprefix("."))
 
 
 def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:

@@ -7,19 +7,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.log.damage import damage_findings
+from bridge.log.in_charge import GONE_S, WEAK_S, InCharge, in_charge
 from bridge.log.logfile import RunData, read_run
 from bridge.log.metadata import number_of
+from bridge.log.storage.chain import Chain, chain_in_words
 from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
+from cockpit.judge.log_faults import of_bytes, of_clock, of_events
 from cockpit.judge.pauses import Pauses, pauses_in, pauses_in_words
 from diagnosis.features.cycles import Cycles, find_cycles
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
 _ALARM_RATIO = 1.05
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
-_CONTROLLED = ("drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m")
+_STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a drive that changed by less in this time moves evenly
+_FADE_S = 0.2  # of the vibration at the end of a run
+_CONTROLLED = ("drive_force_N", "mass_position_m", "base_accel_mps2", "drive_position_m")
 _STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
 _BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; a foreign rig need not say it
 _RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
@@ -55,6 +59,8 @@ class RunVerdict(NamedTuple):
     all_losses_known: bool  # False: a log that is cut or damaged may lack more than it shows
     enabled_from_s: float
     stopped_s: float  # by an operator, and no part of `after`
+    charge: InCharge  # when the rig was on its own, which is no part of `after` either, and blocks without an answer
+    alone: Phase | None  # the rig on its own, for longer than a late command explains
     before: Phase | None
     after: Phase | None
     drive_velocity_max_mps: float  # as measured
@@ -63,7 +69,9 @@ class RunVerdict(NamedTuple):
     latency: Latency | None
     pauses: Pauses | None  # of the whole machine; None in lockstep, and where they were not watched
     not_watched: str  # why the machine's pauses are not known; empty where they are, and in lockstep
-    faults: list[str]
+    faults: list[str]  # with each of these the run is not good
+    told: list[str]  # what a person should know besides
+    chain: Chain
     normal_scheduling: list[str]  # processes without a real-time priority; in lockstep none needs it
     untested: str  # why nothing was tested; empty where the drive moved with the controller in charge
 
@@ -74,12 +82,12 @@ class RunVerdict(NamedTuple):
         A machine that pauses for some 20 ms loses nothing: the controller ramps down and up again, which is told and no more.
         """
         gone = not self.untested and self.after is not None and self.after.slips == 0
-        return gone and self.lost_blocks == 0 and all(fault.startswith("STALE: ") for fault in self.faults)
+        return gone and self.lost_blocks == 0 and not self.faults
 
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
-        table: dict[str, Any] = self._asdict() | {"good": self.good}
-        for name in ("before", "after", "latency", "pauses"):
+        table: dict[str, Any] = self._asdict() | {"good": self.good, "chain": self.chain.as_dict()}
+        for name in ("before", "after", "alone", "charge", "latency", "pauses"):
             table[name] = table[name] and table[name]._asdict()
         return table
 
@@ -110,10 +118,16 @@ def judge_run(run: RunData) -> RunVerdict:
     trace = run.trace
     stops = _stops(trace, block_s)
     excited = _vibrating(trace, block_s) & (trace["t_ns"] * 1e-9 > in_charge_s)
-    ratio = trace["vibration_velocity_mps"][excited] / np.maximum(trace["drive_velocity_mps"][excited], 1e-9)
-    faults = [
-        f"{event.code}: {event.text}" for event in run.events if event.code in {"GAP", "DROPPED", "PLANT_LOST", "STALE"}
-    ]
+    speed_mps = np.abs(trace["drive_velocity_mps"])
+    excited &= _is_steady(speed_mps, block_s)
+    ratio = trace["vibration_velocity_mps"][excited] / speed_mps[excited]
+    faults, told = of_events(run)
+    charge = in_charge(run)
+    for code, text, is_fault in charge.sentences():
+        (faults if is_fault else told).append(f"{code}: {text}")
+    if (clock := of_clock(run, block_s)) is not None:
+        faults.append(clock)
+    gone = [stretch for stretch in charge.stretches if stretch[1] - stretch[0] > GONE_S]
     for name in unreadable:
         bad = ~np.isfinite(run.sensors[name]).all(axis=1)
         many, first = counted(np.count_nonzero(bad), "block holds", "blocks hold"), run.sensors["sequence"][bad][0]
@@ -131,7 +145,10 @@ def judge_run(run: RunData) -> RunVerdict:
     stopped_s = sum(min(until_s - _SETTLING_S, seconds) - from_s for from_s, until_s in stops)
     latency = _latency(run)
     pauses, why_not = pauses_in(run, block_s * 1e9) if latency is not None else (None, "")
-    after = _phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, stops)
+    # the controller has its second to settle after it was gone as well
+    without = [*stops, *((from_s, until_s + _SETTLING_S) for from_s, until_s in gone)]
+    after = _phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, without)
+    gone_s = sum(until_s - from_s for from_s, until_s in gone)
     return RunVerdict(
         log=str(run.path),
         seconds=seconds,
@@ -141,6 +158,8 @@ def judge_run(run: RunData) -> RunVerdict:
         all_losses_known=all_losses_known,
         enabled_from_s=enabled_from_s,
         stopped_s=stopped_s,
+        charge=charge,
+        alone=_alone(cycles, t_s, mean_N, gone),
         before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds), []),
         after=after,
         drive_velocity_max_mps=float(trace["drive_velocity_mps"].max(initial=0.0)),
@@ -149,12 +168,34 @@ def judge_run(run: RunData) -> RunVerdict:
         latency=latency,
         pauses=pauses,
         not_watched=why_not,
-        faults=faults + [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, run.path)],
+        faults=faults + [f"{finding.kind}: {finding.text}" for finding in of_bytes(run)],
+        told=told,
+        chain=run.chain,
         normal_scheduling=[
             event.source for event in run.events if event.code == "START" and event.text.startswith(realtime.NORMAL)
         ],
-        untested=_untested(run, after, seconds - enabled_from_s - stopped_s),
+        untested=_untested(run, after, seconds - enabled_from_s - stopped_s - gone_s),
     )
+
+
+def _is_steady(speed_mps: Any, block_s: float) -> Any:
+    """Rows in which the drive moves as fast as 0.1 s before: while it turns, v_a over v_d says nothing."""
+    back = round(_STEADY_S / block_s)
+    steady = np.zeros(len(speed_mps), bool)
+    changed_mps = np.abs(speed_mps[back:] - speed_mps[:-back])
+    steady[back:] = (speed_mps[back:] > _STANDSTILL_MPS) & (changed_mps < _STEADY_SHARE * speed_mps[back:])
+    return steady
+
+
+def _alone(cycles: Cycles | None, t_s: Any, mean_N: Any, gone: list[tuple[float, float]]) -> Phase | None:
+    """What happened while nobody was in charge."""
+    phases = [_phase(cycles, t_s, mean_N, from_s, until_s, []) for from_s, until_s in gone]
+    there = [phase for phase in phases if phase is not None]
+    if not there:
+        return None
+    seconds, slips = sum(phase.seconds for phase in there), sum(phase.slips for phase in there)
+    mean = sum(phase.mean_force_N * phase.seconds for phase in there) / seconds
+    return Phase(seconds, slips, 60.0 * slips / seconds, max(phase.swing_N for phase in there), mean)
 
 
 def _untested(run: RunData, after: Phase | None, in_charge_s: float) -> str:
@@ -163,11 +204,13 @@ def _untested(run: RunData, after: Phase | None, in_charge_s: float) -> str:
         return "no block was recorded"
     if not len(run.trace):
         return "no step of a controller was recorded: nothing was tested"
+    if (run.trace["reason"] == wire.NOT_ARMED).all():
+        return "the rig was never armed: `stickslip arm`, or `arm = true` in the scenario of a simulated rig"
     if not (np.abs(run.trace["drive_velocity_mps"]) > _STANDSTILL_MPS).any():
         return "the drive never moved: nothing was tested"
     if after is not None:
         return ""
-    if in_charge_s <= 0.0:
+    if in_charge_s <= 0.0 or not (run.applied["fallback"] == 0).any():
         return "the controller was not in charge in this run"
     why = f"too short to judge: it has {_SETTLING_S:g} s to settle"
     if in_charge_s > _SETTLING_S:  # the force is no number, or the operator left it no second to settle in
@@ -187,8 +230,9 @@ def _slowest_fall_s(run: RunData) -> float:
 
 
 def _stops(trace: Any, block_s: float) -> list[tuple[float, float]]:
-    """When an operator had stopped the controller, and until it was in charge again; in s."""
-    stopped = np.concatenate([[False], trace["mode"] == wire.STOPPED, [False]])
+    """When an operator had stopped the controller, or the rig was not armed, and until it was in charge again; in s."""
+    idle = (trace["mode"] == wire.STOPPED) | (trace["reason"] == wire.NOT_ARMED)
+    stopped = np.concatenate([[False], idle, [False]])
     starts, ends = np.flatnonzero(np.diff(stopped.astype(int))).reshape(-1, 2).T
     t_s = trace["t_ns"] * 1e-9
     return [(t_s[start] - block_s, t_s[end - 1] + _SETTLING_S) for start, end in zip(starts, ends, strict=True)]
@@ -274,8 +318,15 @@ def in_words(verdict: RunVerdict) -> list[str]:
         lines.append(
             f"after    {counted(v.after.slips, 'slip')} in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
         )
-    if v.stopped_s > 0:
-        lines.append(f"stopped  by an operator for {v.stopped_s:.1f} s, which is no part of what came after")
+    if v.alone is not None:
+        lines.append(
+            f"alone    {counted(v.alone.slips, 'slip')} in {v.alone.seconds:.2f} s with nobody in charge, drive force swings by "
+            f"{v.alone.swing_N:.2f} N"
+        )
+    if v.stopped_s > _FADE_S:
+        lines.append(
+            f"stopped  by an operator, or not armed, for {v.stopped_s:.1f} s, which is no part of what came after"
+        )
     if v.velocity_ratio_max > 0:
         low = "ok" if v.velocity_ratio_min >= _ALARM_RATIO else f"below {_ALARM_RATIO}: stick-slip may return"
         lines.append(f"v_a/v_d  {v.velocity_ratio_min:.2f} to {v.velocity_ratio_max:.2f} while vibrating ({low})")
@@ -294,7 +345,8 @@ def in_words(verdict: RunVerdict) -> list[str]:
     if v.normal_scheduling:
         who = " and ".join(v.normal_scheduling)
         lines.append(f"priority {who} under {realtime.NORMAL}: {realtime.NOT_GUARANTEED}")
-    lines.extend(f"warning  {fault}" for fault in v.faults)
+    lines.extend(f"warning  {fault}" for fault in [*v.faults, *v.told])
+    lines.append(chain_in_words(v.chain))
     lines.append(f"log      {v.log}")
     return lines
 
@@ -302,10 +354,20 @@ def in_words(verdict: RunVerdict) -> list[str]:
 def headline(verdict: RunVerdict) -> str:
     """The answer in one line."""
     v = verdict
+    if v.alone is not None:
+        why = ", then it was gone" if v.charge.controller_until_s is not None else ""
+        slips = f"; {counted(v.alone.slips, 'slip')} with nobody in charge" if v.alone.slips else ""
+        held_s = max(v.seconds - v.enabled_from_s - v.stopped_s - v.alone.seconds, 0.0)
+        return f"the controller was in charge for {held_s:.2f} of {v.seconds:.2f} s only{why}{slips}"
     if v.untested or v.after is None:
         return v.untested
+    tripped = next((fault for fault in v.faults if fault.startswith("FAULT: ")), None)
+    if tripped is not None:
+        return f"the rig's guard stopped the vibration: {tripped.removeprefix('FAULT: ')}"
+    weak = f"; {', '.join(name for name, seconds in v.charge.reasons_s.items() if seconds > WEAK_S)}"
+    weak = weak if len(weak) > 2 else ""
     if v.after.slips:
-        return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge"
+        return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge{weak}"
     if v.before is not None and v.before.slips:
-        return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before, none with the controller in charge"
-    return "no stick-slip with the controller in charge"
+        return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before, none with the controller in charge{weak}"
+    return f"no stick-slip with the controller in charge{weak}"

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, StrictUndefined  # here, so that it is missed before minutes of simulation
 
+from bridge.files import write_whole
 from cockpit.paper.claims import PAPER_CLAIMS, PaperRow, paper_claims, parameter_rows, reference_rows, slip_rows
 from cockpit.paper.runs import (
     CYCLES_FROM_S,
@@ -60,7 +61,7 @@ def reproduce(out: Path, progress: bool) -> ReproduceResult:
     slip = one_slip("C45-C45 @ 0.063")
     rows = paper_claims(runs) + reference_rows(runs) + slip_rows(slip) + parameter_rows()
     result = ReproduceResult(rows, time.perf_counter() - started_s)
-    out.write_text(_page(result, runs), encoding="utf-8")
+    write_whole(out, _page(result, runs))
     return result._replace(elapsed_s=time.perf_counter() - started_s)
 
 

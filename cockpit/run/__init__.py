@@ -6,5 +6,6 @@ in_process, closed_loop     in one process, without a bus; plant and controller 
 processes, child_process    as several processes: started, watched, ended; how each behaves
 progress, operator, status  the progress line; a person's stop or reset on its way; what goes on at a rig
 replay, log_to_bus          a log through today's controller; a log back on the bus
+authority                   the certificates of the roles
 writable                    files that a command writes at its end
 """

@@ -12,6 +12,7 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 from bridge.faults import Fault
+from bridge.plain import say
 from bridge.wire import realtime
 
 _PARENT_CHECK_S = 0.25
@@ -100,7 +101,7 @@ def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
 
     def tell() -> None:
         heeded.set()
-        print(line, file=sys.stderr, flush=True)
+        say(line)
 
     def on_signal(_number: int, _frame: Any) -> None:
         if heeded.is_set():
@@ -131,7 +132,7 @@ def report(fault: Fault, as_json: bool) -> int:
     if as_json:
         print(json.dumps({"fault": fault.kind.code, "line": fault.line, "exit_status": fault.kind.exit_status}))
     else:
-        print(f"stickslip: {fault.kind.code}: {fault.line}", file=sys.stderr)
+        say(f"stickslip: {fault.kind.code}: {fault.line}")
     return fault.kind.exit_status
 
 
@@ -179,7 +180,7 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         return report(Fault("NO_MEMORY", line), as_json)
     except UnicodeEncodeError as error:  # of a library that takes only UTF-8; stdout escapes what it cannot show
         name = error.object if len(error.object) <= _LONGEST_NAME else error.object[error.start : error.end]
-        shown = name.removesuffix(".part").encode(errors="backslashreplace").decode()
+        shown = name.encode(errors="backslashreplace").decode()
         line = f"{shown}: is not UTF-8, which is needed here; rename it"
         return report(Fault("CONFIG", line), as_json)
     except ModuleNotFoundError as error:

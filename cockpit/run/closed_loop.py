@@ -6,6 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.guard.core import accept
+from bridge.guard.senses import expect_drive
+from bridge.guard.states import obey
 from bridge.kernel import unlocked_kernel
 from bridge.kernel_cache import compile_once
 from bridge.wire.messages import APPLIED, CHANNELS, COMMAND, TRACE, Records, sensor_block
@@ -16,7 +19,7 @@ from controller.core import step as controller_step
 from controller.records import build as controller_records
 from plant.config import RigConfig
 from plant.inputs import RigInputs
-from plant.records import TRUTH
+from plant.records import TRUTH, guard_records
 from plant.records import build as plant_records
 from plant.step import step as plant_step
 
@@ -27,6 +30,8 @@ _VELOCITY = TRUTH.index("true_velocity_mps")
 def advance_both(
     plant_params: npt.NDArray[Any],
     plant_state: npt.NDArray[Any],
+    guard_params: npt.NDArray[Any],
+    guard_state: npt.NDArray[Any],
     velocity_mps: npt.NDArray[np.float64],
     delay_blocks: npt.NDArray[np.int64],
     noise: npt.NDArray[np.float64],
@@ -46,7 +51,7 @@ def advance_both(
     """Advance the rig and its controller by many blocks, in place; return how many were done.
 
     Args:
-        plant_params, plant_state, controller_params, controller_state: one record each.
+        plant_params, plant_state, guard_params, guard_state, controller_params, controller_state: one record each.
         velocity_mps: of the drive, [blocks].
         delay_blocks: that the command takes to the exciter besides, [blocks].
         noise: standard normal numbers, [blocks, 5, samples].
@@ -63,16 +68,21 @@ def advance_both(
     """
     last, said = truth.shape[1] - 1, 0
     for i in range(velocity_mps.shape[0]):
+        came = answered if i == 0 else 1
+        if came == 1 and not accept(guard_params[0], guard_state[0], commands[i]):
+            came = 0
+        first, said = said, said + announcements[i]
+        for row in range(first, said):
+            expect_drive(guard_state[0], announce[row].drive_velocity_mps)
         plant_step(
-            plant_params, plant_state, velocity_mps[i], commands[i : i + 1], answered if i == 0 else 1, delay_blocks[i],
-            noise[i], 0, 0, 0, analogue, truth, sensors[i : i + 1], applied[i : i + 1],
+            plant_params, plant_state, guard_params, guard_state, velocity_mps[i], commands[i : i + 1], came,
+            delay_blocks[i], noise[i], 0, 0, 0, analogue, truth, sensors[i : i + 1], applied[i : i + 1],
         )  # fmt: skip
         if not math.isfinite(truth[_VELOCITY, last]):
             return i
         events = BLOCK | operator_events if i == 0 else BLOCK
-        for _ in range(announcements[i]):
-            take_announcement(controller_state[0], announce[said].holds_from_ns, announce[said].drive_velocity_mps)
-            said += 1
+        for row in range(first, said):
+            take_announcement(controller_state[0], announce[row].holds_from_ns, announce[row].drive_velocity_mps)
             events |= ANNOUNCED
         controller_step(
             controller_params, controller_state, sensors[i : i + 1], events, 0, sensors[i].t_ns,
@@ -98,10 +108,11 @@ class ClosedLoop:
         rig: the rig file.
         seed: of the sensor noise.
         config: the controller's configuration, with the `block_s` and `samples_per_block` of the rig.
+        arm: whether the rig starts ARMED.
 
     """
 
-    def __init__(self, rig: RigConfig, seed: int, config: ControllerConfig) -> None:
+    def __init__(self, rig: RigConfig, seed: int, config: ControllerConfig, arm: bool) -> None:
         self.block = 0  # number of the next block
         self.block_ns = round(rig.solver.block_s * 1e9)
         self.controller_state: npt.NDArray[Any]
@@ -110,6 +121,7 @@ class ClosedLoop:
         self._inputs = RigInputs(rig, seed)
         self._sensors = sensor_block(samples)
         self._plant_params, self._plant_state = plant_records(rig)
+        self._guard_params, self._guard_state = guard_records(rig, 1, arm)
         self._controller_params, self.controller_state = controller_records(config)
         self._analogue, self._truth = np.empty((len(CHANNELS), samples)), np.empty((len(TRUTH), samples))
         self._last_command = COMMAND.blank()
@@ -122,6 +134,10 @@ class ClosedLoop:
         """Continue with another configuration of the controller and its present memory."""
         self._controller_params, _ = controller_records(config)
 
+    def obey(self, word: int) -> None:
+        """The rig takes a person's word, of `wire.Operator.Action`, before its next block."""
+        obey(self._guard_state[0], word)
+
     def advance(self, blocks: int, operator_events: int = 0) -> Blocks:
         """Advance by `blocks`; the controller obeys `operator_events` in the first one.
 
@@ -132,7 +148,7 @@ class ClosedLoop:
         commands[:1] = self._last_command
         sensors, applied, trace = self._sensors.blank(blocks), APPLIED.blank(blocks), TRACE.blank(blocks)
         done = advance_both(
-            self._plant_params, self._plant_state, velocity_mps, delay_blocks, noise,
+            self._plant_params, self._plant_state, self._guard_params, self._guard_state, velocity_mps, delay_blocks, noise,
             self._controller_params, self.controller_state, operator_events, announcements, announce, min(self.block, 1),
             self._analogue, self._truth, sensors, applied, commands, trace,
         )  # fmt: skip

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
+from bridge.guard.tell import Teller, changes
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import (
@@ -34,7 +35,7 @@ _STRETCH_BLOCKS = SNAPSHOT_EVERY
 
 
 class Word(NamedTuple):
-    """An operator's STOP or RESET, of `wire.Operator.Action`, that the step at `t_ns` is to obey."""
+    """An operator's word, of `wire.Operator.Action`, that rig and controller are to obey at `t_ns`."""
 
     t_ns: int
     action: int
@@ -58,14 +59,15 @@ def run_onboard(
         stopped: asked before every stretch of blocks; the run then ends as it does at its full duration.
 
     """
-    loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller)
+    loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
     loop.warm_up()
-    log = RunLog(path, lockstep=True)
+    log = RunLog(path, lockstep=True, rotation=scenario.log.rotation)
     log.add_metadata("run", about)
     for role in ("controller", "plant"):
         log.add_header(header(scenario, role, lockstep=True))
     blocks = round(scenario.duration_s / scenario.rig.solver.block_s) if scenario.duration_s > 0 else 2**62
-    log.write(PLANT_EVENT, _event("plant", 0, 0, "START", "lockstep"))
+    say = _Events(log)
+    say(0, "START", "lockstep")
     ahead, to_say = list(changes), list(words)
     try:
         # the log is compressed and written while the next stretch is computed
@@ -76,14 +78,16 @@ def run_onboard(
                     loop.reconfigure(ahead.pop(0).config)
                 events = 0
                 while to_say and _first_step(loop, to_say[0].t_ns) <= loop.block:
-                    events = obeyed(events, to_say.pop(0).action)
+                    action = to_say.pop(0).action
+                    loop.obey(action)
+                    events = obeyed(events, action)
                 # what changes the controller ends a stretch, too
                 ends = [blocks, (loop.block // _STRETCH_BLOCKS + 1) * _STRETCH_BLOCKS]
                 ends += [_first_step(loop, part[0].t_ns) for part in (ahead, to_say) if part]
                 made = loop.advance(min(ends) - loop.block, events)
                 if written is not None:
                     written.result()
-                written = writer.submit(_write, log, loop.block, loop.block_ns, made, loop.controller_state.copy())
+                written = writer.submit(_write, log, say, loop.block, loop.block_ns, made, loop.controller_state.copy())
                 if loop.block < min(ends):
                     written.result()
                     raise no_number(scenario.rig, loop.block)
@@ -92,7 +96,7 @@ def run_onboard(
             if written is not None:
                 written.result()
         t_ns = loop.block * loop.block_ns
-        log.write(PLANT_EVENT, _event("plant", 1, t_ns, "END", f"blocks={loop.block}"))
+        say(t_ns, "END", f"blocks={loop.block}")
         text = f"steps={loop.block} duplicates=0 dropped=0"
         log.write(CONTROLLER_EVENT, _event("controller", 0, t_ns, "END", text))
     finally:
@@ -104,21 +108,46 @@ def _first_step(loop: ClosedLoop, t_ns: int) -> int:
     return max(-(-t_ns // loop.block_ns) - 1, 0)
 
 
-def _write(log: RunLog, end: int, block_ns: int, made: Blocks, memory: npt.NDArray[Any]) -> None:
+class _Events:
+    """The rig's events, as its process publishes them."""
+
+    def __init__(self, log: RunLog) -> None:
+        self._log = log
+        self._said = 0
+        self._teller = Teller()
+
+    def __call__(self, t_ns: int, code: str, text: str) -> None:
+        self._log.write(PLANT_EVENT, _event("plant", self._said, t_ns, code, text))
+        self._said += 1
+
+    def of(self, applied: npt.NDArray[Any]) -> dict[int, list[tuple[str, str]]]:
+        """What the guard has to say of a stretch: codes and texts, by the number of the block after which they come."""
+        found = {int(applied["sequence"][row]): self._teller.news(applied[row]) for row in changes(applied)}
+        return {block: news for block, news in found.items() if news}
+
+
+def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: Blocks, memory: npt.NDArray[Any]) -> None:
     """Write the messages of a stretch that ends before block `end`, with the state and the snapshot where they are due."""
     begin = end - len(made.trace)
     for row in range(len(made.announce)):
         log.write(ANNOUNCE, made.announce[row : row + 1].tobytes())
+    news = say.of(made.applied)
     tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
     # a stretch that was cut short begins and ends with blocks that have no whole period of the state message
     whole = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)
-    for first, last in pairwise(sorted({begin, *whole, end})):
+    cuts = {begin, *whole, end}
+    for block in news:  # an event stands where it came, and the parts beside it have whole periods or none
+        period = block - block % STATE_EVERY
+        cuts |= {max(period, begin), block + 1, min(period + STATE_EVERY, end)}
+    for first, last in pairwise(sorted(cuts)):
         part = {topic: table[first - begin : last - begin] for topic, table in tables.items()}
         steps = range(first + STATE_EVERY - first % STATE_EVERY, last + 1, STATE_EVERY)
         states = (
             {STATE: plotted(made.trace[steps[0] - begin - 1 :: STATE_EVERY][: len(steps)], steps[0])} if steps else {}
         )
         log.write_blocks(part, states)
+        for code, text in news.get(last - 1, ()):
+            say(last * block_ns, code, text)
     if end % SNAPSHOT_EVERY == 0 and end > begin:
         log.write(SNAPSHOT, snapshot(memory, end, end * block_ns))
     log.flush()

@@ -73,6 +73,7 @@ def publish_log(
         send_event(_event("START", f"replay of {path.name} at {speed:g} times real time"))
         blocks = _play(schedule, tables, send, speed, pause, stop)
         send_event(_event("END", f"blocks={blocks}"))
+        bus.withdraw()
         bus.wait_until_alone(_GOODBYE_S)
 
 

@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import FAULTS, Fault
+from bridge.plain import say
 from cockpit.run.child_process import handle_endings
 
 _GRACE_S = 6.0  # to fade out, say goodbye on the bus and close the log
 _LOOK_S = 0.05
+_WARNING = "stickslip: warning: "  # how a line of a child begins that a person must see at once
 # in this order they are asked to stop: the plant fades the vibration out and tells the others
 _ROLES = ("plant", "controller", "recorder")
 
@@ -43,7 +45,10 @@ class Child:
     def _read(self) -> None:
         if self.process.stderr is not None:
             with self.process.stderr as lines:
-                self._lines.extend(line.rstrip() for line in lines)
+                for line in lines:
+                    self._lines.append(line.rstrip())
+                    if line.startswith(_WARNING):
+                        say(line.rstrip())
 
     def last_words(self) -> str:
         """What it said last on stderr."""

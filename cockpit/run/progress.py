@@ -1,9 +1,11 @@
 """The live progress line of a run, fed from the bus."""
 
+import contextlib
+import math
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from rich.console import Console
 from rich.live import Live
@@ -11,22 +13,30 @@ from rich.text import Text
 
 from bridge.faults import Fault
 from bridge.log.pause_events import pauses_of
+from bridge.plain import plain
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.topics import RECORDER_EVENT, STATE
-from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
+from bridge.wire.event_codes import WEAK_REASONS, harms, is_told
+from bridge.wire.payloads import parsed
+from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, STATE
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 
 _LOOK_S = 0.1
+_SHOWN_S = 3.0  # of an event that is no failure
+_EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 
 
-def progress_line(state: wire.State, duration_s: float, pauses: int = 0, paused_ms: float = 0.0) -> str:
+def progress_line(
+    state: wire.State, duration_s: float, pauses: int = 0, paused_ms: float = 0.0, warnings: Iterable[str] = ()
+) -> str:
     """What is going on, in one line; of the machine's pauses how many there were and how long all of them."""
     t_s = state.t_ns * 1e-9
     bar = f"[{'#' * round(20 * min(t_s / duration_s, 1.0)):<20}] " if duration_s else ""  # none where no end is known
     ratio = f"v_a/v_d {state.velocity_ratio:4.2f}" if state.velocity_ratio > 0.01 else "no vibration"
     paused = f"  machine paused {pauses} x, {paused_ms:.0f} ms" if pauses else ""
+    warned = "".join(f"  {warning}" for warning in warnings)
     return (
         f"{t_s:6.1f} s {bar}{wire.ContactState.Name(state.state):<10} {wire.Mode.Name(state.mode):<8} "
-        f"F_d {state.drive_force_N:5.2f} N  {ratio:<12}  slips {state.slips}{paused}"
+        f"F_d {state.drive_force_N:5.2f} N  {ratio:<12}  slips {state.slips}{paused}{warned}"
     )
 
 
@@ -46,10 +56,45 @@ def follower(config: BusConfig, duration_s: float) -> Callable[[threading.Event]
     return follow
 
 
+class Watch:
+    """What a person should see at once beside the progress: nobody in charge, a weak exciter, events that are more than news."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, float] = {}  # code of an event, and until when it is shown
+        self._applied: bytes | None = None
+        self._command: bytes | None = None
+
+    def note(self, received: Received) -> None:
+        """Take a message of the rig, of the controller, or an event. Raises Fault BAD_MESSAGE."""
+        if received.topic is APPLIED:
+            self._applied = received.payload
+        elif received.topic is COMMAND:
+            self._command = received.payload
+        elif received.topic in _EVENTS:
+            event = parsed(wire.Event, received.payload, received.topic.name)
+            if is_told(event.code):
+                # what is a failure stays to the end of the run
+                self._told[event.code] = math.inf if harms(event.code) else time.monotonic() + _SHOWN_S
+
+    def warnings(self, roles: Iterable[str]) -> list[str]:
+        """The words now; `roles` are those on the bus."""
+        found = [f"no {role}" for role in ("controller", "recorder") if role not in roles]
+        if self._applied is not None and parsed(wire.Applied, self._applied, APPLIED.name).fallback:
+            found.append("FALLBACK: nobody in charge")
+        if self._command is not None:
+            reason = parsed(wire.Command, self._command, COMMAND.name).reason
+            found += [name for name in WEAK_REASONS if wire.Reason.Value(name) == reason]
+        return [*found, *(code for code, until_s in self._told.items() if time.monotonic() < until_s)]
+
+
 def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
     inbox = Inbox(1000)
-    for topic in (STATE, RECORDER_EVENT):
+    watch = Watch()
+    for topic in (STATE, *_EVENTS):
         bus.listen(topic, inbox.push)
+    newest_of: dict[str, Received] = {}
+    for topic in (APPLIED, COMMAND):  # a thousand a second, of which the newest ten are looked at
+        bus.listen(topic, lambda received: newest_of.__setitem__(received.topic.name, received))
     pauses, paused_ms = 0, 0.0
     with Live(Text("starting"), console=Console(stderr=True), refresh_per_second=8, transient=True) as live:
         while not over.wait(_LOOK_S):
@@ -58,8 +103,15 @@ def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
                 if received.topic is STATE:
                     newest = received
                     continue
-                for pause in pauses_of([wire.Event.FromString(received.payload)]):
-                    pauses, paused_ms = pauses + 1, paused_ms + (pause.until_ns - pause.from_ns) * 1e-6
+                with contextlib.suppress(Fault):  # rubbish of another client
+                    watch.note(received)
+                    for pause in pauses_of([parsed(wire.Event, received.payload, received.topic.name)]):
+                        pauses, paused_ms = pauses + 1, paused_ms + (pause.until_ns - pause.from_ns) * 1e-6
             if newest is not None:
-                state = wire.State.FromString(newest.payload)
-                live.update(Text(progress_line(state, duration_s, pauses, paused_ms)))
+                with contextlib.suppress(Fault):
+                    for received in [*newest_of.values()]:
+                        watch.note(received)
+                    state = parsed(wire.State, newest.payload, STATE.name)
+                    roles = [role for role in ("controller", "recorder") if bus.alive(role)]
+                    line = progress_line(state, duration_s, pauses, paused_ms, watch.warnings(roles))
+                    live.update(Text(plain(line)))

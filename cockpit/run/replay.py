@@ -70,9 +70,16 @@ def _timed_then(run: RunData) -> list[str]:
 
 
 def _words_of(run: RunData) -> list[Word]:
-    """What the operator said, and when."""
-    words = ((STOP, wire.Operator.STOP), (RESET, wire.Operator.RESET))
-    return [Word(int(row["t_ns"]), action) for row in run.trace for bit, action in words if int(row["events"]) & bit]
+    """What persons said to controller and rig, and when."""
+    bits = ((STOP, wire.Operator.STOP), (RESET, wire.Operator.RESET))
+    found = [Word(int(row["t_ns"]), action) for row in run.trace for bit, action in bits if int(row["events"]) & bit]
+    causes: dict[int, int] = {
+        wire.ARMED_BY_PERSON: wire.Operator.ARM,
+        wire.DISARMED_BY_PERSON: wire.Operator.DISARM,
+    }
+    began = run.applied[np.flatnonzero(np.diff(run.applied["cause"], prepend=0))]
+    found += [Word(int(row["t_ns"]), causes[int(row["cause"])]) for row in began if int(row["cause"]) in causes]
+    return sorted(found)
 
 
 class Replayed(NamedTuple):
@@ -203,6 +210,8 @@ def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
         raise Fault("BAD_LOG", f"{path}: holds no block with what the controller did; there is nothing to compare with")
     # what was recorded, not what was planned: a run may have been interrupted, or have had no end
     table = {"rig": plant["rig"], "seed": plant["seed"], "duration_s": int(run.sensors["t_ns"][-1]) * 1e-9}
+    # a rig that told of no guard vibrated as it was told
+    table["arm"] = int(run.sensors["guard_state"][0]) in {wire.NO_GUARD, wire.ARMED, wire.ACTIVE}
     table["controller"] = changes[0].config.model_dump(mode="json")
     scenario = validate(Scenario, table, path.name)
     about = about_run(scenario, lockstep=True) | {

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
 from bridge.log.live import refuse_a_live_log
+from bridge.log.storage.parts import parts_of
+from bridge.plain import say
+from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
 from cockpit.run.scenario import Scenario, load_scenario, refuse_what_takes_no_clock
 from cockpit.run.writable import LOG, check_output
@@ -31,11 +34,13 @@ def keep_aside(path: Path) -> None:
     aside, number = path.with_stem(f"{path.stem}-{written}"), 1
     while aside.exists():
         aside, number = path.with_stem(f"{path.stem}-{written}-{number}"), number + 1
+    parts = parts_of(path)
     try:
-        path.rename(aside)
+        for part in parts:  # run-0001.mcap becomes run-20261121-101500-0001.mcap
+            part.rename(aside.with_stem(aside.stem + part.stem.removeprefix(path.stem)))
     except OSError as error:
         raise Fault("LOG_WRITE", f"{path}: cannot be renamed: {error.strerror}; choose another --log") from None
-    print(f"kept     {aside}, which was {path.name} until now", file=sys.stderr)
+    say(f"kept     {aside}, which was {path.name} until now")
 
 
 def about_run(scenario: Scenario, lockstep: bool) -> dict[str, object]:
@@ -93,8 +98,10 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
     if not (lockstep or in_process):
         refuse_what_takes_no_clock(scenario)
         warn_without_priority()
+    if not in_process:
+        rig_security(scenario.bus)  # here, where its warning is seen and its fault comes before anything starts
     if endless:
-        print(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}", file=sys.stderr, flush=True)
+        say(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
     interrupted = False
     try:
         if in_process:
@@ -123,7 +130,7 @@ def _judged(scenario: Scenario, path: Path, interrupted: str) -> RunOutcome:
 
     if interrupted and scenario.duration_s:
         with contextlib.suppress(Fault):  # a log of a moment may hold nothing to judge
-            print("\n".join(in_words(judge(path))), file=sys.stderr)
+            say("\n".join(in_words(judge(path))))
         raise Fault("INTERRUPTED", interrupted)
     run = read_run(path)
     if interrupted and not len(run.sensors):

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from bridge.config import Strict, blamed, read_toml, validate, with_overrides
 from bridge.faults import Fault
+from bridge.log.storage.log_files import Rotation
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
@@ -31,6 +32,18 @@ def _plain(name: str) -> str:
     return name
 
 
+class LogTable(Strict):
+    """When the log of a run goes on in a new file, `NAME-0001.mcap` and so on."""
+
+    file_MB: Annotated[float, Field(ge=0)] = Field(default=1000.0, description="Size of a file; 0: any.")
+    file_s: Annotated[float, Field(ge=0)] = Field(default=3600.0, description="Length of the run in a file; 0: any.")
+
+    @property
+    def rotation(self) -> Rotation:
+        """The same for whoever writes the log."""
+        return Rotation(round(self.file_MB * 1e6), self.file_s)
+
+
 class Scenario(Strict):
     """One run, with every default filled in."""
 
@@ -38,9 +51,14 @@ class Scenario(Strict):
     description: str = ""
     duration_s: Annotated[float, Field(ge=0)] = Field(default=16.0, description="0: until Ctrl-C or SIGTERM.")
     seed: Annotated[int, Field(ge=0)] = 1
+    arm: bool = Field(
+        default=False,
+        description="true: the simulated rig starts ARMED, without the loop check; false: `stickslip arm`.",
+    )
     rig: RigConfig
     controller: ControllerConfig = ControllerConfig()
     bus: BusConfig = BusConfig()
+    log: LogTable = LogTable()
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Scenario":

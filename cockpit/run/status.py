@@ -12,6 +12,7 @@ from google.protobuf.message import Message
 from bridge.faults import Fault
 from bridge.units import quantity
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.event_codes import WEAK_REASONS
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, STATE, Topic
 from bridge.wire.words import words
@@ -22,7 +23,20 @@ _ROLES_S = 0.2  # who is there is known as soon as the link is; only who is not 
 _HEADER_S = 0.2
 _LISTEN_S = 0.3  # three blocks of a rig that is late for 0.1 s; events within this time are told
 _ROLES = ("plant", "controller", "recorder")
-_TOLD_ANYWAY = {"NO_LIMIT", "SLEW", "RANGE", "FREQUENCY_BAND", "OPERATOR_STOP"}  # limits that are no fault
+_NEXT = {
+    "FAULT": "nothing vibrates until a person resets the rig: `stickslip reset`, then `stickslip arm`",
+    "DISARMED": "nothing vibrates until a person arms the rig: `stickslip arm`",
+    "NO_GUARD": "this rig does not tell of a guard: nothing on its side is known to hold the vibration",
+}
+_TOLD_ANYWAY = {
+    "NO_CAUSE",
+    "SLEW_RATE",
+    "NO_LIMIT",
+    "SLEW",
+    "RANGE",
+    "FREQUENCY_BAND",
+    "OPERATOR_STOP",
+}  # limits that are no fault
 
 M = TypeVar("M", bound=Message)
 
@@ -46,6 +60,10 @@ class Status(NamedTuple):
     frequency_Hz: float | None  # at the rig, after its own limits and ramps
     amplitude_m: float | None
     fallback: bool | None  # the rig has no fresh command and ramps to zero by itself
+    state: str | None  # of the rig's guard
+    cause: str | None  # of that state
+    guard_limit: str | None  # that holds the command back now
+    heat_share: float | None  # of the exciter's largest rise of temperature, by its model
     events: list[str]  # while it was listened to
 
     @property
@@ -60,6 +78,9 @@ class Status(NamedTuple):
             f"rig      {self.rig or 'of unknown name'} at {self.endpoint}",
             f"on bus   {', '.join(self.roles)}" + (f"; no {', no '.join(missing)}" if missing else ""),
         ]
+        if self.state is not None and self.cause is not None:
+            lines.append(f"state    {self.state}: {_help('guard_state', self.state)}")
+            lines.append(f"cause    {self.cause}: {_help('cause', self.cause)}")
         if self.t_s is not None:
             lines.append(f"run      {self.t_s:.1f} s, {self.slips} slips")
         for name, column, word in (
@@ -88,10 +109,16 @@ class Status(NamedTuple):
             found.append("no controller is on the bus: the rig is on its own")
         elif self.mode is None:
             found.append(f"the controller sent no command for {_LISTEN_S:g} s")
-        if self.fallback:
+        if self.state in _NEXT:
+            found.append(_NEXT[self.state])
+        if self.guard_limit is not None and self.guard_limit not in _TOLD_ANYWAY:
+            found.append(f"{self.guard_limit}: {_help('cause', self.guard_limit)}")
+        if self.fallback and self.state in {"ARMED", "ACTIVE"}:
             found.append("the rig has no fresh command and ramps the vibration to zero by itself")
         if self.limit is not None and self.limit not in _TOLD_ANYWAY:
             found.append(f"{self.limit}: {_help('limit', self.limit)}")
+        if self.reason in WEAK_REASONS:
+            found.append(f"{self.reason}: {_help('reason', self.reason)}")
         if "recorder" not in self.roles:
             found.append("nothing is recorded")
         return found
@@ -134,7 +161,9 @@ def look(bus_config: BusConfig) -> Status:
     where = bus_config.endpoint
     try:
         bus = Bus(bus_config, "status", lockstep=False, patience_s=_DIAL_S)
-    except Fault:
+    except Fault as fault:
+        if fault.kind.code != "NO_PEER":
+            raise
         line = f"{where}: no rig answers there within {_DIAL_S:g} s: --endpoint must be that of a run under way"
         raise Fault("NO_PEER", f"{line}; start one, or give its --endpoint") from None
     with bus:
@@ -189,6 +218,10 @@ def _status(endpoint: str, rig: str | None, roles: list[str], newest: _Newest) -
         frequency_Hz=applied.frequency_Hz if applied else None,
         amplitude_m=applied.amplitude_m if applied else None,
         fallback=bool(applied.fallback) if applied else None,
+        state=word("guard_state", applied.guard_state) if applied else None,
+        cause=word("cause", applied.cause) if applied else None,
+        guard_limit=word("cause", applied.guard_limit) if applied else None,
+        heat_share=applied.heat_share if applied else None,
         events=_events(newest),
     )
 

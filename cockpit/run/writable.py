@@ -51,7 +51,6 @@ def check_writable(option: str, path: Path) -> None:
         line = f"{option} {path}: takes a file, and {path} is an option; give a file, or the whole path of one of that name"
         raise Fault("CONFIG", line)
     with writing(path):
-        Path(f"{path}.part").exists()  # it is written beside itself first: a name may be too long for that
         needed = [path] if path.exists() else []
         if path.is_file() or not needed:
             needed.append(next(parent for parent in path.absolute().parents if parent.exists()))
@@ -68,6 +67,6 @@ def writing(path: Path | None = None) -> Generator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        where = str(error.filename or path).removesuffix(".part")
+        where = error.filename if error.filename and not str(error.filename).endswith(".part") else path
         line = f"{where}: cannot be written: {error.strerror}; choose another place or free space"
         raise Fault("LOG_WRITE", line) from None

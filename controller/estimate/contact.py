@@ -11,7 +11,7 @@ import math
 
 from bridge.kernel import Record, kernel
 from controller.codes import SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
-from controller.estimate.windows import BINS, FORCE, SLIDE
+from controller.estimate.windows import BINS, DRIVE, FORCE, OF_STEP, SLIDE, WELL_KNOWN
 
 _SIGMAS = 6.0  # 1e-9 a window: less than one false announcement in 100 hours of windows of 1 ms
 _HALF = 0.5  # of v_d: the distance between stick and sliding that a window must resolve
@@ -90,7 +90,7 @@ def contact(p: Record, s: Record, force_N: float, tick_s: float) -> None:
     else:
         s.force_rate, likely = 0.0, 0.0
     s.score += min(tick_s / _SCORE_S, 1.0) * (likely - s.score)
-    _expect(s, force_N, tick_s, speed_mps)
+    _expect(p, s, force_N, tick_s, speed_mps)
 
 
 @kernel
@@ -113,8 +113,8 @@ def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
     elif s.measured == 0:
         s.contact = UNKNOWN
     elif s.moving == 0:
-        s.contact = STANDSTILL
-    elif s.level < 0 and s.unseen_s < _BLIND_S and before in (STANDSTILL, STICK):
+        s.contact = UNKNOWN if s.blind == 1 else STANDSTILL  # a drive that feeds unseen looks as if it stood
+    elif s.level < 0 and s.unseen_s < _BLIND_S and _stood(s, before, tick_s):
         s.contact = STICK  # a slide that stood sticks until it is seen to slide
     elif s.level < 0:
         s.contact = UNKNOWN
@@ -134,14 +134,23 @@ def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
 
 
 @kernel
-def _expect(s: Record, force_N: float, tick_s: float, speed_mps: float) -> None:
+def _stood(s: Record, before: int, tick_s: float) -> bool:
+    """Whether the slide stood until now, as it did when the drive started or turned."""
+    if s.moved_s > tick_s:
+        return before == STICK
+    return s.rested == 1 and (before in (STANDSTILL, STICK) or (before == UNKNOWN and s.blind == 1))
+
+
+@kernel
+def _expect(p: Record, s: Record, force_N: float, tick_s: float, speed_mps: float) -> None:
     """Say how long a stick will last and how long it is until the slip, and whether a stick can be seen in time."""
     way = 0 if s.direction > 0 else 1
     along_N = s.direction * force_N
     climbing_N_per_s = s.stiffness_N_per_m * speed_mps
     s.time_to_slip_s = -1.0
     if s.moving == 0 or climbing_N_per_s <= 0.0:
-        s.blind, s.unseen_s = 0, 0.0
+        s.unseen_s = 0.0
+        s.blind = 1 if s.moving == 0 and _feeds_unseen(p, s) else 0
         return
     swing_N = _EXPECTED_SWING * math.fabs(force_N)
     if s.swing_N[way] > 0.0:
@@ -152,3 +161,20 @@ def _expect(s: Record, force_N: float, tick_s: float, speed_mps: float) -> None:
     in_time = s.level >= 0 and (s.window_s < s.expected_stick_s or s.contact == STICK or s.slipping == 1)
     s.unseen_s = 0.0 if in_time else s.unseen_s + tick_s
     s.blind = 1 if s.unseen_s > _BLIND_S else 0
+
+
+@kernel
+def _feeds_unseen(p: Record, s: Record) -> bool:
+    """Whether a feed that counts as motion would not stand out from the noise of the drive's position within a second.
+
+    The noise is that of the best windows as white noise over a second, as a stop disturbs the long windows for seconds.
+    """
+    least_mps = math.inf
+    for level in range(p.levels):
+        if s.differences[level] < WELL_KNOWN:
+            break
+        share = p.window_s[level] / _LONGEST_WINDOW_S
+        least_mps = min(least_mps, s.sigma[DRIVE, level] * share * math.sqrt(share))
+    step_mps = OF_STEP * s.resolution[DRIVE] / _LONGEST_WINDOW_S
+    seen_mps = _SIGMAS * math.sqrt(least_mps * least_mps + step_mps * step_mps)
+    return math.isfinite(seen_mps) and seen_mps > p.least_feed_mps

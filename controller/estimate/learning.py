@@ -13,6 +13,7 @@ _KEPT = 0.9983  # of what was learnt of the stiffness, at each window that teach
 _FEWEST = 5.0  # windows until the told stiffness gives way to the learnt one
 _TOLD_SIGMA = 0.5  # of a told stiffness, over itself
 _STEADY_S = 0.05  # of constant v_d until a climbing force says something of the stiffness
+_MOST_OFF = 100.0  # factor by which a told stiffness may be off: beyond, the channels are not what they are called
 _SLIP_SHARE = 0.3  # of one more slip in the learnt breakaway and swing
 _SLIDING_S = 0.3  # time constant of the learnt sliding force
 
@@ -45,12 +46,19 @@ def stiffness(p: Record, s: Record) -> None:
         if s.taught >= _FEWEST and mean > 0.0:
             sigma = scatter / mean / math.sqrt(s.taught)
             if sigma < _TOLD_SIGMA or s.stiffness_learnt == 1:
-                s.stiffness_N_per_m, s.stiffness_sigma, s.stiffness_learnt = mean, min(max(sigma, 0.01), 1.0), 1
+                s.stiffness_N_per_m, s.stiffness_learnt = _bounded(p, mean), 1
+                s.stiffness_sigma = min(max(sigma, 0.01), 1.0)
     elif s.stiffness_learnt == 0 and s.moving == 1 and s.level >= 0 and s.steady_s > _STEADY_S:
         climbing_N_per_m = s.direction * s.slope[FORCE, s.level] / math.fabs(s.drive_velocity_mps)
         sure_N_per_m = _SIGMAS * s.sigma[FORCE, s.level] / math.fabs(s.drive_velocity_mps)
         if climbing_N_per_m - sure_N_per_m > s.stiffness_N_per_m:
-            s.stiffness_N_per_m = climbing_N_per_m
+            s.stiffness_N_per_m = _bounded(p, climbing_N_per_m)
+
+
+@kernel
+def _bounded(p: Record, stiffness_N_per_m: float) -> float:
+    told_N_per_m = p.drive_stiffness_N_per_m
+    return min(max(stiffness_N_per_m, told_N_per_m / _MOST_OFF), told_N_per_m * _MOST_OFF)
 
 
 @kernel
@@ -59,6 +67,22 @@ def begin(p: Record, s: Record) -> None:
     s.stiffness_N_per_m = p.drive_stiffness_N_per_m
     s.stiffness_sigma = _TOLD_SIGMA
     s.direction = 1
+
+
+@kernel
+def spring(s: Record, elongation_m: float) -> float:
+    """Force of the drive's spring from both positions [N], for a rig without a force sensor.
+
+    The spring is taken to be relaxed at the start; once the slide was dragged both ways, half-way between the farthest
+    elongations, as friction pulls as much one way as the other.
+    """
+    if s.stretched == 0:
+        s.shortest_m, s.longest_m, s.stretched = elongation_m, elongation_m, 1
+        s.relaxed_m = elongation_m
+    s.shortest_m, s.longest_m = min(s.shortest_m, elongation_m), max(s.longest_m, elongation_m)
+    if s.dragged[0] == 1 and s.dragged[1] == 1:
+        s.relaxed_m = 0.5 * (s.shortest_m + s.longest_m)
+    return s.stiffness_N_per_m * (elongation_m - s.relaxed_m)
 
 
 @kernel
@@ -81,3 +105,5 @@ def forces(s: Record, force_N: float, tick_s: float) -> None:
             s.sliding_N[way] = along_N if known_N == 0.0 else known_N + tick_s / _SLIDING_S * (along_N - known_N)
     if s.slipping == 0 and s.contact != STICK:
         s.peak_N = along_N
+    if s.contact == SMOOTH or s.slipping == 1:
+        s.dragged[way] = 1

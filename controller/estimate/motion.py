@@ -3,17 +3,25 @@
 import math
 
 from bridge.kernel import Record, kernel
-from controller.estimate.windows import BINS, DRIVE, FORCE
+from controller.estimate.windows import BINS, DRIVE, FORCE, WELL_KNOWN
 
 _SIGMAS = 6.0  # 1e-9 a window that a standing drive is called moving
-_UNSURE_SIGMAS, _WELL_KNOWN = 9.0, 40  # the same while the noise of the window is known from fewer differences
+_UNSURE_SIGMAS = 9.0  # the same while the noise of the window is known from fewer differences
 _AGREE_SIGMAS = 5.0  # of the shorter of two neighbours, within which their slopes are of one velocity
 _AFTER_STOP_S = 0.01  # shortest of the longest windows after a stop
 _EXACT = 0.005  # of v_d: noise at which no longer window is asked
 _SURE = 0.03  # noise of v_d, over it, up to which it is held: the first windows of a move are off by a third
 _STEADY = 0.04  # change of v_d, over it, from which the drive is not steady
+# Standstill after which the slide is taken to have come to rest. Shorter: a slide that still slides is called stuck where the
+# drive only became too slow to be seen at once.
+_RESTED_S = 0.2
+_SURELY_SIGMAS = 3.3
+_ROUGHLY = 0.1  # noise of a window, over its velocity, up to which it may say that the drive speeds up
+_MOST_AHEAD = 1.3  # of a window's velocity, as a speed that has come to its end looks as if it went on to grow
+_OF_TWO = 1.8  # sigma of twice a slope less that over twice the window, over that of the slope
 # Of a move, in which a force that climbs may say so before the position does: at 50 N/um breakaway comes after 6 ms.
 _BY_FORCE_S = 0.02
+_FORCE_SETTLES_S = 0.05  # after a vibration: the friction that it took off comes back, and the force climbs with it
 _HOLD_S = 0.1  # in which the held velocity falls to a third: what a slide still does after a step of the drive
 
 
@@ -25,7 +33,7 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
     From there on, ever longer windows as long as each agrees with the one before (Lepski's rule), until the noise is small.
     """
     velocity_mps, sigma_mps = 0.0, 0.0
-    first = -1
+    first, taken = -1, 0
     for level in range(p.levels):
         if s.pushed[level] < BINS:
             break
@@ -41,12 +49,13 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
         agrees = math.fabs(slope - velocity_mps) <= _AGREE_SIGMAS * sigma_mps
         if first >= 0 and not agrees and level > first + 1:
             break
-        velocity_mps, sigma_mps = slope, sigma
+        velocity_mps, sigma_mps, taken = slope, sigma, level
         if first < 0 or not agrees:  # what the next window does not confirm was noise
-            sure = _SIGMAS if s.differences[level] >= _WELL_KNOWN else _UNSURE_SIGMAS
+            sure = _SIGMAS if s.differences[level] >= WELL_KNOWN else _UNSURE_SIGMAS
             first = level if math.fabs(slope) > max(sure * sigma, p.least_feed_mps) else -1
     moving = first >= 0 and not _stopped(s, first)
-    if p.use_force == 1 and s.moved_s < _BY_FORCE_S and not moving:
+    quiet = s.allowed_m == 0.0 and s.silent_steps * p.block_s > _FORCE_SETTLES_S
+    if p.use_force == 1 and s.moved_s < _BY_FORCE_S and not moving and quiet:
         by_force_mps = _climbing(p, s)
         if by_force_mps != 0.0:
             velocity_mps, moving = by_force_mps, True
@@ -59,17 +68,42 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
     s.steady_s += tick_s
     if moving:
         direction = 1 if velocity_mps > 0.0 else -1
-        if direction != s.direction:
+        turned = direction != s.direction
+        if turned:
             s.direction = direction
             s.moved_s = 0.0
+        if s.moved_s == 0.0:
+            s.rested = 1 if turned or s.stood_s > _RESTED_S else 0
         s.moved_s += tick_s
         s.stood_s = 0.0
     else:
         s.moved_s = 0.0
         s.stood_s += tick_s
+    # so much that v_a at the least ratio is above v_d for all but 5e-4 of its noise
+    surely_mps = (speed_mps + _SURELY_SIGMAS * sigma_mps) / p.least_ratio
+    s.rising_mps = max(_rising(s, speed_mps, taken), surely_mps) if moving else 0.0
     s.held_mps *= 1.0 - min(tick_s / _HOLD_S, 1.0)
     if moving and sigma_mps < _SURE * speed_mps:
         s.held_mps = max(s.held_mps, speed_mps)
+
+
+@kernel
+def _rising(s: Record, speed_mps: float, taken: int) -> float:
+    """|v_d| at the end of the windows where it grows [m/s]; else `speed_mps`, which is that of the middle of level `taken`.
+
+    The shortest window that says so counts. Of two windows the longer one is as much slower than the shorter one as that is
+    slower than the drive is now.
+    """
+    for level in range(taken):
+        sigma, slope = s.noise[DRIVE, level], s.direction * s.slope[DRIVE, level]
+        if sigma == 0.0 or s.differences[level] < WELL_KNOWN or sigma > _ROUGHLY * slope:
+            continue
+        now_mps = min(2.0 * slope - s.direction * s.slope[DRIVE, level + 1], _MOST_AHEAD * slope)
+        if now_mps > slope and now_mps - speed_mps > _OF_TWO * _AGREE_SIGMAS * sigma:
+            return now_mps
+        if slope - speed_mps > _AGREE_SIGMAS * sigma:
+            return slope
+    return speed_mps
 
 
 @kernel
@@ -95,7 +129,7 @@ def _climbing(p: Record, s: Record) -> float:
             break
         noise_N_per_s, noise_mps = s.noise[FORCE, level], s.noise[DRIVE, level]
         velocity_mps = s.slope[FORCE, level] / s.stiffness_N_per_m
-        if s.differences[level] >= _WELL_KNOWN and math.fabs(s.slope[FORCE, level]) > _SIGMAS * noise_N_per_s:
+        if s.differences[level] >= WELL_KNOWN and math.fabs(s.slope[FORCE, level]) > _SIGMAS * noise_N_per_s:
             seen = math.fabs(velocity_mps - s.slope[DRIVE, level]) < _SIGMAS * noise_mps
             return velocity_mps if seen and math.fabs(velocity_mps) > p.least_feed_mps else 0.0
     return 0.0

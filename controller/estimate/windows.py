@@ -24,10 +24,11 @@ _QUARTILE = 0.3186  # of |d| of a normal distribution, over its sigma
 _WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for white noise
 # Differences until a level's own noise is used; before, that of shorter windows is carried on as white noise.
 _FEWEST = 10
+WELL_KNOWN = 40  # differences from which a level's noise is off by some per cent only
 _CARRIED = 1.3  # factor for a noise that is carried on: ten differences are 20 % off, and no noise is quite white
 _FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # of the logarithm of sigma that one difference moves; 6 % of scatter at 0.005
 # Largest error of a slope by a quantisation step q over a window is q / W; uniform in a step it is 0.29 of that.
-_OF_STEP = 0.29
+OF_STEP = 0.29
 
 
 @kernel
@@ -100,7 +101,7 @@ def _note_noise(p: Record, s: Record, level: int) -> None:
                 measured = s.noise[row, i - 1] * _WHITE * (_CARRIED if s.differences[i - 1] >= _FEWEST else 1.0)
             else:
                 break
-            step = _OF_STEP * s.resolution[row] / p.window_s[i]
+            step = OF_STEP * s.resolution[row] / p.window_s[i]
             s.noise[row, i] = math.sqrt(measured * measured + step * step)
 
 

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 OTHER_NAMES = ("none", "unexplained")
+_MOST = 0.5  # share of the held-out gap from which "partly" counts as a name, not as "unexplained"
 # the result of a case that ended in a fault: no answer, so every score counts the case as wrong
 _NOTHING_SAID: dict[str, Any] = {
     "verdict": "fault",
@@ -16,7 +17,7 @@ _NOTHING_SAID: dict[str, Any] = {
 
 
 class Opened(NamedTuple):
-    """Answer and result of one case; `said` has the keys of the format `diagnosis/1`, or some of them."""
+    """Answer and result of one case; `said` has the keys of the format `diagnosis/2`, or some of them."""
 
     name: str
     answer: dict[str, Any]
@@ -48,8 +49,16 @@ class Opened(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """The verdict of the result: effect, no-gap, unexplained, or fault."""
+        """The verdict of the result: effect, partly, no-gap, unexplained, or fault."""
         return self.said["verdict"]
+
+    @property
+    def told_outside(self) -> bool:
+        """Whether the result says that no known effect accounts for most of the gap."""
+        if self.verdict != "partly":
+            return self.verdict == "unexplained"
+        share = self.said["gap"].get("shrinkage")
+        return share is None or share < _MOST
 
     @property
     def named(self) -> frozenset[str]:

@@ -3,12 +3,12 @@
 A set of hundreds of cases takes hours. Two halves, each opened once and diagnosed by the same version, are worth as much.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bridge.faults import Fault
+from bridge.files import read_json
 from diagnosis.blind.locating import LEAST_SHARE, shares
 from diagnosis.blind.opening import OpenedSet
 from diagnosis.blind.outcomes import Opened
@@ -83,7 +83,7 @@ def _scored_of(said: Mapping[str, Any]) -> dict[str, Any]:
 
 def _read(path: Path) -> OpenedSet:
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        table = read_json(path)
     except OSError as error:
         raise Fault("BAD_SET", f"{path}: cannot be read: {error.strerror}; {_MADE_BY}") from None
     except ValueError as error:

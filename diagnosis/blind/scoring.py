@@ -24,7 +24,7 @@ Oracle = dict[str, float | None]  # by case: shrinkage with the true effects
 class Singles(NamedTuple):
     """Scores of cases with one effect of the library."""
 
-    alarm: Score | None  # the verdict is effect or unexplained
+    alarm: Score | None  # the verdict is effect, partly or unexplained
     top_1: Score | None  # the true effect is the first candidate
     top_3: Score | None  # the true effect is among the first three candidates
     in_group: Score | None  # the true effect is named, or said to look like a named effect
@@ -52,7 +52,9 @@ class Scores(NamedTuple):
     by_backbone: dict[str, Singles]
     false_alarms: Score | None
     false_alarms_wide: Score | None  # of rigs whose numbers were drawn from wider tolerances than usual
-    outside_caught: Score | None  # effects outside the library whose verdict is unexplained
+    outside_caught: (
+        Score | None
+    )  # effects outside the library whose verdict is unexplained, or partly with less than half
     outside_caught_visible: Score | None  # of 2 detection limits or more
     outside_named: Score | None
     sure_of_wrong_name: (
@@ -109,10 +111,8 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
         },
         false_alarms=rate([case.verdict != "no-gap" for case in no_gap]),
         false_alarms_wide=rate([case.verdict != "no-gap" for case in no_gap if case.answer["tolerances"] > 1.0]),
-        outside_caught=rate([case.verdict == "unexplained" for case in outside]),
-        outside_caught_visible=rate(
-            [case.verdict == "unexplained" for case in outside if case.detectability >= _VISIBLE]
-        ),
+        outside_caught=rate([case.told_outside for case in outside]),
+        outside_caught_visible=rate([case.told_outside for case in outside if case.detectability >= _VISIBLE]),
         outside_named=rate([bool(case.named) for case in outside]),
         sure_of_wrong_name=rate([_sure_of(case, effects_only=True) for case in made]),
         sure_of_wrong_answer=rate([_sure_of(case, effects_only=False) for case in one_right]),
@@ -143,7 +143,7 @@ def score(cases: Sequence[Opened], oracle: Oracle) -> Scores:
 def of_singles(cases: Sequence[Opened]) -> Singles:
     """The scores of cases with one effect of the library."""
     return Singles(
-        alarm=rate([case.verdict in {"effect", "unexplained"} for case in cases]),
+        alarm=rate([case.verdict in {"effect", "partly", "unexplained"} for case in cases]),
         top_1=rate([frozenset(name for name, _ in case.ranked[:1]) == case.truth for case in cases]),
         top_3=rate([case.truth <= {name for name, _ in case.ranked[:3]} for case in cases]),
         in_group=rate([case.truth <= case.group for case in cases]),

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
-from bridge.files import write_json
+from bridge.files import read_json, write_json
 from diagnosis.blind.version import tool_version
 
 Answer = dict[str, Any]
@@ -85,7 +85,7 @@ def read_key(path: Path) -> dict[str, Secret]:
 
 def _read(path: Path, wanted: str, fields: tuple[str, ...]) -> dict[str, dict[str, Any]]:
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        table = read_json(path)
     except OSError as error:
         raise Fault(
             "BAD_SET", f"{path}: cannot be read: {error.strerror}; `python -m tests.blind make` writes such a file"

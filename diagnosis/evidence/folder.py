@@ -84,6 +84,7 @@ def load_evidence(folder: Path) -> Evidence:
         text = f"none for {', '.join(exact)}: known exactly, so an ordinary difference there will be called an effect"
         findings.append(Finding("tolerance", f"{MANIFEST}: rig.tolerance", text))
     for table in manifest.run:
+        _refuse_a_way_out(folder, table.file)
         check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
     read = [read_columns(folder / table.file, manifest.channels) for table in manifest.run]
     _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
@@ -97,6 +98,13 @@ def load_evidence(folder: Path) -> Evidence:
         text = "no run is marked holdout: this one is held out; mark one to choose for yourself"
         findings.append(Finding("holdout", runs[-1].file, text))
     return Evidence(folder, manifest.rig, tuple(runs), tuple(findings))
+
+
+def _refuse_a_way_out(folder: Path, file: str) -> None:
+    """Raise Fault BAD_EVIDENCE for a run that is a link to a file outside of its folder, which may be nobody's to show."""
+    if not (folder / file).resolve().is_relative_to(folder.resolve()):
+        line = f"{MANIFEST}: run.file = {file!r}: is a link that leads out of the folder: must be a file in it"
+        raise Fault("BAD_EVIDENCE", f"{line}; copy the file there")
 
 
 def _refuse_misspelt(manifest: Manifest, findings: list[Finding]) -> None:

@@ -11,6 +11,7 @@ from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
+from bridge.files import LOG, folder_beside, followed, refuse_to_replace, replacing
 from bridge.log.finding import Finding
 from bridge.log.runlog import RunLog
 from bridge.tables.export import CHANNELS
@@ -208,16 +209,13 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
     ]
     created = not out.exists()
     out.mkdir(parents=True, exist_ok=True)
-    part, manifest_part = out / (run.file + ".part"), out / (MANIFEST + ".part")
     try:
         fields = [pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit_of(name)}) for name in columns]
-        pq.write_table(pa.table(list(columns.values()), schema=pa.schema(fields)), part, use_dictionary=False)
-        manifest_part.write_text(manifest_text(rig, runs, assumed), encoding="utf-8")
-        part.replace(out / run.file)
-        manifest_part.replace(out / MANIFEST)
+        # the manifest takes its place last: it names the table
+        with replacing(out / MANIFEST) as manifest, replacing(out / run.file) as file:
+            manifest.write(manifest_text(rig, runs, assumed).encode("utf-8"))
+            pq.write_table(pa.table(list(columns.values()), schema=pa.schema(fields)), file, use_dictionary=False)
     finally:
-        part.unlink(missing_ok=True)
-        manifest_part.unlink(missing_ok=True)
         if created and not any(out.iterdir()):
             out.rmdir()
     return Imported(out, run.file, len(columns["t_s"]), list(columns), _missing(columns), findings)
@@ -254,9 +252,9 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
     commanded = [name for name in columns if name.startswith("vibration")]
     text = "left out, as the log holds sensors alone: without it the run counts as one without vibration; import it into a folder"
     findings += [Finding("missing", f"{path.name}: {name}", text) for name in commanded]
-    part = out.with_name(out.name + ".part")
-    log = RunLog(part, lockstep=True)
-    try:
+    refuse_to_replace(out, LOG, str(out))
+    with folder_beside(out) as folder:
+        log = RunLog(folder / "import.mcap", lockstep=True)
         about = {"source": path.name, "sample_rate_Hz": 1.0 / step_s, "samples_per_block": _BLOCK_SAMPLES}
         log.add_metadata("import", about | {"missing": missing, "starts_at_s": float(t_s[0]) - step_s})
         message = sensor_block(_BLOCK_SAMPLES).blank()
@@ -269,9 +267,7 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
                     message[name] = columns[name][samples]
             log.write(SENSORS, message.tobytes())
         log.close()
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
+        log.path.replace(followed(out))
     return Imported(
         out, out.name, blocks * _BLOCK_SAMPLES, [name for name in CHANNELS if name in columns], missing, findings
     )

@@ -1,6 +1,7 @@
 """The keys of `manifest.toml` in an evidence folder: the rig, how well it is known, the channels and the runs."""
 
 import math
+from collections import Counter
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal
 
@@ -144,10 +145,11 @@ class Manifest(Strict):
     def _names_are_right(self) -> "Manifest":
         check_channel_names(self.channels)
         names = [str(PurePath(run.file).with_suffix("")) for run in self.run]
+        counts = Counter(names)
         for run, name in zip(self.run, names, strict=True):
-            if names.count(name) > 1:
+            if counts[name] > 1:
                 raise ValueError(
-                    f"run.file = {run.file!r}: {names.count(name)} runs are called {name!r}; each run has a file of its own, "
+                    f"run.file = {run.file!r}: {counts[name]} runs are called {name!r}; each run has a file of its own, "
                     "and goes by its name without the suffix: rename one"
                 )
         if all(run.holdout for run in self.run):
@@ -180,6 +182,9 @@ def read_manifest(folder: Path) -> Manifest:
     check_folder(folder)
     path = folder / MANIFEST
     check_file(path, "BAD_EVIDENCE", "an evidence folder needs it, see `stickslip log import`")
+    if not path.resolve().is_relative_to(folder.resolve()):
+        line = f"{path}: is a link that leads out of the folder: must be a file in it; copy the file there"
+        raise Fault("BAD_EVIDENCE", line)
     try:
         table = read_toml(path)
         if "format" in table and table["format"] != FORMAT:

@@ -24,7 +24,7 @@ from diagnosis.model.sensor_chain import SENSOR_EFFECTS, Chain, sensed, true_for
 from diagnosis.model.true_force import relative, true_commands
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
-from plant.four_rigs_step import LANES
+from plant.four_rigs_step import NARROW
 
 Floats = npt.NDArray[np.floating[Any]]
 AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # an effect, and the contact's age when a run begins
@@ -186,7 +186,7 @@ class Problem:
         found = {key: self._simulated.pop(key) for key in set(keys) if key in self._simulated}
         todo = {key: request for key, request in zip(keys, requests, strict=True) if key not in found}
         spare: dict[object, _Request] = {}
-        if len(todo) % LANES:
+        if len(todo) % NARROW:
             soon = [_request(run, point, None) for point in perhaps]
             known = todo.keys() | found.keys() | self._simulated.keys()
             spare = {key: request for request in soon if (key := _key(run, request, inputs)) not in known}

@@ -23,7 +23,7 @@ from diagnosis.model.rig import Entry, Rig, Start, built
 from plant.config import RigConfig
 from plant.core import advance_disturbed
 from plant.four_rigs import advance_lanes
-from plant.four_rigs_step import LANES
+from plant.four_rigs_step import LANES, NARROW
 from plant.records import TRUTH
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -75,10 +75,14 @@ def predict_many(
     found: dict[int, Floats] = {}
     for numbers in same_steps.values():
         needed = len(numbers) if wanted is None else sum(number < wanted for number in numbers)
-        for group in (numbers[first : first + LANES] for first in range(0, needed, LANES)):
-            lanes = [*group, *[group[-1]] * (LANES - len(group))]
+        first = 0
+        while first < needed:
+            width = LANES if needed - first > NARROW else NARROW
+            group = numbers[first : first + width]
+            lanes = [*group, *[group[-1]] * (width - len(group))]
             signals = _side_by_side([rigs[number] for number in lanes], commands, [entries[one] for one in lanes])
             found |= zip(group, signals, strict=False)
+            first += width
     return [dict(zip(SIGNALS, found[number], strict=True)) if number in found else None for number in range(len(rigs))]
 
 
@@ -100,13 +104,13 @@ def _led(rig: Rig, commands: Commands) -> Floats:
 
 
 def _side_by_side(rigs: Sequence[Rig], commands: Commands, entries: Sequence[Sequence[Entry]]) -> Floats:
-    """Signals of `LANES` rigs with the same steps, [LANES, signals, blocks]."""
+    """Signals of `NARROW` or `LANES` rigs with the same steps, [rigs, signals, blocks]."""
     blocks = np.array([entry.block for entry in entries[0]], np.int64)
     ages_s = [[math.nan if entry.age_s is None else entry.age_s for entry in own] for own in entries]
     forces_N = [[entry.force_N for entry in own] for own in entries]
-    out = np.empty((LANES, len(SIGNALS), len(commands.drive)))
+    out = np.empty((len(rigs), len(SIGNALS), len(commands.drive)))
     advance_lanes(
-        np.concatenate([rig.params for rig in rigs]), np.concatenate([rig.state for rig in rigs]), BLOCK_S,
+        (1,) * len(rigs), np.concatenate([rig.params for rig in rigs]), np.concatenate([rig.state for rig in rigs]), BLOCK_S,
         commands.drive, commands.frequency_Hz, commands.amplitude_m, rigs[0].steps,
         blocks, np.array(forces_N).T.copy(), np.array(ages_s).T.copy(), out,
     )  # fmt: skip

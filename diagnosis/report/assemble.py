@@ -24,7 +24,6 @@ from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.pictures.choice import pictures
-from diagnosis.report.summary import summary
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.verdict.blend import flexible_differences
 from diagnosis.verdict.confirmation import Confirmation
@@ -48,7 +47,7 @@ def assembled(
     began: float,
     jobs: int,
 ) -> Diagnosis:
-    """The diagnosis of an evidence.
+    """The diagnosis of an evidence, still without its relations and without sentences.
 
     Args:
         evidence, runs: the evidence as read, and all its runs, held-out runs among them.
@@ -81,7 +80,7 @@ def assembled(
         for name, probability in verdict.probabilities.items()
     )
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
-    effects = best.hypothesis.effects if verdict.named else ()
+    effects = verdict.names
     followed = [one for one in verdict.ranked if not is_random(one.fit.hypothesis)]
     alike = imitators(fitter, followed, verdict.scale) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
@@ -92,7 +91,7 @@ def assembled(
             following = Experiment(SINE, "Every effect of the library shakes the base with a sine.", None)
     else:
         following = next_experiment(fitter.problem, nuisances, leaders)
-    done = Diagnosis(
+    return Diagnosis(
         verdict=verdict.kind,
         effects=effects,
         summary=(),
@@ -113,7 +112,6 @@ def assembled(
         compared_features=len(baseline.residual),
         elapsed_s=time.monotonic() - began,
     )
-    return done._replace(summary=summary(done))
 
 
 def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:

@@ -6,7 +6,7 @@ from typing import Any, Final, NamedTuple
 
 from bridge import units
 from bridge.files import write_whole
-from diagnosis.report import words
+from diagnosis.report import relation_words, words
 from diagnosis.report.page_plots import STYLES, draw
 from diagnosis.result import Candidate, Cell, Diagnosis, Gap, RigNumber
 
@@ -15,7 +15,12 @@ _REGIMES = ("stick", "breakaway", "slip", "restick", "steady")
 _SMALL = 0.005
 # Probability below which an effect is listed by name alone. Smaller: a long table. Larger: candidates are missed.
 _SMALL_PROBABILITY = 0.015
-_BANNERS: Final = {"effect": "An effect was found", "no-gap": "No gap", "unexplained": "Unexplained gap"}
+_BANNERS: Final = {
+    "effect": "An effect was found",
+    "partly": "A part is explained",
+    "no-gap": "No gap",
+    "unexplained": "Unexplained gap",
+}
 
 
 class GapBar(NamedTuple):
@@ -65,6 +70,10 @@ def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
         "who": words.who_in_words,
         "closed": words.closed_in_words,
         "closed_between": words.closed_between,
+        "sizes": relation_words.sizes_in_words,
+        "remainder": relation_words.remainder_in_words,
+        "relation_number": relation_words.number_in_words,
+        "between": units.interval,
         "sd": lambda shift: f"{shift:+.1f}",
     }
     template = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")

@@ -36,11 +36,11 @@ def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
     """
     refuse_force_drive(evidence)
     name = evidence.folder.name
-    if diagnosis.verdict == "unexplained":
+    if diagnosis.verdict in ("unexplained", "partly"):
         raise Fault(
             "CONFIG",
-            f"{name}: the verdict is unexplained: there is no effect to apply; measure what the diagnosis suggests next, and "
-            "diagnose again",
+            f"{name}: the verdict is {diagnosis.verdict}: there is no effect to apply; measure what the diagnosis suggests "
+            "next, and diagnose again",
         )
     table = rig_table(diagnosis, evidence)
     validate(RigConfig, table, f"the rig diagnosed from {name}")

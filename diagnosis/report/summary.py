@@ -6,6 +6,7 @@ from bridge.units import percent, signal_name, times
 from diagnosis.evidence.exciter_harmonics import DISTORTED
 from diagnosis.evidence.force_pickup import PICK_UP
 from diagnosis.model.per_run import has_own_phases
+from diagnosis.report.relation_words import remainder_in_words
 from diagnosis.report.words import EFFECT_WORDS, cannot_tell, closed_between, closed_in_words, estimate_in_words
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
@@ -45,6 +46,13 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 f"It scatters as {nearest.effect} at random would (probability {percent(nearest.probability)}), and as bursts "
                 "of debris or a tilted track would: no path can be told from these runs."
             )
+    elif diagnosis.verdict == "partly":
+        sentences.append(
+            f"{' and '.join(diagnosis.effects)} explains a part of what differs, more than chance would; the rest is not "
+            "explained."
+        )
+    if diagnosis.remainder is not None and diagnosis.remainder.what:
+        sentences.append(f"{remainder_in_words(diagnosis.remainder)}.")
     still = [finding.where.partition(":")[0] for finding in diagnosis.findings if finding.kind == "still"]
     if still:
         sentences.append(f"In {', '.join(still)} the drive stands still: friction and drive are not tested there.")
@@ -70,7 +78,9 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
         candidate = next(one for one in diagnosis.candidates if one.effect == name)
         numbers = ", ".join(estimate_in_words(name, *item) for item in candidate.parameters.items())
         says = "explains it" if i == 0 else "is needed besides"
-        if len(diagnosis.effects) > 1 and i == 0:
+        if diagnosis.verdict == "partly":
+            says = "explains a part of it" if i == 0 else "another part"
+        elif len(diagnosis.effects) > 1 and i == 0:
             says = f"explains it together with {diagnosis.effects[1]}"
         sentences.append(
             f"{name} {says}"

@@ -37,6 +37,8 @@ def answer(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "unexplained":
         return "these runs differ from the rig as described, and no known effect accounts for it"
     names = " and ".join(diagnosis.effects)
+    if diagnosis.verdict == "partly":
+        return f"{names} explains a part of what differs; the rest is not explained"
     sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
     others = [one for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for one in group]
     others = [one for one in dict.fromkeys(others) if one not in diagnosis.effects]

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bridge.config import validate
+from bridge.files import write_whole
 from bridge.tables.writers import ArrowTable
 from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
 from diagnosis.evidence.manifest_text import manifest_text
@@ -113,7 +114,7 @@ def make_evidence(folder: Path, case: Case, seed: int, progress: Callable[[float
         writer.finish()
         runs.append(RunTable(file=file, drive_velocity_mps=velocity_mps, holdout=plan.holdout))
         progress(number / len(plans))
-    (folder / MANIFEST).write_text(manifest_text(table, runs, []))
+    write_whole(folder / MANIFEST, manifest_text(table, runs, []))
 
 
 def _after_earlier_runs(rig: DrawnRig, before_s: float) -> DrawnRig:

@@ -61,14 +61,20 @@ class RankedFit(NamedTuple):
 class Verdict(NamedTuple):
     """The answer of one judgement over fits."""
 
-    kind: Literal["effect", "no-gap", "unexplained"]
-    named: Fit | None  # None unless `kind` is "effect"
+    kind: Literal["effect", "partly", "no-gap", "unexplained"]
+    named: Fit | None  # None unless `kind` is "effect" or "partly"; None there where no fit has what is named
     probabilities: dict[str, float]  # of every effect, "none" and "unexplained", largest first; they add up to 1
     runner_up: Fit | None
     ranked: tuple[RankedFit, ...]  # single effects, the largest evidence first
     scale: float  # the misfit that all evidence is divided by, at least 1
     refuted: tuple[str, ...] = ()  # effects that won, and that the held-out runs do not confirm
     outside: bool = False  # whether the runs show a vibration that no feature compares and no effect makes
+    by_relations: tuple[str, ...] = ()  # names that the relations decide, where they are not those of `named`
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The named effects."""
+        return self.by_relations or (() if self.named is None else self.named.hypothesis.effects)
 
 
 def _left_by_right(baseline: Fit, best: RankedFit, expected_chi2: float) -> float:

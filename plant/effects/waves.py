@@ -8,7 +8,7 @@ TWO_PI = 2.0 * math.pi
 
 
 @kernel
-def _value(index: float, seed: float) -> float:
+def lattice_value(index: float, seed: float) -> float:
     """A number of unit variance that belongs to a lattice point: the same on every machine, no generator needed."""
     mixed = math.sin(index * 12.9898 + seed * 78.233) * 43758.5453
     return (mixed - math.floor(mixed) - 0.5) * math.sqrt(12.0)
@@ -18,10 +18,15 @@ def _value(index: float, seed: float) -> float:
 def smooth_noise(at: float, seed: float) -> float:
     """Noise with mean 0 and variance 1, smooth, with a new value at every whole number."""
     index = math.floor(at)
-    share = at - index
+    return noise_in_cell(at - index, lattice_value(index, seed), lattice_value(index + 1.0, seed))
+
+
+@kernel
+def noise_in_cell(share: float, before: float, after: float) -> float:
+    """Smooth noise at a share of the way from one lattice point to the next, from its values there."""
     share = share * share * (3.0 - 2.0 * share)
     # the mean of (1 - share)^2 + share^2 over a cell is 26/35
-    return (_value(index, seed) * (1.0 - share) + _value(index + 1.0, seed) * share) / math.sqrt(26.0 / 35.0)
+    return (before * (1.0 - share) + after * share) / math.sqrt(26.0 / 35.0)
 
 
 @kernel

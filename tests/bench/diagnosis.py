@@ -109,7 +109,8 @@ def _gain(effects: dict[str, dict[str, float | str]]) -> float:
         for _ in range(LANES):
             params, state, steps = built(config, False, commands, start)
             p = params[0]
-            p.steps_per_sample, p.samples_per_block, p.dt_s = 1, steps[0], 1e-3 / steps[0]
+            p.steps_per_sample = p.steps_per_stick_sample = 1
+            p.samples_per_block, p.dt_s, p.stick_dt_s = steps[0], 1e-3 / steps[0], 1e-3 / steps[0]
             analogue, truth = (np.empty((len(rows), int(steps.sum()))) for rows in (CHANNELS, TRUTH))
             run_blocks(params, state, drive, still, still, analogue, truth)
         apart_s.append(time.perf_counter() - begin)

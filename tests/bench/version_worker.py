@@ -9,6 +9,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 # where the functions were in the version a44e824, and are now
 _PLACES = {
     "old": {
@@ -16,16 +18,39 @@ _PLACES = {
         "scenario": "cockpit.scenario",
         "log": "bridge.logfile",
         "replay": "cockpit.replaying",
+        "messages": "bridge.messages",
     },
     "new": {
         "run": "cockpit.run.in_process",
         "scenario": "cockpit.run.scenario",
         "log": "bridge.log.logfile",
         "replay": "cockpit.run.replay",
+        "messages": "bridge.wire.messages",
     },
 }
 _STEP_S = 1e-5
 _VIBRATED_STEP_S = 6.25e-6
+
+
+def _steps(version: str) -> Any:
+    """A compiled function that takes all blocks of a run, as a run in one process does."""
+    kernel: Any = importlib.import_module("bridge.kernel").kernel
+    step = importlib.import_module("controller.core").step
+    if version == "old":
+
+        @kernel
+        def of_old(params: Any, state: Any, sensors: Any, command: Any, trace: Any, scratch: Any) -> None:
+            for i in range(sensors.shape[0]):
+                step(params, state, sensors[i : i + 1], 1, 0, sensors[i].t_ns, command, trace, scratch)
+
+        return of_old
+
+    @kernel
+    def of_new(params: Any, state: Any, sensors: Any, command: Any, trace: Any, scratch: Any) -> None:
+        for i in range(sensors.shape[0]):
+            step(params, state, sensors[i : i + 1], 1, 0, sensors[i].t_ns, command, trace)
+
+    return of_new
 
 
 class Worker:
@@ -40,9 +65,12 @@ class Worker:
         self._replay: Any = importlib.import_module("controller.replay").replay
         self._ours: Any = importlib.import_module("tests.bench.solvers").ours
         case: Any = importlib.import_module("tests.bench.case")
+        self._messages = _PLACES[version]["messages"]
         self._still = case.unvibrated()
         self._shaken = case.vibrated(self._still)
         self._log = folder / f"{version}.mcap"
+        self._steps = _steps(version)
+        self._told: tuple[Any, Any] | None = None
 
     def in_process(self, seconds: float) -> float:
         """A run with its log."""
@@ -60,6 +88,19 @@ class Worker:
         if not result.identical:
             raise RuntimeError("a replay differs from its log")
         return took_s
+
+    def controller(self, _seconds: float) -> float:
+        """The controller's steps alone, over the blocks of the log."""
+        if self._told is None:
+            scenario = self._load_scenario("paper-c45-c45", [])
+            self._told = scenario.controller, self._read_run(self._log).sensors
+        config, sensors = self._told
+        records, messages = importlib.import_module("controller.records"), importlib.import_module(self._messages)
+        params, state = records.build(config)
+        command, trace = messages.COMMAND.blank(), messages.TRACE.blank()
+        begin_s = time.perf_counter()
+        self._steps(params, state, sensors, command, trace, np.empty(sensors["drive_force_N"].shape[1]))
+        return time.perf_counter() - begin_s
 
     def plant(self, _seconds: float) -> float:
         """The rig's kernel without vibration."""

@@ -67,7 +67,7 @@ def close_the_loop(
     """Run the loop in lockstep for `seconds`; `deliver` says what becomes of each block on its way, None for lost."""
     rig_config = validate(RigConfig, {"contact": {"pair": pair}} | (rig or {}), "rig")
     plant, node = (
-        PlantNode(rig_config, seed),
+        PlantNode(rig_config, seed, arm=True),
         ControllerNode(validate(ControllerConfig, controller or {}, "controller")),
     )
     traces: list[bytes] = []

@@ -89,7 +89,7 @@ def test_a_piezo_that_suffices_again_is_weak_no_longer() -> None:
     loop = close_the_loop(5.0, rig={"drive": {"profile": profile}, "piezo": {"delivered_ratio": 0.3}})
     assert set(loop.trace["reason"][(loop.t_s > 1.0) & (loop.t_s < 2.0)]) == {wire.PIEZO_WEAK}
     assert loop.ratio(3.5).min() > 1.05
-    assert set(loop.trace["reason"][loop.t_s > 3.5]) == {wire.HELD}
+    assert set(loop.trace["reason"][loop.t_s > 3.5]) <= {wire.HELD, wire.STILL_NEEDED}
 
 
 def test_velocity_ratio_holds_while_the_drive_speeds_up_and_slows_down() -> None:
@@ -168,7 +168,7 @@ def test_no_false_stick_in_a_minute_of_smooth_sliding() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("channel", ["drive_force_N", "mass_accel_mps2", "base_accel_mps2", "drive_position_m"])
+@pytest.mark.parametrize("channel", ["drive_force_N", "mass_position_m", "base_accel_mps2", "drive_position_m"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("bad_block", [20, 300, 1500])  # before, at and after the switch-on
 def test_a_sample_that_is_no_number_is_forgotten(channel: str, value: float, bad_block: int) -> None:
@@ -184,7 +184,6 @@ def test_a_sample_that_is_no_number_is_forgotten(channel: str, value: float, bad
     for field in (
         "score",
         "force_rate",
-        "burst_mps2",
         "drive_velocity_mps",
         "vibration_velocity_mps",
         "time_to_slip_s",
@@ -192,6 +191,17 @@ def test_a_sample_that_is_no_number_is_forgotten(channel: str, value: float, bad
         assert np.isfinite(loop.trace[field]).all(), field
     assert loop.slips(0.0) == 0
     assert loop.held(2.0).min() > 0.97
+
+
+def test_a_rig_without_an_accelerometer_on_the_slide_may_send_what_it_likes() -> None:
+    def deliver(_: int, payload: bytes) -> bytes:
+        sensors = sensor_block(20).read(payload, "sensors")
+        sensors["mass_accel_mps2"] = np.nan
+        return sensors.tobytes()
+
+    loop = close_the_loop(1.0, deliver=deliver)
+    assert not (loop.trace["limit"] == wire.NOT_FINITE).any()
+    assert loop.held(0.5).min() > 0.97
 
 
 @pytest.mark.parametrize("pause_blocks", [1, 2, 3])
@@ -225,7 +235,8 @@ def test_blocks_that_keep_failing_do_not_make_it_blind(every_blocks: int, unread
         return sensors.tobytes()
 
     drive = {"profile": [(0.0, 5e-4), (4.0, 5e-4), (4.5, 8e-4)]}
-    loop = close_the_loop(8.0, rig={"drive": drive}, deliver=deliver)
+    policy = {"policy": {"first_probe_s": 100.0}}
+    loop = close_the_loop(8.0, rig={"drive": drive}, controller=policy, deliver=deliver)
     assert loop.slips(0.0) == 0
     late = loop.trace[loop.t_s > 5.0]
     assert late["drive_velocity_mps"] == pytest.approx(8e-4, rel=0.05)

@@ -71,7 +71,7 @@ def test_the_trace_says_what_was_consumed(run: RunData) -> None:
 
 def test_block_by_block_it_is_the_run_in_one_process(run: RunData, tmp_path: Path) -> None:
     scenario = strokes()
-    plant, controller = PlantNode(scenario.rig, scenario.seed), ControllerNode(scenario.controller)
+    plant, controller = PlantNode(scenario.rig, scenario.seed, arm=True), ControllerNode(scenario.controller)
     written = RunLog(tmp_path / "blocks.mcap", lockstep=True)
     for role in ("controller", "plant"):
         written.add_header(header(scenario, role, lockstep=True))
@@ -112,7 +112,7 @@ def test_the_ring_holds_all_that_lies_ahead() -> None:
     assert MOST_BLOCKS_AHEAD + 1 == MOST_ANNOUNCED
     ahead_s = f"rig.drive.announce_ahead_s={MOST_BLOCKS_AHEAD * 1e-3}"
     scenario = strokes("rig.drive.profile=[[0.0, 0.0], [100.0, 0.02]]", "rig.drive.repeat_every_s=0.0", ahead_s)
-    loop = ClosedLoop(scenario.rig, 1, scenario.controller)
+    loop = ClosedLoop(scenario.rig, 1, scenario.controller, arm=True)
     for blocks in (1, 5, 300):
         loop.advance(blocks)
         memory = loop.controller_state[0]

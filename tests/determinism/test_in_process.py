@@ -15,21 +15,28 @@ from controller.node import ControllerNode
 from controller.replay import Change
 from plant.node import PlantNode
 
-STOP_NS, RESET_NS, CHANGE_NS = 333_000_000, 421_500_000, 587_000_000  # ns; inside stretches, one between two blocks
+STOP_NS, RESET_NS, ARM_NS, CHANGE_NS = (
+    333_000_000,
+    421_500_000,
+    450_000_000,
+    587_000_000,
+)  # ns; inside stretches, one between two blocks
 TABLES = ("sensors", "applied", "command", "trace", "state")
 
 
 def block_by_block(scenario: Scenario, log: Path, changes: list[Change], words: list[Word]) -> RunData:
     """What the processes do in lockstep, without a bus."""
-    plant, controller = PlantNode(scenario.rig, scenario.seed), ControllerNode(scenario.controller)
+    plant, controller = PlantNode(scenario.rig, scenario.seed, arm=True), ControllerNode(scenario.controller)
     written = RunLog(log, lockstep=True)
     for role in ("controller", "plant"):
         written.add_header(header(scenario, role, lockstep=True))
     commands: list[bytes] = []
     ahead, to_say = list(changes), list(words)
     while plant.block < round(scenario.duration_s * 1e3):
+        t_ns = (plant.block + 1) * plant.block_ns
+        for word in (word for word in to_say if t_ns >= word.t_ns):
+            plant.obey(word.action)
         messages = [*plant.advance(commands)]
-        t_ns = plant.block * plant.block_ns
         while ahead and t_ns >= ahead[0].t_ns:
             controller.reconfigure(ahead.pop(0).config)
         while to_say and t_ns >= to_say[0].t_ns:
@@ -54,7 +61,8 @@ def test_stretches_make_the_messages_of_single_blocks(tmp_path: Path, scenario: 
         Change(CHANGE_NS, config.model_copy(update={"limits": config.limits.model_copy(update={"v_ratio": 1.4})}))
     ]
     stop, reset = wire.Operator.STOP, wire.Operator.RESET
-    words = [Word(STOP_NS, stop), Word(STOP_NS, reset), Word(RESET_NS, reset)]
+    arm = wire.Operator.ARM
+    words = [Word(STOP_NS, stop), Word(STOP_NS, reset), Word(RESET_NS, reset), Word(ARM_NS, arm)]
     run_onboard(scenario, tmp_path / "run.mcap", {}, changes=changes, words=words)
     run = read_run(tmp_path / "run.mcap")
     expected = block_by_block(scenario, tmp_path / "blocks.mcap", changes, words)

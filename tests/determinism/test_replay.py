@@ -86,7 +86,7 @@ def test_jitter_reordering_and_duplicates_change_nothing_that_the_log_does_not_e
     tmp_path: Path, seed: int
 ) -> None:
     run = scenario("duration_s=3.0")
-    plant = PlantNode(run.rig, 1)
+    plant = PlantNode(run.rig, 1, arm=True)
     blocks = [plant.advance([])[0].payload for _ in range(3000)]
     chance = random.Random(seed)
     deliver: list[int] = []
@@ -186,7 +186,7 @@ def test_closed_loop_compares_both(log: Path, tmp_path: Path) -> None:
     same = CliRunner().invoke(app, ["replay", str(log), "--closed-loop", "--json", "--log", str(out)])
     figures = json.loads(same.stdout)
     assert figures["was"] == figures["now"]
-    arguments = ["--closed-loop", "--set", "policy.least_ratio=1.18", "--json", "--log", str(out)]
+    arguments = ["--closed-loop", "--set", "limits.v_ratio=1.5", "--json", "--log", str(out)]
     changed = json.loads(CliRunner().invoke(app, ["replay", str(log), *arguments]).stdout)
     assert changed["now"]["vibration_dose_mm2_per_s"] > changed["was"]["vibration_dose_mm2_per_s"]
     assert changed["now"]["velocity_ratio_min"] > 1.15 > changed["was"]["velocity_ratio_min"]
@@ -207,14 +207,18 @@ def test_the_log_of_a_closed_loop_with_a_change_replays(log: Path, tmp_path: Pat
 def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_the_controllers(tmp_path: Path) -> None:
     stopped, again = tmp_path / "stopped.mcap", tmp_path / "again.mcap"
     run = load_scenario("from-the-start", ["duration_s=14.0"])
-    words = [Word(4_000_000_000, wire.Operator.STOP), Word(9_000_000_000, wire.Operator.RESET)]
+    words = [
+        Word(4_000_000_000, wire.Operator.STOP),
+        Word(9_000_000_000, wire.Operator.RESET),
+        Word(9_100_000_000, wire.Operator.ARM),
+    ]
     run_onboard(run, stopped, {}, words=words)
     slips = judge_run(read_run(stopped))
     assert (slips.before, slips.good) == (None, True)
     assert slips.after is not None
-    assert slips.after.seconds == pytest.approx(8.0, abs=0.01)
-    assert slips.stopped_s == pytest.approx(5.0, abs=0.01)
-    assert "stopped  by an operator for 5.0 s, which is no part of what came after" in in_words(slips)
+    assert slips.after.seconds == pytest.approx(6.4, abs=0.1)
+    assert slips.stopped_s == pytest.approx(6.6, abs=0.1)
+    assert "stopped  by an operator, or not armed, for 6.6 s, which is no part of what came after" in in_words(slips)
     assert int(read_run(stopped).trace["slips"][-1]) >= 3
     figures = CliRunner().invoke(app, ["replay", str(stopped), "--closed-loop", "--json", "--log", str(again)])
     compared = json.loads(figures.stdout)

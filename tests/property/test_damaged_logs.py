@@ -20,6 +20,7 @@ from bridge.log.logfile import read_run
 from bridge.log.recover import recover
 from bridge.log.runlog import RunLog
 from bridge.tables.export import export
+from bridge.wire.complaints import Complaints
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import CONTROLLER_EVENT, PLANT_EVENT, SENSORS, SNAPSHOT, Topic
 from bridge.wire.zenoh_link import Received
@@ -213,7 +214,7 @@ def test_a_log_that_a_fault_has_closed_can_be_closed_again(tmp_path: Path, monke
     def full() -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(log._writer, "finish", full)
+    monkeypatch.setattr(log._files.writer, "finish", full)
     with pytest.raises(Fault, match="LOG_WRITE"):
         log.close()
     log.close()  # as a `finally` does
@@ -240,7 +241,7 @@ def test_a_chunk_of_which_nothing_is_readable_is_no_table(tmp_path: Path) -> Non
     log = RunLog(tmp_path / "run.mcap", lockstep=True)
     for number in range(100):
         log.write(SENSORS, block(number))
-    log._guarded(log._writer.flush)
+    log.flush()
     for number in range(100, 200):  # a rig with other blocks came in its place
         log.write(SENSORS, block(number, 19))
     log.close()
@@ -249,6 +250,8 @@ def test_a_chunk_of_which_nothing_is_readable_is_no_table(tmp_path: Path) -> Non
 
 def test_a_rig_that_leaves_before_its_first_word_ends_the_record(tmp_path: Path) -> None:
     class Quiet:
+        dropped = 0
+
         def get(self, timeout_s: float) -> None:
             time.sleep(timeout_s)
 
@@ -263,10 +266,13 @@ def test_a_rig_that_leaves_before_its_first_word_ends_the_record(tmp_path: Path)
             self.looks += 1
             return self.looks == 1
 
+        def linked(self) -> bool:
+            return True
+
     log = RunLog(tmp_path / "run.mcap", lockstep=False)
     bus: Any = Left()
     inbox: Any = Quiet()
-    assert recorder._record(log, bus, inbox, threading.Event(), None) is True
+    assert recorder._record(log, bus, inbox, threading.Event(), None, Complaints(log.add_event)) is True
     log.close()
     assert [event.code for event in read_run(log.path).events] == ["PLANT_LOST"]
 
@@ -289,6 +295,7 @@ def test_a_stop_ends_the_record_of_a_rig_that_goes_on(tmp_path: Path, monkeypatc
         def __init__(self) -> None:
             self.began_s = time.monotonic()
             self.count = 0
+            self.dropped = 0
 
         def get(self, _: float) -> Received:
             assert time.monotonic() < self.began_s + 5.0
@@ -301,6 +308,6 @@ def test_a_stop_ends_the_record_of_a_rig_that_goes_on(tmp_path: Path, monkeypatc
     stop.set()
     bus: Any = None
     inbox: Any = Endless()
-    assert recorder._record(log, bus, inbox, stop, None) is False
+    assert recorder._record(log, bus, inbox, stop, None, Complaints(log.add_event)) is False
     assert inbox.count > 0
     log.close()

@@ -12,13 +12,16 @@ from diagnosis.report.page import write_report
 from diagnosis.result import to_json
 from tests.real.evidences import AXIS, EVIDENCES, MISSING, SLIDER
 from tests.real.known import known
-from tests.real.table import lines
+from tests.real.table import lines, of_relations
 
 parser = argparse.ArgumentParser(prog="python -m tests.real", description=__doc__)
 parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(EVIDENCES)}; all if left out")
 parser.add_argument("--json", type=Path, metavar="FILE", help="write all results there")
 parser.add_argument("--out", type=Path, default=Path("runs/real"), metavar="DIR", help="reports")
 parser.add_argument("--known", action="store_true", help="only what plain rulers say, beforehand")
+parser.add_argument(
+    "--relations", action="store_true", help="only the relations between channels, without a simulation"
+)
 parser.add_argument("--jobs", type=int, default=1)
 
 if __name__ == "__main__":
@@ -30,6 +33,14 @@ if __name__ == "__main__":
         sys.exit()
     if told.known:
         print("\n".join(known()))
+        sys.exit()
+    if told.relations:
+        for name in told.names or EVIDENCES:
+            with tempfile.TemporaryDirectory() as folder:
+                EVIDENCES[name](Path(folder))
+                print(
+                    "\n".join([name, *(f"  {line}" for line in of_relations(load_evidence(Path(folder))))]), flush=True
+                )
         sys.exit()
     told.out.mkdir(parents=True, exist_ok=True)
     results = {}

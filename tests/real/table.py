@@ -1,6 +1,10 @@
 """The figures of one diagnosis, a few lines of text: what docs/quality/real-evidence.md quotes."""
 
 from bridge.units import percent, times
+from diagnosis.evidence.folder import Evidence
+from diagnosis.gap.prepare import prepare
+from diagnosis.relations.answer import Answered, relations_of
+from diagnosis.relations.decide import decision_of
 from diagnosis.report.words import estimate_in_words, headline
 from diagnosis.result import Diagnosis, Shrinkage
 
@@ -29,6 +33,32 @@ def lines(found: Diagnosis) -> list[str]:
         if abs(one.retuned - one.described) > 2.0 * one.tolerance * (one.described or 1.0)
     ]
     return [*said, f"next        {found.next_experiment.what}", f"took        {found.elapsed_s:.0f} s"]
+
+
+def of_relations(evidence: Evidence) -> list[str]:
+    """What the relations between channels show: sizes, shares on the held-out runs, what is left out."""
+    runs = prepare(evidence)
+    relations = relations_of(evidence.rig, runs)
+    said = [line for one in relations.answered for line in _relation(one)]
+    decision = decision_of(relations)
+    said += [f"{one.relation}: named: {one.cause}" for one in decision.decided]
+    said += [
+        f"{one.relation}: outside: {one.what}: {one.size:.3g} {one.unit}, noise {one.noise:.3g}"
+        for one in decision.outside
+    ]
+    return [*said, *(f"{one.name}: left out: {one.why}" for one in relations.missing)]
+
+
+def _relation(one: Answered) -> list[str]:
+    sizes = f"{one.described:.3g} {one.unit} described, {one.refitted:.3g} refitted, {one.left:.3g} left, noise {one.noise:.3g}"
+    if one.shares is None:
+        return [f"{one.name}: {sizes}"]
+    shares = [
+        f"  {share.cause}: {percent(max(share.share, 0.0))}, by chance up to {percent(share.null_90)}"
+        for share in one.shares.causes
+    ]
+    rest = f"  noise {percent(one.shares.noise)}, unexplained {percent(one.shares.unexplained)}"
+    return [f"{one.name}: {sizes}", *shares, rest]
 
 
 def _closed(one: Shrinkage) -> str:

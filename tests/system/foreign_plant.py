@@ -119,7 +119,7 @@ class Rig:
         self.send_sensors = self._publisher("sensors", first=True)
         self.send_applied = self._publisher("applied")
         self._send_event = self._publisher("event/plant")
-        self._keep.append(self.session.liveliness().declare_token(self._key("alive/plant")))
+        self._token = self.session.liveliness().declare_token(self._key("alive/plant"))
 
     def _key(self, name: str) -> str:
         return f"{self._prefix}/{name}"
@@ -176,7 +176,8 @@ class Rig:
                 return command
 
     def goodbye(self) -> None:
-        """Wait until the others have left, since this session relays them."""
+        """Leave as a rig, and wait until the others have left, since this session relays them."""
+        self._token.undeclare()
         with self._changed:
             self._changed.wait_for(lambda: self._alive <= {"plant"}, GOODBYE_S)
 

@@ -59,7 +59,7 @@ def command(damped, tmp_path_factory):
 
 def test_the_command_names_the_effect_in_the_form_of_the_contract(command):
     said, found, _ = command
-    assert found["format"] == "diagnosis/1"
+    assert found["format"] == "diagnosis/2"
     assert found["verdict"] == "effect"
     assert found["effects"] == ["drive-damping"]
     names = {one["effect"] for one in found["candidates"]}

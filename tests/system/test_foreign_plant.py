@@ -144,13 +144,13 @@ def test_the_example_of_the_page_is_the_command_it_describes() -> None:
     assert [line[1].split(" = ")[0] for line in lines] == [field.name for field in wire.Command.DESCRIPTOR.fields]
     command = wire.Command(
         sequence=3, t_ns=4_000_000, block=3, frequency_Hz=2600.0, amplitude_m=1e-9,
-        mode=wire.EXCITE, limit=wire.SLEW, reason=wire.STICK_SEEN,
+        mode=wire.EXCITE, limit=wire.SLEW, reason=wire.STICK_SEEN, run=0x0123456789ABCDEF,
     )  # fmt: skip
     assert wire.Command.FromString(payload) == command
     assert messages.COMMAND.is_canonical(payload)
     command.limit = wire.NO_LIMIT
     short = command.SerializeToString()
-    assert len(short) == 55
+    assert len(short) == 64
     whole = messages.COMMAND.canonical(short, "command")
     assert messages.COMMAND.is_canonical(whole)
     assert wire.Command.FromString(whole) == command

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from bridge.faults import Fault
+from bridge.wire.certificates import CLUSTER, files_of
+from cockpit.run.authority import make_certificates
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult, diagnose_many, find_sources
 from tests import made_up
 
@@ -48,13 +50,19 @@ def gone(pid: int) -> bool:
 
 
 @contextmanager
-def cluster(at: Path, workers: int) -> Iterator[str]:
-    """A Dask scheduler with workers, each a process without a nurse that would start it again; its address."""
+def cluster(at: Path, workers: int, certs: Path | None = None) -> Iterator[str]:
+    """A Dask scheduler with workers, each a process without a nurse that would start it again; its address.
+
+    With TLS where there is a folder of certificates.
+    """
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
+        address = f"{'tls' if certs else 'tcp'}://127.0.0.1:{probe.getsockname()[1]}"
     dask = [sys.executable, "-m", "distributed.cli"]
     quiet = ["--no-dashboard"]
+    if certs is not None:
+        own = files_of(CLUSTER, certs)
+        quiet += ["--tls-ca-file", str(own.authority), "--tls-cert", str(own.certificate), "--tls-key", str(own.key)]
     local = [*quiet, "--no-nanny", "--nthreads", "1", "--host", "127.0.0.1", "--local-directory", str(at)]
     commands = [[f"{dask[2]}.dask_scheduler", "--host", address, *quiet]]
     commands += [[f"{dask[2]}.dask_worker", address, *local]] * workers
@@ -99,6 +107,27 @@ def test_a_killed_dask_worker_costs_nothing(tmp_path):
     assert gone(killed)
     assert {name for name, outcome in outcomes.items() if outcome.diagnosis} == {"a", "b", "deadly"}
     assert outcomes["refused"].fault == ("BAD_EVIDENCE", "run-01.csv: too short")
+
+
+def test_a_cluster_with_tls(tmp_path):
+    (tmp_path / "dask").mkdir()
+    make_certificates(tmp_path / "certs", [])
+    with cluster(tmp_path / "dask", 1, tmp_path / "certs") as address:
+        found = by_name(diagnose_many(sources(tmp_path, ["a"]), 1, address, made_up.quick, str(tmp_path / "certs")))
+    assert found["a"].diagnosis is not None
+
+
+@pytest.mark.parametrize(
+    ("address", "rule"),
+    [
+        ("tcp://192.0.2.1:8786", "must be an address of this computer alone, or tls://"),
+        ("tls://127.0.0.1:9", "no such file"),
+    ],
+)
+def test_a_cluster_that_others_reach_needs_certificates(tmp_path, address, rule):
+    with pytest.raises(Fault, match=rule) as raised:
+        list(diagnose_many(sources(tmp_path, ["a"]), 1, address, made_up.quick, str(tmp_path / "none")))
+    assert raised.value.kind.code == "NOT_SECURE"
 
 
 def test_a_cluster_that_is_not_there(tmp_path):

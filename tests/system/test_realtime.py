@@ -13,7 +13,7 @@ import pytest
 from bridge.faults import FAULTS
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.topics import CONTROLLER_EVENT, OPERATOR, STATE
+from bridge.wire.topics import APPLIED, OPERATOR, STATE
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 from controller.codes import BLOCK
 from tests.system.ports import free_endpoint
@@ -38,7 +38,8 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=90, check=False,
     )  # fmt: skip
     data = read_run(log)
-    assert len(data.sensors) == 6000, result.stderr
+    # after the last of 6 s the vibration fades
+    assert 6000 <= len(data.sensors) < 6100, result.stderr
     assert np.array_equal(data.trace["block"][data.trace["events"] & BLOCK != 0], data.sensors["sequence"])
     # how soon the answers come is for the bench to say; that they come at all is for this test
     assert np.array_equal(np.unique(data.command["block"]), data.sensors["sequence"])
@@ -121,8 +122,8 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
         status = json.loads(told.stdout)
         assert (status["rig"], status["mode"]) == ("paper-c45-c45", "STOPPED")
         assert status["roles"] == ["plant", "controller", "recorder"]
-        again = [*COMMAND, "stop", "--reset", "--endpoint", endpoint]
-        assert subprocess.run(again, timeout=30, check=False).returncode == 0
+        for word in ("reset", "arm"):
+            assert subprocess.run([*COMMAND, word, "--endpoint", endpoint], timeout=30, check=False).returncode == 0
         await_size(log, log.stat().st_size + 150_000)
         run.send_signal(signal.SIGINT)
         run.communicate(timeout=60)
@@ -136,26 +137,26 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
     assert data.trace["vibration_velocity_mps"][stopped][300:].max() < 1e-5
     assert data.trace["mode"][-1] != wire.STOPPED
     said = [event.text.split()[0] for event in data.events if event.code == "OPERATOR"]
-    assert list(dict.fromkeys(said)) == ["STOP", "RESET"]  # on a busy machine one may be said twice
+    assert list(dict.fromkeys(said)) == ["STOP", "RESET", "ARM"]  # on a busy machine one may be said twice
 
 
-@pytest.mark.parametrize("word", [[], ["--reset"]], ids=["stop", "reset"])
-def test_a_controller_that_does_not_obey_is_said(word: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("state", "told"), [(wire.ACTIVE, "the rig is ACTIVE and vibrates with 37 nm after a stop"), (None, "no rig says")]
+)
+def test_a_rig_that_does_not_obey_is_said(state: int | None, told: str) -> None:
     config = BusConfig(endpoint=free_endpoint())
-    inbox = Inbox(10)
-    with Bus(config, "plant", lockstep=False) as plant, Bus(config, "controller", lockstep=False) as controller:
-        controller.listen(OPERATOR, inbox.push)
-        controller.announce()
-        assert not plant.wait_for({"controller"}, 10.0)
-        command = [*COMMAND, "stop", *word, "--endpoint", config.endpoint]
-        told = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-        tell = controller.publisher(CONTROLLER_EVENT)
-        for action in ("STOP", "RESET"):  # somebody else's words are taken meanwhile
-            assert inbox.get(30.0) is not None
-            tell(wire.Event(source="controller", code="OPERATOR", text=f"{action} by anna").SerializeToString())
-        _, said = told.communicate(timeout=30)
-    assert told.returncode == FAULTS["NO_PEER"].exit_status
-    assert f"{config.endpoint}: the controller does not answer" in said
+    with Bus(config, "plant", lockstep=False) as plant:
+        inbox, send = Inbox(10), plant.publisher(APPLIED)
+        plant.listen(OPERATOR, inbox.push)
+        stop = subprocess.Popen([*COMMAND, "stop", "--endpoint", config.endpoint], stderr=subprocess.PIPE, text=True)
+        assert inbox.get(60.0) is not None
+        while stop.poll() is None:
+            if state is not None:
+                send(wire.Applied(guard_state=state, amplitude_m=37e-9).SerializeToString())
+            time.sleep(0.01)
+        _, said = stop.communicate()
+    assert stop.returncode == FAULTS["NO_PEER"].exit_status
+    assert f"{config.endpoint}: {told}" in said
 
 
 def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
@@ -166,8 +167,13 @@ def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
     )  # fmt: skip
     try:
         await_size(log, 300_000)
-        with Bus(BusConfig(endpoint=endpoint), "stranger", lockstep=False) as bus:
-            for topic, payload in ((OPERATOR, b"\x08\x07"), (OPERATOR, b"\xff\xff"), (STATE, b"\xff\xff\xff")):
+        config = BusConfig(endpoint=endpoint)
+        with Bus(config, "operator", lockstep=False) as operator, Bus(config, "controller", lockstep=False) as other:
+            for bus, topic, payload in (
+                (operator, OPERATOR, b"\x08\x07"),
+                (operator, OPERATOR, b"\xff\xff"),
+                (other, STATE, b"\xff\xff\xff"),
+            ):
                 bus.publisher(topic)(payload)
             time.sleep(0.5)
         run.communicate(timeout=60)
@@ -178,5 +184,6 @@ def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
     # on a busy machine a step without a block, for a late one, may stand between
     assert int((data.trace["events"] & BLOCK).sum()) == 5000
     texts = [f"{event.code} {event.text}" for event in data.events]
-    assert sum(text.startswith("OPERATOR ignored") for text in texts) == 2
-    assert sum(text.startswith("BAD_MESSAGE") for text in texts) == 1
+    assert "BAD_MESSAGE operator: action = 7: not known: dropped" in texts
+    assert any(text.startswith("BAD_MESSAGE operator: 2 bytes are no Operator") for text in texts)
+    assert any(text.startswith("BAD_MESSAGE state: 3 bytes are no State") for text in texts)

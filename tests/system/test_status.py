@@ -30,14 +30,14 @@ SENT = {
         slips=5,
     ),
     COMMAND: wire.Command(mode=wire.EXCITE, reason=wire.HELD, limit=wire.SLEW),
-    APPLIED: wire.Applied(frequency_Hz=2600.0, amplitude_m=37e-9),
+    APPLIED: wire.Applied(frequency_Hz=2600.0, amplitude_m=37e-9, guard_state=wire.ACTIVE, cause=wire.VIBRATION_BEGAN),
     CONTROLLER_EVENT: wire.Event(source="controller", code="GAP", text="3 blocks"),
 }
 
 
 @contextmanager
-def publishing(bus: Bus, messages: dict) -> Generator[None]:
-    """Say everything again and again, as a loop does."""
+def publishing(plant: Bus, controller: Bus, messages: dict) -> Generator[None]:
+    """Say everything again and again, as a loop does; each may say its own topics alone."""
     over = threading.Event()
 
     def say() -> None:
@@ -45,7 +45,7 @@ def publishing(bus: Bus, messages: dict) -> Generator[None]:
             for topic, message in messages.items():
                 senders[topic](message.SerializeToString())
 
-    senders = {topic: bus.publisher(topic) for topic in messages}
+    senders = {topic: (plant if topic.sender == "plant" else controller).publisher(topic) for topic in messages}
     thread = threading.Thread(target=say)
     thread.start()
     try:
@@ -68,7 +68,7 @@ def test_a_rig_and_its_controller_are_told(config: BusConfig) -> None:
         plant.announce()
         controller.announce()
         assert not plant.wait_for(["plant", "controller"], 10.0)
-        with publishing(controller, SENT):
+        with publishing(plant, controller, SENT):
             seen = look(config)
         assert said.get_nowait() is None
         assert not plant.alive("status")
@@ -78,6 +78,7 @@ def test_a_rig_and_its_controller_are_told(config: BusConfig) -> None:
     words = "\n".join(seen.in_words())
     assert f"rig      lathe at {config.endpoint}" in words
     assert "on bus   plant, controller; no recorder" in words
+    assert "state    ACTIVE: it vibrates" in words
     assert "mode     EXCITE: vibrating, so that v_a stays above v_d" in words
     assert "drive    500 µm/s against 13.50 N" in words
     assert "v_a/v_d  1.20" in words
@@ -90,7 +91,10 @@ def test_a_rig_and_its_controller_are_told(config: BusConfig) -> None:
     [
         ({}, "the controller sent no command for 0.3 s"),
         (SENT | {COMMAND: wire.Command(mode=wire.EXCITE, limit=wire.STALE_INPUT)}, "STALE_INPUT: no fresh block"),
-        (SENT | {APPLIED: wire.Applied(fallback=1)}, "the rig has no fresh command and ramps the vibration to zero"),
+        (
+            SENT | {APPLIED: wire.Applied(fallback=1, guard_state=wire.ACTIVE)},
+            "the rig has no fresh command and ramps the vibration to zero",
+        ),
     ],
 )
 def test_what_is_wrong_is_a_warning(config: BusConfig, messages: dict, warning: str) -> None:
@@ -98,7 +102,7 @@ def test_what_is_wrong_is_a_warning(config: BusConfig, messages: dict, warning: 
         plant.announce()
         controller.announce()
         assert not plant.wait_for(["plant", "controller"], 10.0)
-        with publishing(controller, messages):
+        with publishing(plant, controller, messages):
             seen = look(config)
     assert seen.rig is None
     assert seen.warnings()[0].startswith(warning)

@@ -19,7 +19,7 @@ from diagnosis.model.sensor_chain import SENSOR_EFFECTS
 from plant.core import advance, advance_disturbed
 from plant.effects.library import EFFECTS
 from plant.four_rigs import advance_lanes
-from plant.four_rigs_step import LANES, gone
+from plant.four_rigs_step import LANES, NARROW, gone
 from plant.records import TRUTH
 from tests.prepared import prepared
 
@@ -80,7 +80,7 @@ def alone(config, commands, start):
 
 
 def steps_of_one_length(p, s, first):
-    """The nominal kernel takes longer steps while a slide sticks, which four rigs at once do not."""
+    """The nominal kernel takes longer steps while a slide sticks, which rigs side by side do not."""
     p.steps_per_stick_sample, p.stick_dt_s = 1, p.dt_s
     for name in ("force_keep", "accel_keep", "accel_highpass_keep", "position_keep"):
         p[f"{name}_stick"] = p[name]
@@ -144,6 +144,25 @@ def test_to_the_last_bit_the_same_in_any_company(ladder, tables):
     for config, found in zip(configs, together, strict=True):
         by_itself = predict(config, False, commands, start, entries)
         assert all(np.array_equal(found[name], by_itself[name]) for name in by_itself)
+
+
+def test_to_the_last_bit_the_same_whether_four_or_eight_are_stepped_at_once(ladder, tables):
+    rig, _ = ladder
+    commands, start = there_and_back(0.1), Start(0.5 * rig.coulomb_force_N, 0.0)
+    keys = ["frictional-lag", "static-friction-ageing", "drive-speed-ripple", "piezo-sag", "normal-load-fluctuation"]
+    configs = [rig_config(rig, {}, tables[next(key for key in FORMS if key[0] == name)], None) for name in keys]
+    configs += rigs(rig, {}, Roughness(0.01, 2e-5, 7), count=3)
+    entries = (Entry(130, 9.0, 0.4),)
+    at_once, in_halves = (
+        [
+            signals
+            for part in parts
+            for signals in predict_many(part, False, commands, [start] * len(part), [entries] * len(part))
+        ]
+        for parts in ([configs], [configs[:NARROW], configs[NARROW:]])
+    )
+    for one, other in zip(at_once, in_halves, strict=True):
+        assert all(np.array_equal(one[name], other[name]) for name in other)
 
 
 def test_what_may_be_asked_next_is_simulated_where_a_lane_is_free(ladder, monkeypatch):

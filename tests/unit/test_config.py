@@ -139,7 +139,7 @@ def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
             for step_s in ("9e-10", "1e-12", "1e-300", "4.94066e-324")
         ),
         (["bus.endpoint=here"], ["bus.endpoint", "here"]),
-        (["bus.endpoint=tls/127.0.0.1:7447"], ["bus.endpoint", "tls/127.0.0.1:7447", "tcp/"]),
+        (["bus.endpoint=udp/127.0.0.1:7447"], ["bus.endpoint", "udp/127.0.0.1:7447", "tcp"]),
         (["bus.endpoint=tcp/127.0.0.1:99999"], ["bus.endpoint", "tcp/127.0.0.1:99999", "from 1 to 65535"]),
         (["bus.endpoint=tcp/127.0.0.1:0"], ["bus.endpoint", "from 1 to 65535"]),
         (["rig.drive.profile=[[1.0, 0.1], [0.5, 0.1]]"], ["profile", "must increase"]),

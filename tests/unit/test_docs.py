@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from docs import generate
+from docs import generate, zenoh_files
 
 ROOT = Path(__file__).parent.parent.parent
 _OUTSIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "bridge/wire/PROTOCOL.md")
@@ -64,6 +64,14 @@ def test_made_pages_are_those_of_the_code() -> None:
         name for name, text in generate.pages().items() if (generate.FOLDER / name).read_text(encoding="utf-8") != text
     ]
     assert not stale, "make reference"
+
+
+def test_the_configurations_of_zenoh_are_those_of_the_code() -> None:
+    made = zenoh_files.configurations()
+    assert {path.name for path in zenoh_files.FOLDER.glob("*.json5")} == made.keys()
+    assert not [name for name, text in made.items() if (zenoh_files.FOLDER / name).read_text() != text], (
+        "make reference"
+    )
 
 
 def test_readme_is_a_landing_page() -> None:

@@ -97,12 +97,10 @@ def applied(number: int, arrival_ns: int) -> Received:
 
 
 def test_a_log_tells_of_pauses_in_the_time_of_its_run(tmp_path: Path) -> None:
-    watch, log, sent = (
-        FakeWatch([], [*still((7 * MS, 9 * MS)), Pause(9 * MS, 12 * MS, core=1)]),
-        RunLog(tmp_path / "run.mcap", lockstep=False),
-        [],
-    )
-    writer = PauseWriter(log, sent.append, watch)  # pyright: ignore[reportArgumentType]
+    sent: list[wire.Event] = []
+    watch = FakeWatch([], [*still((7 * MS, 9 * MS)), Pause(9 * MS, 12 * MS, core=1)])
+    log = RunLog(tmp_path / "run.mcap", lockstep=False, on_event=sent.append)
+    writer = PauseWriter(log, watch)  # pyright: ignore[reportArgumentType]
     began_ns = 5 * MS
     for number in range(11):
         received = applied(number, began_ns + (number + 1) * MS)
@@ -115,12 +113,12 @@ def test_a_log_tells_of_pauses_in_the_time_of_its_run(tmp_path: Path) -> None:
     assert not_watched(events) == ""
     assert pauses_of(events, CORE_PAUSE) == [RunPause(4 * MS, 7 * MS)]
     assert [event.code for event in events] == ["WATCH", "PAUSE", "CORE_PAUSE"]
-    assert [wire.Event.FromString(payload) for payload in sent] == events
+    assert sent == events
 
 
 def test_a_watch_that_is_refused_or_ends_is_told_and_no_pause_is_claimed(tmp_path: Path) -> None:
     log, watch = RunLog(tmp_path / "run.mcap", lockstep=False), FakeWatch([], still((7 * MS, 9 * MS)))
-    writer = PauseWriter(log, lambda _payload: None, watch)  # pyright: ignore[reportArgumentType]
+    writer = PauseWriter(log, watch)  # pyright: ignore[reportArgumentType]
     writer.tell_when_due()
     watch.refused = "a timer ended"
     writer.finish()

@@ -27,7 +27,7 @@ def test_a_full_disk_tells_the_time_of_the_last_whole_chunk(tmp_path: Path, bloc
     log = RunLog(path, lockstep=True)
     log._due_s = math.inf  # no chunk ends by itself
     _write(log, range(blocks))
-    log._guarded(log._writer.flush)
+    log.flush()
     _write(log, range(blocks, blocks + 300))
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 60, before[1]))

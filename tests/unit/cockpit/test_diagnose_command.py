@@ -52,8 +52,21 @@ def test_one_folder_says_the_verdict_first(tmp_path):
     assert lines[6].startswith(
         "gap        6.2 as described, 5.9 baseline, 1.08 with drive-backlash; perfect is 1; 98 %"
     )
-    assert lines[7].startswith("next       Reverse the drive")
-    assert lines[8:] == [
+    after = next(i for i, line in enumerate(lines) if line.startswith("next"))
+    assert lines[7:16] == [
+        "relations  spring relation: 800 mN as described, 300 refitted, 50 with drive-backlash; noise 12",
+        "             drive-backlash 73 % (90 %: 61 % to 92 %); chance alone shows up to 12 %",
+        "             noise 25 %",
+        "             unexplained 2 % (90 %: 0 % to 5 %)",
+        "           base: left out: run-01.parquet has no base_accel_mps2",
+        "           46 mN remain in the spring relation over the extension, where noise is 12: nothing in the library",
+        "numbers    drive stiffness 11.697 kN/m (90 %: 11.650 to 11.744) by the spring relation, described 20 kN/m",
+        "           mass 1.497 kg, described 1.5 kg",
+        "           drive stiffness 11.01 kN/m, described 11.7 kN/m",
+    ]
+    assert all("described" in line for line in lines[13:after])
+    assert lines[after].startswith("next       Reverse the drive")
+    assert lines[after + 1 :] == [
         "data       run-01.parquet: base_accel_mps2: not there: what the piezo delivers cannot be seen",
         "           run-02.parquet: drive_force_N: 12 samples at 20 N were left out",
     ]
@@ -81,7 +94,7 @@ def test_one_folder_writes_json_report_and_rig(tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     assert files(out) == {"a.json", "a.html"}
     written = json.loads((out / "a.json").read_text())
-    assert written["format"] == "diagnosis/1"
+    assert written["format"] == "diagnosis/2"
     assert written["elapsed_s"] == 3.0  # the stand-in says the number of jobs here
     assert rigs == [(("drive-backlash",), "rig", "a.toml")]
     assert "Diagnosis of rig" in (out / "a.html").read_text()
@@ -151,10 +164,10 @@ def test_an_option_that_would_be_the_name_of_a_file_is_refused_before_the_work(t
 @pytest.mark.parametrize("option", ["--json", "--report", "--apply"])
 def test_a_name_too_long_to_be_written_is_said_before_the_work(option, tmp_path, monkeypatch):
     monkeypatch.setattr(many, "real_diagnose", made_up.endless)
-    result = diagnose(folders(tmp_path, "rig") / "rig", option, tmp_path / f"{'x' * 247}.json")
+    result = diagnose(folders(tmp_path, "rig") / "rig", option, tmp_path / f"{'x' * 251}.json")
     assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
     assert result.stderr.startswith(
-        f"stickslip: LOG_WRITE: {tmp_path / ('x' * 247)}.json: cannot be written: File name too long"
+        f"stickslip: LOG_WRITE: {tmp_path / ('x' * 251)}.json: cannot be written: File name too long"
     )
 
 
@@ -193,7 +206,7 @@ def test_a_folder_of_folders_gives_every_result_in_order(tmp_path):
     assert "4 of 4: refused: BAD_EVIDENCE: run-01.csv: too short" in result.stderr
     assert files(out) == {"a.json", "reports/a.html", "reports/c.html"}
     written = json.loads((out / "a.json").read_text())
-    assert written["format"] == "diagnoses/1"
+    assert written["format"] == "diagnoses/2"
     results = {one["evidence"]: one for one in written["results"]}
     assert results["a"]["diagnosis"]["verdict"] == "effect"
     assert results["refused"]["fault"] == {"fault": "BAD_EVIDENCE", "line": "run-01.csv: too short"}

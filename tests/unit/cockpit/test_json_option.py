@@ -265,7 +265,7 @@ def test_a_shell_completes_commands_and_options() -> None:
 def test_an_export_of_nothing_is_told_and_leaves_an_older_table(tmp_path: Path) -> None:
     table = tmp_path / "run.csv"
     table.write_text("of yesterday\n")
-    result = call("log", "export", "run.mcap", "--to", "run.csv", "--topic", "trace", "--from", "90s")
+    result = call("log", "export", "run.mcap", "--to", "run.csv", "--topic", "trace", "--from", "90s", "--overwrite")
     assert result.exit_code == 1
     assert "nothing to write: no message of these topics in this time; a table that is there stays" in result.stdout
     assert table.read_text() == "of yesterday\n"

@@ -87,10 +87,28 @@ def test_stdout_escapes_what_it_cannot_show(tmp_path):
     assert (done.returncode, done.stdout) == (0, f"written  {tmp_path}/\\xfc/rig.json\n")
 
 
-def test_a_name_that_is_not_utf_8_is_one_line(files):
-    done = _in_a_shell(f"-m cockpit log export {files['run.mcap']} --to \"$(printf '\\377.csv')\" --topic trace")
-    assert done.returncode == FAULTS["CONFIG"].exit_status
-    assert done.stderr == "stickslip: CONFIG: \\udcff.csv: is not UTF-8, which is needed here; rename it\n"
+def test_a_name_that_is_not_utf_8_is_written(files):
+    folder = files["run.mcap"].parent
+    done = _in_a_shell(
+        f"-m cockpit log export {files['run.mcap']} --to {folder}/\"$(printf '\\377.csv')\" --topic trace"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert b"\xff.csv" in os.listdir(os.fsencode(folder))
+
+
+def test_a_table_that_is_there_is_not_replaced_unasked(files, monkeypatch):
+    log = files["run.mcap"]
+    monkeypatch.chdir(log.parent)
+    Path("mine.csv").write_text("mine")
+    words = ["log", "export", "run.mcap", "--to", "mine.csv", "--topic", "trace"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert (
+        "--to mine.csv: is there already, and would be lost; choose another name, or add --overwrite" in result.output
+    )
+    assert Path("mine.csv").read_text() == "mine"
+    assert CliRunner().invoke(app, [*words, "--overwrite"]).exit_code == 0
+    assert Path("mine.csv").read_text().startswith('"t_s"')
 
 
 def test_a_picture_is_made_whatever_backend_the_environment_names(files):

@@ -116,10 +116,10 @@ def test_a_diagnosis_fits_and_one_more_key_does_not(tmp_path: Path) -> None:
     source = many.find_sources([folder])[0]
     diagnosis = made_up.diagnosis()
     table = strict_json(to_json(diagnosis))
-    check("diagnosis-1", table)
-    assert not fits("diagnosis-1", table | {"more": 1})
+    check("diagnosis-2", table)
+    assert not fits("diagnosis-2", table | {"more": 1})
     outcomes = [many.FolderResult(source, diagnosis, None), many.FolderResult(source, None, ("BAD_EVIDENCE", "why"))]
-    check("diagnoses-1", diagnose_output.many_as_json(outcomes))
+    check("diagnoses-2", diagnose_output.many_as_json(outcomes))
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_without_a_name_they_are_listed_and_with_a_folder_written(tmp_path: Path
 
 
 def test_a_format_goes_by_the_name_in_its_files_too() -> None:
-    assert call("schema", "diagnosis/1").stdout == call("schema", "diagnosis-1").stdout
+    assert call("schema", "diagnosis/2").stdout == call("schema", "diagnosis-2").stdout
     result = call("schema", "rigs")
     assert result.exit_code == 2
     assert "rigs: no such schema; known: rig, scenario" in result.stderr

@@ -22,12 +22,22 @@ def time_s(seconds: float) -> Any:
     return SAMPLE_S * (1.0 + np.arange(round(seconds / SAMPLE_S)))
 
 
-def listen(drive_m: Any, slide_m: Any, offset_N: float = 0.0, seed: int = 1, **config: Any) -> Any:
+def listen(
+    drive_m: Any,
+    slide_m: Any,
+    offset_N: float = 0.0,
+    seed: int = 1,
+    position_noise_m: float = POSITION_NOISE_M,
+    missing: str = "",
+    **config: Any,
+) -> Any:
     """The trace of a controller that only listens, of [blocks].
 
     Args:
         drive_m, slide_m: positions, [samples]; the force follows from them and `offset_N`.
         seed: of the noise.
+        position_noise_m: rms of both positions.
+        missing: a channel that is NaN.
         config: tables of the controller file besides.
 
     """
@@ -38,14 +48,14 @@ def listen(drive_m: Any, slide_m: Any, offset_N: float = 0.0, seed: int = 1, **c
     force_N = offset_N + STIFFNESS_N_PER_M * (drive_m - slide_m)
     channels = {
         "drive_force_N": force_N + chance.normal(0.0, FORCE_NOISE_N, len(force_N)),
-        "drive_position_m": drive_m + chance.normal(0.0, POSITION_NOISE_M, len(drive_m)),
-        "mass_position_m": slide_m + chance.normal(0.0, POSITION_NOISE_M, len(slide_m)),
+        "drive_position_m": drive_m + chance.normal(0.0, position_noise_m, len(drive_m)),
+        "mass_position_m": slide_m + chance.normal(0.0, position_noise_m, len(slide_m)),
     }
     traces: list[bytes] = []
     for block in range(len(drive_m) // SAMPLES):
         sensors["sequence"], sensors["t_ns"] = block, 1_000_000 * (block + 1)
         for name, values in channels.items():
-            sensors[name][0] = values[SAMPLES * block : SAMPLES * (block + 1)]
+            sensors[name][0] = values[SAMPLES * block : SAMPLES * (block + 1)] if name != missing else np.nan
         node.block(sensors.tobytes())
         traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)
     return np.frombuffer(b"".join(traces), TRACE_LAYOUT.dtype)

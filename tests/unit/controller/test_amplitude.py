@@ -23,14 +23,17 @@ SILENT = 200  # steps of 1 ms
 NOISE_MPS2 = 0.0015
 
 
-def run(steps: int, delay: int, gain: Callable[[int], float], block_s: float = 1e-3) -> tuple[Any, Any, Any]:
-    """Parameters, memory, and true v_a of each step [m/s]: `SILENT_S` without, then with a vibration wanted.
+def run(
+    steps: int, delay: int, gain: Callable[[int], float], block_s: float = 1e-3, silent_s: float = SILENT_S
+) -> tuple[Any, Any, Any]:
+    """Parameters, memory, and true v_a of each step [m/s]: `silent_s` without, then with a vibration wanted.
 
     Args:
         steps: in all.
         delay: blocks that a command takes besides the one in which it is given.
         gain: delivered over commanded amplitude at a step.
         block_s: length of a block.
+        silent_s: from the start, in which the noise is learnt.
 
     """
     samples = round(block_s / 5e-5)
@@ -38,7 +41,8 @@ def run(steps: int, delay: int, gain: Callable[[int], float], block_s: float = 1
     config = {"block_s": block_s, "samples_per_block": samples, "limits": limits}
     params, state = build(validate(ControllerConfig, config, "test"))
     p, s = params[0], state[0]
-    silent = round(SILENT_S / block_s)
+    silent = round(silent_s / block_s)
+    s.silent_steps = p.silence_steps
     s.listening, s.onset_steps, s.loop_delay_steps, s.growth = 1, -1, -1, FIRST_SHARE
     s.candidate = int(np.argmin(np.abs(p.candidate_Hz - FREQUENCY_HZ)))
     s.wanted_Hz, s.tuned, s.held_mps = p.candidate_Hz[s.candidate], 1, WANTED_MPS / 1.2
@@ -79,6 +83,16 @@ def test_it_holds_with_short_and_long_blocks(block_s: float, delay: int) -> None
     steps = round((SILENT_S + 1.5) / block_s)
     _, s, true_mps = run(steps, delay, lambda _: 3.0, block_s)
     assert s.loop_delay_steps == pytest.approx(delay, abs=max(1, round(1e-3 / block_s)))
+    assert true_mps[-round(0.5 / block_s) :] == pytest.approx(WANTED_MPS, rel=0.02)
+
+
+@pytest.mark.parametrize(("block_s", "delay"), [(2.5e-4, 40), (1e-3, 10), (1e-3, 0), (10e-3, 5)])
+@pytest.mark.parametrize("silent", [1, 4, 12])
+def test_noise_teaches_no_delay_where_the_vibration_begins_early(block_s: float, delay: int, silent: int) -> None:
+    """Silence in blocks: what comes before the vibration arrives is noise as well."""
+    _, s, true_mps = run(round(1.5 / block_s), delay, lambda _: 3.0, block_s, silent_s=silent * block_s)
+    assert s.loop_delay_steps == pytest.approx(delay, abs=max(1, round(1e-3 / block_s)))
+    assert true_mps.max() < 1.3 * WANTED_MPS
     assert true_mps[-round(0.5 / block_s) :] == pytest.approx(WANTED_MPS, rel=0.02)
 
 

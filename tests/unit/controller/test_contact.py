@@ -45,6 +45,24 @@ def test_a_slide_that_swings_by_less_than_half_slips_not() -> None:
     assert not (trace["state"][1000:] == wire.STICK).any()
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_without_a_force_sensor_both_positions_tell_the_force_of_the_spring(way: float) -> None:
+    drive_m, slide_m = stick_slip(4.0, 5e-4, 0.96, 0.04)
+    trace = listen(way * drive_m, way * slide_m, missing="drive_force_N", estimator={"use_force": False})
+    force_N = way * STIFFNESS_N_PER_M * (drive_m - slide_m).reshape(-1, 20).mean(axis=1)
+    assert trace["drive_force_N"] == pytest.approx(force_N, abs=0.1)
+    assert trace["breakaway_force_N"][-1] == pytest.approx(STIFFNESS_N_PER_M * 5e-4 * 0.97, rel=0.03)
+
+
+def test_the_spring_of_both_ways_is_relaxed_half_way() -> None:
+    """A start with the spring wound up by 0.4 mm; friction of 5.85 N either way."""
+    t_s = time_s(8.0)
+    drive_m = 5e-4 * np.where(t_s < 4.0, t_s, 8.0 - t_s)
+    slide_m = drive_m - 5e-4 * np.clip(np.where(t_s < 4.0, 1.0, 5.0 - t_s), -1.0, 1.0)
+    trace = listen(drive_m, slide_m, missing="drive_force_N", estimator={"use_force": False})
+    assert trace["drive_force_N"][-1000:] == pytest.approx(-5.85, abs=0.1)
+
+
 @pytest.mark.parametrize("factor", [10.0, 0.1])
 def test_the_stiffness_is_learnt_whatever_was_told(factor: float) -> None:
     drive_m, slide_m = stick_slip(3.0, 5e-4, 0.96, 0.04)

@@ -31,6 +31,13 @@ def test_a_creep_feed_of_a_micrometre_a_second_is_motion() -> None:
     assert not (trace["state"][-3000:] == wire.STANDSTILL).any()
 
 
+@pytest.mark.parametrize(("least_feed_mps", "state"), [(5e-7, wire.UNKNOWN), (1e-5, wire.STANDSTILL)])
+def test_a_feed_that_would_not_be_seen_within_a_second_is_no_standstill(least_feed_mps: float, state: int) -> None:
+    drive_m = 1e-7 * time_s(2.0)
+    trace = listen(drive_m, drive_m, position_noise_m=5e-6, estimator={"least_feed_mps": least_feed_mps})
+    assert set(trace["state"][200:]) == {state}
+
+
 def test_a_stop_is_seen_at_once_and_its_tail_is_no_motion() -> None:
     drive_m = 5e-4 * np.clip(time_s(4.0), 0.0, 2.0)
     trace = listen(drive_m, drive_m)

@@ -2,11 +2,21 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bridge.config import validate
 from controller.config import ControllerConfig
-from controller.need import is_needed, is_needless, lower_ratio, note_needed, note_needless, raise_ratio
+from controller.need import (
+    follow_swing,
+    grows,
+    is_needed,
+    is_needless,
+    note_needed,
+    note_needless,
+    raise_ratio,
+    swing_held,
+)
 from controller.records import build
 
 
@@ -61,36 +71,60 @@ def test_no_speed_is_both_needed_and_needless(speed_mps: float) -> None:
         assert not (is_needed(s, at) and is_needless(s, at))
 
 
-def _calm(p: Any, s: Any, seconds: float, wait_s: float = 0.5) -> None:
+def _follow(p: Any, s: Any, seconds: float, settle_s: float = 0.1) -> None:
     for _ in range(round(seconds / 0.01)):
-        lower_ratio(p, s, 0.01, wait_s)
+        follow_swing(p, s, 0.01, settle_s)
 
 
-def test_the_ratio_falls_to_the_least_in_calm() -> None:
+def test_the_ratio_falls_to_the_least_once_the_spring_is_wound_up() -> None:
     p, s = _start()
-    _calm(p, s, 0.4)
+    _follow(p, s, 20.0)
     assert s.ratio[0] == 1.2
-    _calm(p, s, 20.0)
-    assert s.ratio[0] == p.least_ratio == 1.05
+    s.even_s = 0.2
+    _follow(p, s, 20.0)
+    assert s.ratio[0] == p.least_ratio == 1.07
 
 
 def test_the_ratio_never_falls_onto_the_edge_until_that_is_forgotten() -> None:
     p, s = _start()
-    s.ratio[0] = 1.1
+    s.ratio[0], s.even_s = 1.1, 0.2
     raise_ratio(p, s, 0.1)
     assert s.ratio[0] == pytest.approx(1.2)
-    _calm(p, s, 20.0)
+    s.swing = 0.0
+    _follow(p, s, 20.0)
     assert s.ratio[0] == pytest.approx(1.12)  # a step above
-    _calm(p, s, 60.0)
+    _follow(p, s, 60.0)
     assert s.ratio[0] < 1.12
     assert s.ratio[1] == 1.2
 
 
-def test_the_ratio_is_bounded_and_does_not_fall_while_the_slide_swings() -> None:
+@pytest.mark.parametrize("swing", [0.05, 0.1, 0.2])
+def test_the_ratio_rises_to_what_holds_a_swing_of_friction_and_stays(swing: float) -> None:
+    """Friction that falls by the swing is still held: (1 - swing) is more than the mean friction, over that at v_a = v_s."""
     p, s = _start()
-    for _ in range(10):
-        raise_ratio(p, s, 0.4)
+    s.swing, s.even_s = swing, 0.2
+    _follow(p, s, 40.0, settle_s=1.0)
+    assert swing_held(float(s.ratio[0])) == pytest.approx(swing, rel=0.02)
+    relative = np.abs(1.0 + s.ratio[0] * np.cos(np.linspace(0.0, 2.0 * np.pi, 100_000)))
+    assert 1.0 / relative.mean() < 1.0 - swing
+
+
+def test_the_ratio_is_bounded_and_changes_no_faster_than_the_spring_follows() -> None:
+    p, s = _start()
+    s.swing = 0.9
+    follow_swing(p, s, 0.01, 10.0)
+    assert 1.2 < s.ratio[0] < 1.2 * 1.001
+    assert s.lead == pytest.approx(s.ratio[0] / 1.2 - 1.0)
+    _follow(p, s, 60.0)
     assert s.ratio[0] == p.most_ratio
-    s.swing = 0.5
-    _calm(p, s, 20.0)
+    raise_ratio(p, s, 0.4)
     assert s.ratio[0] == p.most_ratio
+
+
+@pytest.mark.parametrize("ratio", [1.05, 1.2, 1.5, 2.4])
+def test_mean_friction_grows_with_the_slide_as_the_mean_relative_speed_says(ratio: float) -> None:
+    def friction(v_s: float) -> float:
+        return v_s / float(np.abs(v_s + ratio * np.cos(np.linspace(0.0, 2.0 * np.pi, 100_001)[:-1])).mean())
+
+    by = (friction(1.001) - friction(0.999)) / 0.002 / friction(1.0)
+    assert grows(ratio) == pytest.approx(by, rel=0.01)

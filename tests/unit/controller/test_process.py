@@ -13,7 +13,7 @@ from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import sensor_block
-from bridge.wire.topics import COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, Topic
+from bridge.wire.topics import ANNOUNCE, COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, Topic
 from bridge.wire.zenoh_link import Received
 from controller.app import _Process
 from controller.config import ControllerConfig
@@ -28,6 +28,8 @@ class FakeBus:
     def __init__(self) -> None:
         self.receive: dict[str, Callable[[Received], None]] = {}
         self.sent: dict[str, list[bytes]] = {}
+        self.rig_left = False
+        self.times_came = 1
 
     def publisher(self, topic: Topic) -> Callable[[bytes], None]:
         return self.sent.setdefault(topic.name, []).append
@@ -36,18 +38,35 @@ class FakeBus:
         self.receive[topic.name] = receive
 
     def alive(self, _: str) -> bool:
+        return not self.rig_left
+
+    def came(self, _: str) -> int:
+        return self.times_came
+
+    def linked(self) -> bool:
         return True
+
+    def leave(self) -> None:
+        """The rig says END and leaves."""
+        self.say(PLANT_EVENT, END)
+        self.rig_left = True
 
     def say(self, topic: Topic, payload: bytes) -> None:
         self.receive[topic.name](Received(topic, payload, 0))
 
+    def events(self) -> list[wire.Event]:
+        return [wire.Event.FromString(payload) for payload in self.sent[CONTROLLER_EVENT.name]]
+
     def codes(self) -> list[str]:
-        return [wire.Event.FromString(payload).code for payload in self.sent[CONTROLLER_EVENT.name]]
+        return [event.code for event in self.events()]
+
+    def commands(self) -> list[Any]:
+        return [COMMAND_LAYOUT.read(payload, "command")[0] for payload in self.sent[COMMAND.name]]
 
 
 def block(number: int, length_ms: float = 1.0) -> bytes:
     sensors = sensor_block(20).blank()
-    sensors["sequence"], sensors["t_ns"] = number, (number + 1) * round(length_ms * 1e6)
+    sensors["sequence"], sensors["t_ns"] = number, min((number + 1) * round(length_ms * 1e6), 2**62)
     return sensors.tobytes()
 
 
@@ -58,18 +77,31 @@ def process() -> tuple[Any, FakeBus]:
     return made, bus
 
 
+MS = 1_000_000
 END = wire.Event(source="plant", code="END").SerializeToString()
 STOP = wire.Operator(action=wire.Operator.STOP, who="test").SerializeToString()
 
 
-def test_a_rig_that_begins_anew_is_not_taken_for_duplicates() -> None:
+def test_a_rig_that_begins_anew_is_taken_up_again() -> None:
     node = ControllerNode(CONFIG)
     for number in range(1000, 1300):
-        assert node.block(block(number)) is not None
-    assert node.block(block(1299 - 255)) is None
+        assert node.block(block(number), number * MS) is not None
+    assert node.block(block(1299 - 255), 1300 * MS) is None
     assert node.duplicates == 1
-    with pytest.raises(Fault, match=r"BAD_MESSAGE: sensors: block 0 after block 1299: must count up.*restart"):
-        node.block(block(0))
+    answered = [node.block(block(number), (1400 + number) * MS) is not None for number in range(20)]
+    assert answered == [False] * 7 + [True] * 13
+    assert (node.restarts, node.strays, node.last_block) == (1, 0, 19)
+    assert node._trace[0]["gap_blocks"] == 0
+    assert node.t_ns == 20 * MS
+
+
+def test_a_rig_that_came_back_is_taken_up_at_its_first_block() -> None:
+    node = ControllerNode(CONFIG)
+    for number in range(100):
+        node.block(block(number), number * MS)
+    node.rig_was_away()
+    assert node.block(block(0), 100 * MS) is not None
+    assert node.restarts == 1
 
 
 def test_blocks_of_another_length_are_refused() -> None:
@@ -77,8 +109,19 @@ def test_blocks_of_another_length_are_refused() -> None:
     node.block(block(0, 2.0))
     node.block(block(3, 2.0))  # across a gap it cannot be told
     node.stale(20)
+    for number in (4, 5):  # a clock that jumps once is no other length
+        node.block(block(number, 2.0))
     with pytest.raises(Fault, match=r"CONFIG: sensors: blocks are 2 ms apart: must be block_s = 0.001 s; set"):
-        node.block(block(4, 2.0))
+        node.block(block(6, 2.0))
+
+
+@pytest.mark.parametrize("wrong_mps", [float("nan"), float("inf"), -1e300])
+def test_an_announcement_that_is_no_velocity_is_refused(wrong_mps: float) -> None:
+    node = ControllerNode(CONFIG)
+    said = wire.Announce(holds_from_ns=5, drive_velocity_mps=wrong_mps)
+    with pytest.raises(Fault, match=r"BAD_MESSAGE: announce: drive_velocity_mps"):
+        node.announcement(said.SerializeToString())
+    assert node._state[0]["announced_count"] == 0
 
 
 def test_a_repeated_block_is_not_fresh() -> None:
@@ -90,9 +133,9 @@ def test_a_repeated_block_is_not_fresh() -> None:
     wait_for(lambda: "STALE" in bus.codes())
     bus.say(SENSORS, block(0))
     wait_for(lambda: controller._node.duplicates == 1)
-    bus.say(PLANT_EVENT, END)
+    bus.leave()
     thread.join(5.0)
-    assert bus.codes() == ["START", "STALE", "END"]
+    assert [code for code in bus.codes() if code != "REPEATED"] == ["START", "STALE", "END"]
 
 
 def test_a_slip_of_a_drive_that_seems_to_stand_is_an_event() -> None:
@@ -104,7 +147,7 @@ def test_a_slip_of_a_drive_that_seems_to_stand_is_an_event() -> None:
         sensors["mass_position_m"] = 0.02 * slid_s + chance.normal(0.0, 5e-7, 20)
         sensors["drive_force_N"] = 10.0 - 11700.0 * 0.02 * slid_s + chance.normal(0.0, 0.02, 20)
         bus.say(SENSORS, sensors.tobytes())
-    bus.say(PLANT_EVENT, END)
+    bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "DRIVE_UNSEEN", "END"]
 
@@ -126,7 +169,7 @@ def test_without_blocks_the_command_ramps_at_the_slew_limit() -> None:
     thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
     thread.start()
     wait_for(lambda: len(bus.sent[COMMAND.name]) >= 40)
-    bus.say(PLANT_EVENT, END)
+    bus.leave()
     thread.join(5.0)
     commands = [COMMAND_LAYOUT.read(payload, "command")[0] for payload in bus.sent[COMMAND.name]]
     assert commands[1].t_ns == 21_000_000  # silent for 20 ms
@@ -139,14 +182,14 @@ def test_a_stop_is_taken_however_full_the_inbox_is() -> None:
     for number in range(300):
         bus.say(SENSORS, block(number))
     bus.say(OPERATOR, STOP)
-    bus.say(PLANT_EVENT, END)
+    bus.leave()
     stop = threading.Event()
     timer = threading.Timer(5.0, stop.set)
     timer.start()  # were the plant's END dropped, it would never come back
     controller.loop(stop, "")
     timer.cancel()
     assert controller._inbox.dropped == 300 - 256
-    assert bus.codes() == ["START", "OPERATOR", "END"]
+    assert bus.codes() == ["START", "FLOOD", "OPERATOR", "END"]
 
 
 def test_a_rig_that_repeats_its_last_block_is_stale() -> None:
@@ -161,9 +204,9 @@ def test_a_rig_that_repeats_its_last_block_is_stale() -> None:
         if bus.sent[COMMAND.name] and commanded_m(bus)[-1] == 0.0:
             break
         time.sleep(0.001)
-    bus.say(PLANT_EVENT, END)
+    bus.leave()
     thread.join(5.0)
-    assert bus.codes() == ["START", "STALE", "END"]
+    assert [code for code in bus.codes() if code != "REPEATED"] == ["START", "STALE", "END"]
     assert commanded_m(bus)[-1] == 0.0
     assert max(abs(np.diff(commanded_m(bus)))) < 1.001e-9
 
@@ -185,8 +228,9 @@ def test_who_leaves_takes_the_amplitude_down_first(why: str) -> None:
         controller.loop(stop, "")
         timer.join()
     else:
-        bus.say(SENSORS, block(0))
-        with pytest.raises(Fault, match="BAD_MESSAGE"):
+        for number in (1001, 1002, 1003, 1004):
+            bus.say(SENSORS, block(number, 2.0))
+        with pytest.raises(Fault, match="CONFIG: sensors: blocks are 2 ms apart"):
             controller.loop(stop, "")
     assert commanded_m(bus)[0] == pytest.approx(2.9e-8)
     assert commanded_m(bus)[-1] == 0.0
@@ -195,13 +239,13 @@ def test_who_leaves_takes_the_amplitude_down_first(why: str) -> None:
 
 def test_samples_that_are_no_numbers_are_said_once() -> None:
     controller, bus = process()
-    for number in range(6):
+    for number in range(30):
         made = sensor_block(20).blank()
         made["sequence"], made["t_ns"] = number, (number + 1) * 1_000_000
         if number in {2, 3}:
             made["base_accel_mps2"][0, 7] = np.nan
         bus.say(SENSORS, made.tobytes())
-    bus.say(PLANT_EVENT, END)
+    bus.leave()
     controller.loop(threading.Event(), "")
     assert bus.codes() == ["START", "NOT_FINITE", "FRESH", "END"]
     assert "block 2 holds a sample" in wire.Event.FromString(bus.sent[CONTROLLER_EVENT.name][1]).text
@@ -214,3 +258,102 @@ def test_a_controller_in_lockstep_refuses_a_rig_that_does_not_wait() -> None:
     bus.say(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
     with pytest.raises(Fault, match=r"CONFIG: event/plant: START says 'SCHED_FIFO 50': must say 'lockstep'"):
         controller.loop(threading.Event(), "")
+
+
+def test_what_cannot_be_read_is_dropped_and_told_once_a_second() -> None:
+    controller, bus = process()
+    bus.say(SENSORS, block(0))
+    for number in range(1, 50):
+        bus.say(SENSORS, b"\xff" * 12)
+        bus.say(SENSORS, block(number))
+        bus.say(OPERATOR, b"\x08\x07")
+    bus.say(ANNOUNCE, b"\xff" * (1 << 17))
+    bus.leave()
+    controller.loop(threading.Event(), "")
+    assert len(bus.sent[COMMAND.name]) == 50
+    told = [(event.code, event.text) for event in bus.events()]
+    assert [code for code, _ in told] == ["START", *["BAD_MESSAGE"] * 5, "END"]
+    assert told[1][1] == "sensors: 12 bytes are no SensorBlock; see bridge/wire/PROTOCOL.md for its fields: dropped"
+    assert told[2][1] == "operator: action = 7: not known: dropped"
+    assert told[3][1].startswith("announce: a message of more than 65536 bytes: a Announce must be shorter")
+    assert told[4][1].endswith("(48 times, 49 in all)")
+
+
+def test_strangers_blocks_are_dropped_and_told() -> None:
+    controller, bus = process()
+    for number in range(60):
+        bus.say(SENSORS, block(number))
+        for strange in (2**62, number + 10**6, max(number - 1, 0)):
+            bus.say(SENSORS, block(strange))
+    bus.leave()
+    controller.loop(threading.Event(), "")
+    assert [commanded.block for commanded in bus.commands()] == list(range(60))
+    codes = bus.codes()
+    assert codes.count("FOREIGN") <= 2
+    assert codes.count("REPEATED") <= 2
+    assert {"FOREIGN", "REPEATED", "END"} <= set(codes)
+
+
+def test_an_end_of_a_rig_that_stays_ends_nobody() -> None:
+    controller, bus = process()
+    thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
+    bus.say(SENSORS, block(0))
+    thread.start()
+    bus.say(PLANT_EVENT, END)
+    for number in range(1, 80):
+        time.sleep(0.02)
+        bus.say(SENSORS, block(number))
+    assert thread.is_alive()
+    assert "FOREIGN" in bus.codes()
+    bus.leave()
+    thread.join(5.0)
+    assert not thread.is_alive()
+
+
+def test_a_rig_that_leaves_without_an_end_is_waited_for_and_told_rightly() -> None:
+    controller, bus = process()
+    stop = threading.Event()
+    thread = threading.Thread(target=controller.loop, args=(stop, ""), daemon=True)
+    for number in range(1000, 1003):
+        bus.say(SENSORS, block(number))
+    thread.start()
+    wait_for(lambda: len(bus.sent[COMMAND.name]) > 2)
+    bus.rig_left = True
+    wait_for(lambda: "RIG_LOST" in bus.codes())
+    lost = next(event for event in bus.events() if event.code == "RIG_LOST")
+    assert lost.text == "the rig left the bus; last block at 1.003 s; waiting for it for 30 s"
+    bus.rig_left, bus.times_came = False, 2
+    for number in range(30):
+        bus.say(SENSORS, block(number))
+        time.sleep(0.001)
+    wait_for(lambda: "FRESH" in bus.codes())
+    stop.set()
+    thread.join(5.0)
+    codes = bus.codes()
+    assert codes[:6] == ["START", "STALE", "RIG_LOST", "RIG_RESTARTED", "RIG_BACK", "FRESH"]
+
+
+def test_a_clock_that_jumps_is_told() -> None:
+    controller, bus = process()
+    for number in range(30):
+        made = np.frombuffer(bytearray(block(number)), sensor_block(20).dtype)
+        made["t_ns"] += 3_600_000 * MS if number >= 10 else 0
+        bus.say(SENSORS, made.tobytes())
+    bus.leave()
+    controller.loop(threading.Event(), "")
+    assert bus.codes() == ["START", "CLOCK", "END"]
+    assert "sensors: block 10: t_ns is 3.6e+06 ms from what the number says" in bus.events()[1].text
+
+
+def test_a_flood_of_an_operators_words_is_obeyed_and_answered_sparsely() -> None:
+    controller, bus = process()
+    bus.say(SENSORS, block(0))
+    for _ in range(1000):
+        bus.say(OPERATOR, STOP)
+    bus.say(SENSORS, block(1))
+    bus.leave()
+    controller.loop(threading.Event(), "")
+    assert bus.codes().count("OPERATOR") == 1
+    flood = next(event.text for event in bus.events() if event.code == "FLOOD")
+    assert flood == "operator: more messages than can be answered: dropped (744 times)"
+    assert controller._node._trace[0]["limit"] == wire.OPERATOR_STOP

@@ -9,7 +9,7 @@ import pytest
 from bridge.config import validate
 from controller.config import ControllerConfig
 from controller.records import build
-from controller.vibration import burst, measure
+from controller.vibration import measure
 
 
 def _measured(frequency_Hz: float, velocity_mps: float, offset: float, blocks: int = 60) -> tuple[Any, Any, Any]:
@@ -32,12 +32,3 @@ def _measured(frequency_Hz: float, velocity_mps: float, offset: float, blocks: i
 def test_amplitude_is_found_at_any_phase(frequency_Hz: float, offset: float) -> None:
     _, s, _ = _measured(frequency_Hz, 6e-4, offset)
     assert s.vibration_velocity_mps == pytest.approx(6e-4, rel=1e-3)
-
-
-def test_burst_sees_a_slip_and_is_silent_while_vibrating() -> None:
-    _, s, line = _measured(2600.0, 6e-4, 0.3)
-    slip = (2.0 * np.sin(np.arange(20) / 20000.0 * 2 * math.pi * 14.0 + 1.0)).astype(np.float32)
-    assert np.sqrt((line**2).mean()) > 6.0
-    assert burst(s, line + slip) == 0.0
-    s.allowed_m = 0.0
-    assert burst(s, slip) == pytest.approx(np.sqrt((slip**2).mean()), rel=1e-6)

@@ -19,12 +19,17 @@ from plant.node import PlantNode
 
 
 def rig(*settings: str):
-    return load_rig("paper-c45-c45", ["piezo.amplitude_slew_m_per_s=0.0", "piezo.amplitude_max_m=0.001", *settings])
+    free = (
+        "guard.loud_ratio={alarm=1e9,abort=1e9}"  # the amplitude tells which command acts, and grows beyond all sense
+    )
+    slewing = ["piezo.amplitude_slew_m_per_s=0.0", "piezo.amplitude_max_m=0.001"]
+    return load_rig("paper-c45-c45", [free, *slewing, *settings])
 
 
 def command(block: int) -> bytes:
     record = COMMAND.blank()
-    record["block"], record["frequency_Hz"], record["amplitude_m"] = block, 2600.0, 1e-9 * (block + 1)
+    record["sequence"], record["run"], record["block"] = block, 1, block
+    record["frequency_Hz"], record["amplitude_m"] = 2600.0, 1e-9 * (block + 1)
     return record.tobytes()
 
 
@@ -55,7 +60,7 @@ def test_a_command_acts_whole_blocks_later(delay_s: float, block_s: float, block
         "piezo.command_timeout_s=0.3",
     )
     assert whole_blocks(delay_s, block_s) == blocks
-    found = acting(PlantNode(config, 1), blocks + 30)
+    found = acting(PlantNode(config, 1, arm=True), blocks + 30)
     assert found.tolist() == [max(block - 1 - blocks, -1) for block in range(blocks + 30)]
 
 
@@ -65,13 +70,13 @@ def test_a_jitter_is_drawn_evenly_and_keeps_the_order() -> None:
     assert np.bincount(delays)[11:31] == pytest.approx(1000, rel=0.15)
     assert delays.min() == 11
     assert delays.max() == 30
-    found = acting(PlantNode(config, 5), 500)
+    found = acting(PlantNode(config, 5, arm=True), 500)
     assert (np.diff(found) >= 0).all()
     late = np.arange(500)[40:] - found[40:] - 1
     assert late.min() >= 11
     assert late.max() <= 30
     assert len(set(late.tolist())) > 5
-    other = acting(PlantNode(config, 6), 500)
+    other = acting(PlantNode(config, 6, arm=True), 500)
     assert not np.array_equal(found, other)
 
 
@@ -84,7 +89,7 @@ def test_noise_and_jitter_are_the_same_however_they_are_drawn() -> None:
 
 
 def test_a_rig_that_lets_go_forgets_what_is_on_its_way() -> None:
-    node = PlantNode(rig("loop.delay_s=0.02"), 1)
+    node = PlantNode(rig("loop.delay_s=0.02"), 1, arm=True)
     acting(node, 10)
     node.let_go()
     for _ in range(30):
@@ -98,7 +103,7 @@ def test_the_line_holds_what_the_longest_delay_needs() -> None:
         "loop.delay_s=0.2", "loop.jitter_s=0.1", "solver.block_s=0.00025", "solver.samples_per_block=5",
         "piezo.command_timeout_s=1.0",
     )  # fmt: skip
-    node = PlantNode(longest, 1)
+    node = PlantNode(longest, 1, arm=True)
     found = acting(node, 3000)
     assert int(node._state["line_count"][0]) <= LINE
     assert found[-1] > 3000 - LINE
@@ -110,7 +115,7 @@ def test_delay_and_jitter_make_the_same_tables_in_one_process_and_block_by_block
     scenario = load_scenario("from-the-start", settings)
     run_onboard(scenario, tmp_path / "run.mcap", {})
     run = read_run(tmp_path / "run.mcap")
-    plant, controller = PlantNode(scenario.rig, scenario.seed), ControllerNode(scenario.controller)
+    plant, controller = PlantNode(scenario.rig, scenario.seed, arm=True), ControllerNode(scenario.controller)
     commands: list[bytes] = []
     for block in range(300):
         sensors, applied = plant.advance(commands)

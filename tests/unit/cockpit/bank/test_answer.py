@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controller.codes import EXCITE, HELD, PROBE, SMOOTH, STICK, STICK_SEEN, WATCH
-from tests.unit.cockpit.bank.made import at_speed, judged, times
+from tests.unit.cockpit.bank.made import along, at_speed, judged, times
 from tests.unit.cockpit.bank.test_motion import stuck_from
 
 
@@ -36,6 +36,13 @@ def test_a_claim_in_smooth_motion_or_at_rest_is_false(drive_mps: float) -> None:
     place_m = at_speed(2.0, drive_mps)
     said = judged(place_m, place_m, state=states(2000, 1000, 1010))
     np.testing.assert_allclose(said.claims[:, 0], [1.001])
+
+
+def test_a_claim_at_a_drive_that_creeps_to_its_turn_is_not_false() -> None:
+    """A hundredth of the slowest feed is no motion in the sums, but its slide sticks all the same."""
+    drive_m = along(np.where(times(2.0) < 1.0, 5e-4, 5e-6))
+    slide_m = along(np.where(times(2.0) < 1.0, 5e-4, 0.0))
+    assert len(judged(slide_m, drive_m, state=states(2000, 1200, 1210)).claims) == 0
 
 
 def test_a_claim_while_vibrating_or_probing_is_not_counted() -> None:

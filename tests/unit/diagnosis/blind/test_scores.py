@@ -24,6 +24,21 @@ from tests.blind.stand_ins import Bump, StandIn, case
 from tests.blind.strata import counts, draw
 
 
+@pytest.mark.parametrize(
+    ("verdict", "share", "told"),
+    [
+        ("unexplained", None, True),
+        ("partly", 0.3, True),
+        ("partly", None, True),
+        ("partly", 0.7, False),
+        ("effect", 0.3, False),
+    ],
+)
+def test_partly_counts_as_outside_where_less_than_half_is_named(verdict, share, told):
+    said = {"verdict": verdict, "effects": ["drive-damping"], "gap": {"shrinkage": share}}
+    assert opened("a", {"effects": [], "verdict": "unexplained", "stratum": "outside"}, said).told_outside is told
+
+
 def test_scores_by_hand():
     cases = [
         case("one-effect", ["drive-damping"], {"drive-damping": 0.9, "none": 0.1}, name="right"),

@@ -297,3 +297,25 @@ def test_no_folder_and_no_manifest(tmp_path: Path) -> None:
         load_evidence(Path(__file__))
     with pytest.raises(Fault, match=r"manifest.toml: no such file"):
         load_evidence(tmp_path)
+
+
+def test_a_run_or_a_manifest_that_is_a_link_out_of_the_folder_is_not_read(tmp_path: Path) -> None:
+    made = folder(tmp_path, columns())
+    secret = tmp_path.parent / f"{tmp_path.name}-secret.csv"
+    secret.write_text("TOP-SECRET-LINE\n")
+    run = next(path for path in made.iterdir() if path.name != "manifest.toml")
+    kept = run.read_bytes()
+    run.unlink()
+    run.symlink_to(secret)
+    with pytest.raises(Fault, match=r"BAD_EVIDENCE: manifest.toml: run.file = .* is a link that leads out") as caught:
+        load_evidence(made)
+    assert "TOP-SECRET" not in caught.value.line
+    run.unlink()
+    run.with_name(f"real{run.suffix}").write_bytes(kept)
+    run.symlink_to(f"real{run.suffix}")  # a link within the folder is one
+    assert load_evidence(made).runs
+    (made / "manifest.toml").unlink()
+    (made / "manifest.toml").symlink_to(secret)
+    with pytest.raises(Fault, match=r"manifest.toml: is a link that leads out of the folder") as caught:
+        load_evidence(made)
+    assert "TOP-SECRET" not in caught.value.line

@@ -29,7 +29,7 @@ class Halves:
 
 
 def test_each_gets_its_own_answers_in_the_order_of_the_works():
-    turns = [3, 0, 2, 7, 2, 0, 5, 4, 6, 2, 8, 3]  # more than go side by side; some ask for nothing at all
+    turns = 2 * [3, 0, 2, 7, 2, 0, 5, 4, 6, 2, 8, 3]  # more than go side by side; some ask for nothing at all
     halves = Halves()
     found = together(halves, [halving(64.0 + number, count) for number, count in enumerate(turns)])
     assert found == [(64.0 + number) / 2.0**count for number, count in enumerate(turns)]

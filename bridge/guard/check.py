@@ -1,0 +1,100 @@
+"""The loop check, before a rig is armed: every sensor lives, and the exciter is heard at each tone; its gain is measured."""
+
+import math
+
+from bridge.guard.codes import ARMED, CHECK_PASSED, EXCITER_SILENT, EXCITER_WILD, SENSOR_FROZEN, SENSOR_NOT_FINITE
+from bridge.guard.states import enter, trip
+from bridge.kernel import Record, kernel
+
+_TWO_PI = 2.0 * math.pi
+_QUIET_S = 0.5  # in which the sensors are listened to; a 16-bit converter shows some noise in it
+_TONE_S = 0.2  # a tone; its first half is the exciter's start
+_HEARD = 4.0  # power of the tone over that of the noise from which it counts as heard
+_WILD = 20.0  # factor either way of the rigid mount's gain; a mount may resonate tenfold
+
+
+@kernel
+def check_tone(p: Record, s: Record) -> tuple[float, float]:
+    """Frequency and amplitude of the check's present tone; an amplitude of 0 before the first and after the last."""
+    at = _tone(p, s.check_blocks)
+    if at < 0 or at >= p.tones:
+        return s.frequency_Hz, 0.0
+    return p.tone_Hz[at], p.check_m
+
+
+@kernel
+def _tone(p: Record, blocks: int) -> int:
+    quiet_blocks, tone_blocks = _blocks(p, _QUIET_S), _blocks(p, _TONE_S)
+    return (blocks - quiet_blocks) // tone_blocks if blocks >= quiet_blocks else -1
+
+
+@kernel
+def _blocks(p: Record, time_s: float) -> int:
+    return max(math.ceil(time_s / p.block_s), 2)
+
+
+@kernel
+def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> None:
+    """Take a block of samples of the check; go to ARMED at its end, or to FAULT.
+
+    Args:
+        p, s: records of `bridge.guard.records`.
+        block: record of a sensor block.
+        square_mps2: square of the amplitude of the base's acceleration at the frequency of the tone.
+
+    """
+    quiet_blocks, tone_blocks = _blocks(p, _QUIET_S), _blocks(p, _TONE_S)
+    if s.check_blocks == 0:
+        s.quiet_mps2, s.tone_mps2 = 0.0, 0.0
+        s.lowest[:], s.highest[:] = math.inf, -math.inf
+    if (
+        not _note(s, 0, block.drive_force_N)
+        or not _note(s, 1, block.mass_accel_mps2)
+        or not _note(s, 2, block.base_accel_mps2)
+        or not _note(s, 3, block.mass_position_m)
+        or not _note(s, 4, block.drive_position_m)
+    ):
+        trip(s, SENSOR_NOT_FINITE)
+    at = _tone(p, s.check_blocks)
+    s.check_blocks += 1
+    if at >= p.tones:
+        if s.amplitude_m == 0.0:
+            enter(s, ARMED, CHECK_PASSED)
+        return
+    if at < 0:
+        s.quiet_mps2 += square_mps2 / quiet_blocks
+        if s.check_blocks == quiet_blocks:
+            for channel in range(s.lowest.shape[0]):
+                if s.lowest[channel] == s.highest[channel]:
+                    s.frozen_channel = channel
+                    trip(s, SENSOR_FROZEN)
+        return
+    done = (s.check_blocks - 1 - quiet_blocks) % tone_blocks
+    if done == 0:
+        s.tone_mps2 = 0.0
+    if 2 * done >= tone_blocks:
+        s.tone_mps2 += square_mps2 / (tone_blocks - (tone_blocks + 1) // 2)
+    if done == tone_blocks - 1:
+        _judge(p, s, at)
+
+
+@kernel
+def _judge(p: Record, s: Record, at: int) -> None:
+    omega = _TWO_PI * p.tone_Hz[at]
+    s.gain[at] = math.sqrt(max(s.tone_mps2 - s.quiet_mps2, 0.0)) / (omega * omega * p.check_m)
+    if s.tone_mps2 < _HEARD * s.quiet_mps2:
+        trip(s, EXCITER_SILENT)
+    elif not 1.0 / _WILD < s.gain[at] < _WILD:
+        trip(s, EXCITER_WILD)
+    elif at == p.tones - 1:
+        s.verified = 1
+
+
+@kernel
+def _note(s: Record, channel: int, samples: Record) -> bool:
+    for i in range(samples.shape[0]):
+        value = float(samples[i])
+        if not math.isfinite(value):
+            return False
+        s.lowest[channel], s.highest[channel] = min(s.lowest[channel], value), max(s.highest[channel], value)
+    return True

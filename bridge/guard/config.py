@@ -1,0 +1,83 @@
+"""The table `[guard]` of a rig file: what the exciter may do, whatever a controller commands. Nothing raises a limit online."""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from bridge.config import Strict, Two
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(gt=0, le=1)]
+MOST_BANDS = 8
+
+
+class Level(Strict):
+    """A limit: the command is held at `alarm`, and beyond `abort` for `hold_s` the rig goes to FAULT."""
+
+    alarm: Positive
+    abort: Positive
+    hold_s: NotNegative = 0.2
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "Level":
+        if self.abort < self.alarm:
+            raise ValueError(f"abort = {self.abort:g}: must not be below alarm = {self.alarm:g}")
+        return self
+
+
+class HeatConfig(Strict):
+    """The exciter's warmth: losses pi tan(d) C f (u0 / s)^2 into one thermal resistance with one time constant."""
+
+    capacitance_F: Positive = Field(default=8e-7, description="C of the stack.")
+    stroke_m_per_V: Positive = Field(default=7.8e-8, description="s of the stack.")
+    loss_tangent: Positive = Field(default=0.2, description="At large signal, ten times the data sheet's.")
+    resistance_K_per_W: Positive = Field(default=20.0, description="From the stack to its surroundings.")
+    time_s: Positive = Field(default=60.0, description="Time constant.")
+    rise_max_K: Positive = Field(default=30.0, description="Largest rise above the surroundings.")
+    alarm_share: Share = Field(default=0.8, description="Of rise_max_K, from which it is told; from 1 on it trips.")
+
+
+class GuardConfig(Strict):
+    """The guard of one rig. Stroke, frequencies and slew are those of `[piezo]`, unless they are narrower here."""
+
+    stroke_m: Level | None = Field(
+        default=None, description="Not given: piezo.amplitude_max_m, abort at 1.5 times that."
+    )
+    velocity_mps: Level | None = Field(
+        default=None, description="Of the commanded v_a. Not given: what the stroke gives at the highest frequency."
+    )
+    velocity_ratio: Level = Field(
+        default=Level(alarm=3.0, abort=4.0),
+        description="Commanded v_a, by the checked gain, over the drive's velocity.",
+    )
+    loud_ratio: Level = Field(
+        default=Level(alarm=3.0, abort=4.0, hold_s=0.1), description="Measured v_a over the drive's velocity."
+    )
+    forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
+        default=[], description="Bands [low, high] in which nothing is vibrated."
+    )
+    band_hold_s: NotNegative = Field(default=0.2, description="Of commands outside of the bands, until it trips.")
+    duty: Level = Field(
+        default=Level(alarm=1.0, abort=1.0), description="Share of the time in which it vibrates; 1: no limit."
+    )
+    duty_window_s: Positive = Field(default=60.0, description="Time constant of that share.")
+    heat: HeatConfig = HeatConfig()
+    drive_memory_s: Positive = Field(
+        default=0.5,
+        description="Time constant in which the drive's velocity is forgotten: a vibration outlasts its move.",
+    )
+    command_lost_s: Positive = Field(default=0.5, description="Without a fresh command, until the rig is DISARMED.")
+    check_Hz: Annotated[list[Positive], Field(max_length=8)] = Field(
+        default=[], description="Frequencies of the loop check, rising. Not given: five over piezo's range."
+    )
+    check_share: Share = Field(default=0.1, description="Of the stroke, at which the loop check vibrates.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "GuardConfig":
+        for low, high in self.forbidden_Hz:
+            if high <= low:
+                raise ValueError(f"forbidden_Hz: [{low:g}, {high:g}]: the second must be above the first")
+        if sorted(set(self.check_Hz)) != self.check_Hz:
+            raise ValueError(f"check_Hz = {self.check_Hz}: must rise")
+        return self

@@ -1,0 +1,76 @@
+"""The guard, block by block: `accept` each command, `allow` a vibration for the block, `look` at the samples of the block."""
+
+import math
+
+from bridge.guard.check import check_tone, follow_check
+from bridge.guard.codes import ACTIVE, ARMED, CHECK_PASSED, CHECKING, COMMAND_LOST, DISARMED, NO_CAUSE, SLEW_RATE
+from bridge.guard.limits import held, watch
+from bridge.guard.senses import see_drive, see_vibration
+from bridge.guard.states import enter, note_vibration
+from bridge.kernel import Record, kernel
+
+NO_COMMAND = -1  # as the unsigned number of the wire: bridge.wire.messages.NO_BLOCK
+
+
+@kernel
+def accept(p: Record, s: Record, command: Record) -> bool:
+    """Whether a command counts: of this run, newer than the last, of a block that was sent, and made of numbers.
+
+    A controller that begins anew counts from 0, so after a time without fresh commands any number is newer.
+    """
+    sequence, block = int(command.sequence), int(command.block)
+    numbers = math.isfinite(command.frequency_Hz) and math.isfinite(command.amplitude_m)
+    ours = command.run == p.run and 0 <= block < s.block
+    if ours and numbers and command.amplitude_m >= 0.0 and (sequence > s.last_sequence or s.fresh == 0):
+        s.last_sequence = sequence
+        return True
+    s.refused += 1
+    return False
+
+
+@kernel
+def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitude_m: float) -> None:
+    """Set `frequency_Hz` and `amplitude_m` of the block to come, from the command in force.
+
+    Args:
+        p, s: records of `bridge.guard.records`.
+        command_block: block that the command answers, NO_COMMAND before the first.
+        frequency_Hz, amplitude_m: of the command.
+
+    """
+    s.limit = NO_CAUSE
+    s.fresh = 1 if command_block != NO_COMMAND and 0 <= s.block - command_block <= p.timeout_blocks else 0
+    target_Hz, target_m = s.frequency_Hz, 0.0
+    if s.state in (ARMED, ACTIVE):
+        if s.fresh == 1:
+            s.heard, s.lost_blocks = 1, 0
+            target_Hz, target_m = frequency_Hz, held(p, s, frequency_Hz, amplitude_m)
+        elif (
+            s.heard == 1 or s.cause == CHECK_PASSED
+        ):  # whom a person arms has a controller; a simulated rig may wait for its own
+            s.limit = COMMAND_LOST
+            s.lost_blocks += 1
+            if s.lost_blocks > p.lost_blocks:
+                enter(s, DISARMED, COMMAND_LOST)
+        watch(p, s)
+        if s.state not in (ARMED, ACTIVE):
+            target_m = 0.0
+    elif s.state == CHECKING:
+        target_Hz, target_m = check_tone(p, s)
+    if target_m > 0.0:
+        s.frequency_Hz = target_Hz  # a vibration that fades keeps its frequency
+    slewed_m = min(max(target_m, s.amplitude_m - p.slew_m_per_block), s.amplitude_m + p.slew_m_per_block)
+    if slewed_m != target_m and s.limit == NO_CAUSE:
+        s.limit = SLEW_RATE
+    s.amplitude_m = slewed_m
+    note_vibration(s)
+
+
+@kernel
+def look(p: Record, s: Record, block: Record) -> None:
+    """Take the samples of the block that was vibrated as `allow` said; the next block begins."""
+    see_drive(p, s, block)
+    see_vibration(p, s, block)
+    if s.state == CHECKING:
+        follow_check(p, s, block, s.square_mps2)
+    s.block += 1

@@ -1,0 +1,77 @@
+"""The limits: each holds the command at its alarm level, and trips where its abort level is passed for its time."""
+
+import math
+
+from bridge.guard.codes import BAND, DRIVE_MAX, DRIVE_RATIO, DUTY, HEAT, LOUD, OVERTRAVEL
+from bridge.guard.records import FIRST
+from bridge.guard.states import trip
+from bridge.kernel import Record, kernel
+
+_TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def passes(p: Record, s: Record, limit: int, value: float) -> bool:
+    """Whether a value keeps to the alarm level of a limit, else `limit` is set; trips beyond the abort level for too long."""
+    i = limit - FIRST
+    s.over_blocks[i] = s.over_blocks[i] + 1 if value > p.abort[i] else 0
+    if s.over_blocks[i] > p.hold_blocks[i]:
+        trip(s, limit)
+    if value <= p.alarm[i]:
+        return True
+    s.limit = limit
+    return False
+
+
+@kernel
+def exciter_gain(p: Record, s: Record, frequency_Hz: float) -> float:
+    """Delivered over commanded v_a at a frequency, as the loop check found it; between its tones by a straight line."""
+    if frequency_Hz <= p.tone_Hz[0]:
+        return s.gain[0]
+    for i in range(1, p.tones):
+        if frequency_Hz <= p.tone_Hz[i]:
+            share = (frequency_Hz - p.tone_Hz[i - 1]) / (p.tone_Hz[i] - p.tone_Hz[i - 1])
+            return s.gain[i - 1] + share * (s.gain[i] - s.gain[i - 1])
+    return s.gain[p.tones - 1]
+
+
+@kernel
+def _inside(p: Record, frequency_Hz: float) -> bool:
+    inside = p.frequency_min_Hz <= frequency_Hz <= p.frequency_max_Hz
+    for i in range(p.bands):
+        inside = inside and not p.band_Hz[i, 0] <= frequency_Hz <= p.band_Hz[i, 1]
+    return inside
+
+
+@kernel
+def held(p: Record, s: Record, frequency_Hz: float, amplitude_m: float) -> float:
+    """The commanded amplitude, held at the limits [m]."""
+    if amplitude_m == 0.0:
+        passes(p, s, BAND, 0.0)
+        return 0.0
+    if not passes(p, s, BAND, 0.0 if _inside(p, frequency_Hz) else 1.0):
+        return 0.0
+    result_m = amplitude_m
+    if not passes(p, s, OVERTRAVEL, amplitude_m):
+        result_m = p.alarm[OVERTRAVEL - FIRST]
+    per_m = _TWO_PI * frequency_Hz
+    if not passes(p, s, DRIVE_MAX, per_m * amplitude_m):
+        result_m = min(result_m, p.alarm[DRIVE_MAX - FIRST] / per_m)
+    if s.verified == 1:
+        per_m *= exciter_gain(p, s, frequency_Hz)
+        ratio = per_m * amplitude_m / max(s.drive_mps, 1e-12)
+        if not passes(p, s, DRIVE_RATIO, ratio):
+            result_m = min(result_m, p.alarm[DRIVE_RATIO - FIRST] * s.drive_mps / per_m)
+    return result_m
+
+
+@kernel
+def watch(p: Record, s: Record) -> None:
+    """Follow warmth, duty and loudness of what vibrates now."""
+    warmth = p.heat_per_Hz_m2 * s.frequency_Hz * s.amplitude_m * s.amplitude_m
+    s.heat += p.heat_share * (warmth - s.heat)
+    s.duty += p.duty_share * ((1.0 if s.amplitude_m > 0.0 else 0.0) - s.duty)
+    passes(p, s, HEAT, s.heat)
+    passes(p, s, DUTY, s.duty)
+    loud = s.vibration_mps / max(s.drive_mps, 1e-12) if s.amplitude_m > 0.0 else 0.0
+    passes(p, s, LOUD, loud)

@@ -1,0 +1,152 @@
+"""The numbers a guard runs on: parameters derived once from the rig file, and everything that changes."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.guard.codes import (
+    ARMED,
+    ARMED_BY_SCENARIO,
+    BAND,
+    DISARMED,
+    DRIVE_MAX,
+    DRIVE_RATIO,
+    DUTY,
+    FAULT,
+    HEAT,
+    LIMITS,
+    LOUD,
+    OVERTRAVEL,
+    POWER_UP,
+    STOP_KEPT,
+)
+from bridge.guard.config import MOST_BANDS, GuardConfig, Level
+from bridge.kernel import record
+
+CHANNELS = 5
+FIRST = min(LIMITS)  # causes of limits are counted from here in the tables below
+MOST_TONES = 8
+_RING = 256  # block means of the drive's position: 50 ms of blocks of 0.25 ms
+_DRIVE_WINDOW_S = 0.05  # of the drive's velocity; shorter: noise. Longer: late, which only loosens a limit that brakes
+_LOUD_FILTER_S = 0.01  # of the measured v_a; shorter: a slip that shakes the base counts as vibration
+_TONES = 5
+
+PARAMS = np.dtype(
+    [("run", "u8")]
+    + [(name, "f8", (len(LIMITS),)) for name in ("alarm", "abort")]
+    + [("hold_blocks", "i8", (len(LIMITS),))]
+    + [
+        (name, "f8")
+        for name in (
+            *("block_s", "sample_s", "slew_m_per_block", "frequency_min_Hz", "frequency_max_Hz"),
+            *("loud_share", "memory_keep", "duty_share"),
+            *("heat_per_Hz_m2", "heat_share", "check_m"),
+        )
+    ]
+    + [(name, "i8") for name in ("timeout_blocks", "lost_blocks", "window_blocks", "bands", "tones")]
+    + [("band_Hz", "f8", (MOST_BANDS, 2)), ("tone_Hz", "f8", (MOST_TONES,))],
+    align=True,
+)
+
+STATE = np.dtype(
+    [
+        (name, "i8")
+        for name in (
+            *("block", "state", "cause", "limit", "fresh", "heard", "last_sequence", "refused"),
+            *("seen_blocks", "lost_blocks", "check_blocks", "verified", "frozen_channel"),
+        )
+    ]
+    + [
+        (name, "f8")
+        for name in (
+            *("frequency_Hz", "amplitude_m", "drive_mps", "vibration_mps", "square_mps2"),
+            *("heat", "duty", "quiet_mps2", "tone_mps2"),
+        )
+    ]
+    + [("over_blocks", "i8", (len(LIMITS),)), ("drive_m", "f8", (_RING,)), ("gain", "f8", (MOST_TONES,))]
+    + [(name, "f8", (CHANNELS,)) for name in ("lowest", "highest")],
+    align=True,
+)
+RING = _RING
+
+
+class Exciter(NamedTuple):
+    """What the rig file says of the exciter and its blocks."""
+
+    stroke_m: float
+    frequency_min_Hz: float
+    frequency_max_Hz: float
+    slew_m_per_s: float  # 0: at once
+    block_s: float
+    samples_per_block: int
+    command_timeout_s: float
+
+
+def build(
+    config: GuardConfig, exciter: Exciter, run: int, arm: bool = False, stop_kept: bool = False
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Parameters and memory of a guard at power-up.
+
+    Args:
+        config, exciter: of the rig file.
+        run: the number that each command must carry.
+        arm: the rig is simulated, and its scenario says so.
+        stop_kept: a person's stop of an earlier run holds.
+
+    """
+    params = record(PARAMS)
+    p: Any = params[0]
+    p.run = run
+    stroke = config.stroke_m or Level(alarm=exciter.stroke_m, abort=1.5 * exciter.stroke_m)
+    fastest_mps = 2.0 * math.pi * exciter.frequency_max_Hz * stroke.alarm
+    velocity = config.velocity_mps or Level(alarm=fastest_mps, abort=1.5 * fastest_mps)
+    heat = Level(alarm=config.heat.alarm_share, abort=1.0, hold_s=0.0)
+    band = Level(alarm=0.5, abort=0.5, hold_s=config.band_hold_s)
+    for limit, level in (
+        (OVERTRAVEL, stroke),
+        (DRIVE_MAX, velocity),
+        (DRIVE_RATIO, config.velocity_ratio),
+        (LOUD, config.loud_ratio),
+        (BAND, band),
+        (HEAT, heat),
+        (DUTY, config.duty),
+    ):
+        p.alarm[limit - FIRST], p.abort[limit - FIRST] = level.alarm, level.abort
+        p.hold_blocks[limit - FIRST] = round(level.hold_s / exciter.block_s)
+    p.block_s, p.sample_s = exciter.block_s, exciter.block_s / exciter.samples_per_block
+    p.slew_m_per_block = exciter.slew_m_per_s * exciter.block_s if exciter.slew_m_per_s > 0.0 else stroke.alarm
+    p.frequency_min_Hz, p.frequency_max_Hz = exciter.frequency_min_Hz, exciter.frequency_max_Hz
+    p.loud_share = 1.0 - math.exp(-exciter.block_s / _LOUD_FILTER_S)
+    p.memory_keep = math.exp(-exciter.block_s / config.drive_memory_s)
+    p.lost_blocks = round(config.command_lost_s / exciter.block_s)
+    p.duty_share = 1.0 - math.exp(-exciter.block_s / config.duty_window_s)
+    warm = config.heat
+    losses_W = math.pi * warm.loss_tangent * warm.capacitance_F / warm.stroke_m_per_V**2  # over f u0^2
+    p.heat_per_Hz_m2 = losses_W * warm.resistance_K_per_W / warm.rise_max_K
+    p.heat_share = 1.0 - math.exp(-exciter.block_s / warm.time_s)
+    p.check_m = config.check_share * stroke.alarm
+    p.timeout_blocks = round(exciter.command_timeout_s / exciter.block_s)
+    p.window_blocks = min(max(round(_DRIVE_WINDOW_S / exciter.block_s), 2), _RING - 1)
+    p.bands = len(config.forbidden_Hz)
+    for i, (low, high) in enumerate(config.forbidden_Hz):
+        p.band_Hz[i] = low, high
+    tones = config.check_Hz or [float(tone) for tone in _tones(config, exciter)]
+    p.tones = len(tones)
+    p.tone_Hz[: len(tones)] = tones
+
+    state = record(STATE)
+    s: Any = state[0]
+    s.last_sequence = -1
+    s.frequency_Hz = exciter.frequency_max_Hz
+    s.state, s.cause = (ARMED, ARMED_BY_SCENARIO) if arm else (DISARMED, POWER_UP)
+    if stop_kept:
+        s.state, s.cause = FAULT, STOP_KEPT
+    return params, state
+
+
+def _tones(config: GuardConfig, exciter: Exciter) -> list[float]:
+    """Frequencies of the loop check, evenly over the exciter's range, none forbidden."""
+    spaced = np.linspace(exciter.frequency_min_Hz, exciter.frequency_max_Hz, _TONES + 2)[1:-1]
+    return [tone for tone in spaced if not any(low <= tone <= high for low, high in config.forbidden_Hz)]

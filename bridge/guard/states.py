@@ -1,0 +1,70 @@
+"""The states of a rig, and what leads from one to another. Nothing arms by itself: not after a freeze, a restart, a new link."""
+
+from bridge.guard.codes import (
+    ACTIVE,
+    ARM,
+    ARMED,
+    ARMED_BY_PERSON,
+    CHECKING,
+    DISARM,
+    DISARMED,
+    DISARMED_BY_PERSON,
+    FAULT,
+    LEAVE,
+    READY,
+    RESET,
+    RESET_BY_PERSON,
+    RUN_ENDED,
+    STOP,
+    STOP_BY_PERSON,
+    VIBRATION_BEGAN,
+    VIBRATION_ENDED,
+)
+from bridge.kernel import Record, kernel
+
+
+@kernel
+def enter(s: Record, state: int, cause: int) -> None:
+    """Go to a state; another state begins anew what is counted in it."""
+    if s.state != state:
+        s.lost_blocks, s.check_blocks, s.heard = 0, 0, 0
+        s.over_blocks[:] = 0
+    s.state, s.cause = state, cause
+
+
+@kernel
+def trip(s: Record, cause: int) -> None:
+    """Go to FAULT, which stays until a person resets it; the first cause stays, too, but for a person's stop."""
+    if s.state != FAULT:
+        enter(s, FAULT, cause)
+
+
+@kernel
+def obey(s: Record, word: int) -> bool:
+    """Take a person's word, or that of the process that ends; whether it changed the state.
+
+    A stop is taken in every state. ARM is taken in DISARMED, and in ARMED without a check, where it begins one, and in READY; a
+    rig in FAULT must be reset first.
+    """
+    before = s.state
+    if word == STOP:
+        enter(s, FAULT, STOP_BY_PERSON)
+        return True
+    if word == RESET and before == FAULT:
+        enter(s, DISARMED, RESET_BY_PERSON)
+    elif word == ARM and (before == DISARMED or (before == ARMED and s.verified == 0)):
+        enter(s, CHECKING, ARMED_BY_PERSON)
+    elif word == ARM and before == READY:
+        enter(s, ARMED, ARMED_BY_PERSON)
+    elif word in (DISARM, LEAVE) and before not in (DISARMED, FAULT):
+        enter(s, DISARMED, DISARMED_BY_PERSON if word == DISARM else RUN_ENDED)
+    return before != s.state
+
+
+@kernel
+def note_vibration(s: Record) -> None:
+    """ARMED becomes ACTIVE where it vibrates, and again ARMED where it is at rest."""
+    if s.state == ARMED and s.amplitude_m > 0.0:
+        s.state, s.cause = ACTIVE, VIBRATION_BEGAN
+    elif s.state == ACTIVE and s.amplitude_m == 0.0:
+        s.state, s.cause = ARMED, VIBRATION_ENDED

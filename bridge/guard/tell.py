@@ -1,0 +1,59 @@
+"""What a rig has to say of its guard: each change of state with its reason, commands that are missing, limits that hold."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.guard.codes import FAULT, LIMITS, STOP_BY_PERSON, STOP_KEPT
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.words import words
+
+_AGAIN_S = 1.0  # the same limit is told at most once in so long
+_TOLD = ("guard_state", "guard_limit", "fallback")
+
+
+def changes(applied: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Which rows of `Applied` may hold news: the first, and those that differ from the row before."""
+    new = np.zeros(len(applied), bool)
+    new[:1] = True
+    for name in _TOLD:
+        new[1:] |= applied[name][1:] != applied[name][:-1]
+    return np.flatnonzero(new)
+
+
+class Teller:
+    """Turns what a rig applied into events, block by block."""
+
+    def __init__(self) -> None:
+        self._help = {(one.column, one.number): f"{one.word}: {one.help}" for one in words()}
+        self._state = -1
+        self._limit = 0
+        self._missing = 1  # before the first command nothing is missed
+        self._fallback = False
+        self._told_s: dict[int, float] = {}
+
+    def news(self, applied: Any) -> list[tuple[str, str]]:
+        """Codes and texts of what is new in a record of `Applied` since the last one."""
+        state, limit, missing = int(applied.guard_state), int(applied.guard_limit), int(applied.fallback)
+        if (state, limit, missing) == (self._state, self._limit, self._missing):
+            return []
+        found: list[tuple[str, str]] = []
+        vibrates = state in (wire.ARMED, wire.ACTIVE)
+        if vibrates and missing > self._missing:
+            found.append(("FALLBACK", "no fresh command: ramping to zero"))
+            self._fallback = True
+        elif self._fallback and not missing:
+            self._fallback = False
+            found.append(("FRESH", "commands arrive again"))
+        if state != self._state:
+            before = f"{wire.GuardState.Name(self._state)} -> " if self._state >= 0 else ""
+            text = f"{before}{wire.GuardState.Name(state)}: {self._help[('cause', int(applied.cause))]}"
+            tripped = state == FAULT and int(applied.cause) not in (STOP_BY_PERSON, STOP_KEPT)
+            found.append(("FAULT" if tripped else "GUARD", text))
+        t_s = int(applied.t_ns) * 1e-9
+        if limit != self._limit and limit in LIMITS and t_s - self._told_s.get(limit, -_AGAIN_S) >= _AGAIN_S:
+            self._told_s[limit] = t_s
+            found.append(("HELD_BACK", self._help[("cause", limit)]))
+        self._state, self._limit, self._missing = state, limit, missing
+        return found

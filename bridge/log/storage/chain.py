@@ -1,0 +1,222 @@
+"""The hash chain of a log: a link after each chunk, SHA-256 over all bytes since the link before and over that link's own hash.
+
+A link is a metadata record of the name `chain`, which other programs pass over. One changed byte before the last link is found,
+in messages, definitions and configurations alike; behind it the checksum of the index counts. A log that was killed can be
+verified up to its last whole chunk. There is no secret in it: who can write the file can also compute the chain anew, unless its
+last hash was noted elsewhere.
+"""
+
+import hashlib
+import struct
+import zlib
+from io import BytesIO
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Metadata
+
+from bridge.faults import Fault
+from bridge.log.finding import Finding
+from bridge.log.library import HEAD, MAGIC
+from bridge.units import counted
+
+CHAIN = "chain"  # the name of the metadata records
+_LONGEST_LINK_BYTES = 256  # of the content of a link; a longer record is none
+_PIECE_BYTES = 1 << 20
+_FOOTER_BYTES = 20
+_ENDING_BYTES = HEAD.size + _FOOTER_BYTES + len(MAGIC)  # from the footer on
+_STRETCHES = 16  # changed stretches that are told one by one
+
+
+class Stretch(NamedTuple):
+    """Bytes of a file that are not those that were written."""
+
+    file: str
+    from_bytes: int
+    until_bytes: int
+
+
+class Chain(NamedTuple):
+    """What the chain says of a log, or of one file of it."""
+
+    links: int  # 0: the log has no chain
+    first: str  # SHA-256 of the first link, hexadecimal; empty without one
+    last: str
+    changed: list[Stretch]  # at most 16
+    changes: int  # all of them
+    ended: bool  # the last link says that it is the last
+    covered_bytes: int  # end of the last link
+    closed: bool  # the file has its footer
+
+    def as_dict(self) -> dict[str, Any]:
+        """For `--json`."""
+        return self._asdict() | {"changed": [stretch._asdict() for stretch in self.changed]}
+
+
+def link_record(number: int, digest: bytes, ended: bool) -> bytes:
+    """The bytes of a link."""
+    builder = RecordBuilder()
+    fields = {"link": str(number), "sha256": digest.hex()} | ({"end": "1"} if ended else {})
+    Metadata(name=CHAIN, metadata=fields).write(builder)
+    return builder.end()
+
+
+class _Walk:
+    """One pass over the records of a file, without taking them apart."""
+
+    def __init__(self, file: IO[bytes], name: str, size: int) -> None:
+        self.file, self.name, self.size = file, name, size
+        self.at = 0
+        self.hash = hashlib.sha256()
+        self.since = 0  # end of the last link
+        self.links, self.first, self.last = 0, "", ""
+        self.changed: list[Stretch] = []
+        self.changes = 0
+        self.ended = self.closed = False
+
+    def change(self, from_bytes: int, until_bytes: int) -> None:
+        self.changes += 1
+        if len(self.changed) < _STRETCHES:
+            self.changed.append(Stretch(self.name, from_bytes, until_bytes))
+
+    def take(self, size: int) -> None:
+        """Hash the next `size` bytes."""
+        while size > 0:
+            data = self.file.read(min(size, _PIECE_BYTES))
+            if not data:
+                return
+            self.hash.update(data)
+            self.at += len(data)
+            size -= len(data)
+
+    def run(self) -> None:
+        self.records()
+        if not self.closed:
+            self.file.seek(max(self.size - len(MAGIC), 0))
+            self.closed = self.file.read() == MAGIC
+            if self.closed:  # the way through the records was lost before their end
+                self.change(self.since, self.size)
+
+    def records(self) -> None:
+        self.take(len(MAGIC))
+        while True:
+            start = self.at
+            head = self.file.read(HEAD.size)
+            if len(head) < HEAD.size:
+                return
+            opcode, length = HEAD.unpack(head)
+            if opcode == 0 or opcode > Opcode.DATA_END or length > self.size - start - HEAD.size:
+                return
+            if opcode == Opcode.DATA_END:
+                self.end(start, head)
+                return
+            if opcode == Opcode.METADATA and length <= _LONGEST_LINK_BYTES:
+                content = self.file.read(length)
+                if self.link(head + content, content):
+                    continue
+                self.hash.update(head + content)
+                self.at += len(head) + len(content)
+                continue
+            self.hash.update(head)
+            self.at += len(head)
+            self.take(length)
+
+    def link(self, record: bytes, content: bytes) -> bool:
+        """Compare a link; False where a metadata record is none."""
+        try:
+            metadata = Metadata.read(ReadDataStream(BytesIO(content)))
+            stored = bytes.fromhex(metadata.metadata["sha256"])
+        except Exception:
+            return False
+        if metadata.name != CHAIN:
+            return False
+        ended = metadata.metadata.get("end") == "1"
+        if stored != self.hash.digest() or record != link_record(self.links, stored, ended):
+            self.change(self.since, self.at + len(record))
+        self.at += len(record)
+        self.since = self.at
+        self.links += 1
+        self.ended = ended
+        self.last = stored.hex()
+        self.first = self.first or self.last
+        self.hash = hashlib.sha256(stored)
+        return True
+
+    def end(self, start: int, head: bytes) -> None:
+        """Compare what follows the data, of which the footer has a checksum."""
+        if self.links and self.since < start:
+            self.change(self.since, start)
+        data_end = head + self.file.read(4)
+        begins = start + len(data_end)
+        self.file.seek(max(self.size - _ENDING_BYTES, begins))
+        ending = self.file.read()
+        self.closed = ending.endswith(MAGIC)
+        summary_start, offset_start, crc = (
+            struct.unpack("<QQI", ending[HEAD.size : HEAD.size + _FOOTER_BYTES])
+            if len(ending) == _ENDING_BYTES
+            else (0, 0, 0)
+        )
+        footer = HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES) + struct.pack("<QQI", summary_start, offset_start, crc) + MAGIC
+        right = ending == footer and data_end == HEAD.pack(Opcode.DATA_END, 4) + bytes(4)
+        if summary_start:
+            right &= summary_start == begins and crc == self.summary_crc(begins)
+        else:
+            right &= self.size - begins == _ENDING_BYTES and not (offset_start or crc)
+        # a file that was cut within its index is no changed one
+        if not right and (self.closed or ending.startswith(HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES))):
+            self.change(start, self.size)
+
+    def summary_crc(self, begins: int) -> int:
+        """The checksum of the index and of the footer up to its own field for it."""
+        self.file.seek(begins)
+        left = self.size - begins - len(MAGIC) - 4
+        crc = 0
+        while left > 0:
+            data = self.file.read(min(left, _PIECE_BYTES))
+            if not data:
+                break
+            crc = zlib.crc32(data, crc)
+            left -= len(data)
+        return crc
+
+
+def chain_of(path: Path) -> Chain:
+    """What the chain of one file says. Raises Fault BAD_LOG when the file cannot be read."""
+    try:
+        with path.open("rb") as file:
+            walk = _Walk(file, path.name, path.stat().st_size)
+            walk.run()
+    except OSError as error:
+        raise Fault("BAD_LOG", f"{path}: cannot be read: {error.strerror}; give the path of a .mcap file") from None
+    return Chain(walk.links, walk.first, walk.last, walk.changed, walk.changes, walk.ended, walk.since, walk.closed)
+
+
+def chain_findings(chain: Chain, name: str) -> list[Finding]:
+    """A finding for each stretch of bytes that was changed after it was written."""
+    found = [Finding("changed", one.file, _in_words(one), one.until_bytes - one.from_bytes) for one in chain.changed]
+    if chain.changes > len(chain.changed):
+        more = chain.changes - len(chain.changed)
+        found.append(Finding("changed", name, f"and {counted(more, 'more stretch', 'more stretches')}", more))
+    if chain.links and chain.closed and not chain.ended:
+        text = "is closed without the end of its hash chain: what came last was not written, or was taken away"
+        found.append(Finding("changed", name, text))
+    return found
+
+
+def _in_words(stretch: Stretch) -> str:
+    if not stretch.until_bytes:
+        return "does not go on from the file before it, which was changed or taken away"
+    where = f"bytes {stretch.from_bytes} to {stretch.until_bytes}"
+    return f"{where} are not those that were written; do not trust what they hold"
+
+
+def chain_in_words(chain: Chain) -> str:
+    """One line for a person."""
+    if not (chain.links or chain.changes):
+        return "chain    none: this log was written without one, so a changed byte outside of its chunks cannot be seen"
+    if chain.changes:
+        return f"chain    BROKEN at {counted(chain.changes, 'place')} of {counted(chain.links, 'link')}"
+    until = "every byte is" if chain.ended and chain.closed else "up to the last whole chunk every byte is"
+    return f"chain    {counted(chain.links, 'link')}: {until} as it was written; SHA-256 {chain.last}"

@@ -1,0 +1,230 @@
+"""The files of a log that is being written: the present one is watched; where it is full, lost or long, the next follows."""
+
+import os
+import time
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from bridge.faults import Fault
+from bridge.log.mcap_chunks import ChunkWriter
+from bridge.log.storage.part_file import PartFile
+from bridge.log.storage.parts import part_path
+from bridge.units import counted
+
+_LOOK_S = 1.0  # between two looks at the path of the file, and at a disk without room
+_LONGEST_WAIT_S = 64.0  # between two tries to go on, which double: a quota is not seen before it is met
+_ROOM_BYTES = 16 << 20  # free on a disk that was full before the log goes on: half a minute of it
+_SLOW_S = 1.0  # a chunk that takes longer to write is told
+
+
+class Rotation(NamedTuple):
+    """When a log goes on in a new file; 0: never for that reason."""
+
+    bytes: int = 0
+    seconds: float = 0.0  # of the run
+
+
+class Owner(Protocol):
+    """Whose log it is: it fills the beginning of each file, and tells what happened."""
+
+    def begin(self, writer: ChunkWriter, number: int, begins: str, follows: str) -> None:
+        """Write what each file begins with: definitions, tables, and its place in the log."""
+        ...
+
+    def add_event(self, code: str, text: str) -> object:
+        """Tell in the log and on the bus."""
+        ...
+
+    @property
+    def t_ns(self) -> int:
+        """The time of the run."""
+        ...
+
+
+class LogFiles:
+    """The files of one log. Where one cannot be written any more, `fault` is why, and is raised at the end.
+
+    Args:
+        path: the first file.
+        owner: whose log it is.
+        rotation: when to go on in a new file.
+        patient: a full disk is no end: the log waits for room.
+
+    Raises Fault CONFIG, LOG_WRITE.
+
+    """
+
+    def __init__(self, path: Path, owner: Owner, rotation: Rotation, patient: bool) -> None:
+        self.path = path
+        self.unwritten = 0  # messages since there was no room
+        self.whole_t_ns: int | None = None  # of the latest message in a chunk that is whole in a file
+        self._owner, self._rotation, self._patient = owner, rotation, patient
+        self._number = 0
+        self._begins = ""  # first link of the first file
+        self._follows = ""  # last link of the file before
+        self._began_ns = 0
+        self._wait_s = _LOOK_S
+        self._look_s = time.monotonic() + _LOOK_S
+        self._lost_s = 0.0  # time of the run from which there was no room
+        self._fault: Fault | None = None
+        self._part: PartFile | None = PartFile(path, replace=True)
+
+    def begin(self) -> None:
+        """Write the beginning of the first file."""
+        self.guarded(lambda writer: self._owner.begin(writer, 0, "", ""))
+        if self._fault is not None:  # what cannot even begin is a fault for the patient too
+            raise self._fault
+
+    @property
+    def writer(self) -> ChunkWriter | None:
+        """The writer of the present file; None where there is no room."""
+        return self._part and self._part.writer
+
+    def guarded(self, write: Callable[[ChunkWriter], None]) -> None:
+        """Call `write` with the writer, and bring what it wrote to the operating system. Raises Fault LOG_WRITE."""
+        part = self._part
+        if part is not None and (cut := part.size_trouble()) is not None:
+            self._lose(part, "LOG_LOST", cut)
+            part = self._part
+        if part is None:
+            return
+        writer = part.writer
+        try:
+            part.guarded(lambda: write(writer))
+        except OSError as error:
+            self._give_up(part, error)
+            return
+        self._begins = self._begins or part.writer.first_link
+        if self._owner.t_ns and not part.writer.open_bytes:
+            self.whole_t_ns = self._owner.t_ns
+
+    def look_after(self) -> None:
+        """Go on in a new file where that is due; tell of a file that was taken away and of a slow disk."""
+        part = self._part
+        if part is not None and self._is_long(part):
+            self._end(part)
+            self._go_on()
+        if time.monotonic() < self._look_s:
+            return
+        self._look_s = time.monotonic() + self._wait_s
+        if part is None:
+            if self._has_room():
+                self._go_on()
+            return
+        if self._patient and part.slowest_s > _SLOW_S:  # a run that can be repeated writes the same log on any disk
+            self._owner.add_event("DISK_SLOW", f"a chunk of the log took {part.slowest_s:.1f} s to write")
+            part.slowest_s = 0.0
+        if self._part is part and (found := part.trouble()) is not None:
+            self._lose(part, *found)
+
+    def close(self) -> None:
+        """Close the present file. Raises Fault LOG_WRITE, LOG_LOST, also of files before."""
+        part = self._part
+        if part is not None and not part.closed:
+            found = part.trouble()
+            if found is not None:
+                self._lose(part, *found)
+            if self._part is not None:
+                self._end(self._part)
+        if self._fault is not None:
+            fault, self._fault = self._fault, None
+            more = f"; {counted(self.unwritten, 'message')} after that were not recorded" if self.unwritten else ""
+            also = f"; it goes on in {part_path(self.path, self._number).name}" if self._number else ""
+            raise Fault(fault.kind.code, fault.line + more + also)
+
+    def _is_long(self, part: PartFile) -> bool:
+        most_bytes, most_s = self._rotation
+        if not part.writer.links:
+            return False
+        long = bool(most_s) and self._owner.t_ns - self._began_ns >= most_s * 1e9
+        return long or (bool(most_bytes) and part.whole_bytes >= most_bytes)
+
+    def _note(self, fault: Fault) -> None:
+        self._fault = self._fault or fault
+
+    def _end(self, part: PartFile) -> None:
+        try:
+            part.close()
+            if self._owner.t_ns:
+                self.whole_t_ns = self._owner.t_ns
+        except OSError as error:
+            self._give_up(part, error)
+
+    def _lose(self, part: PartFile, code: str, text: str) -> None:
+        """A file that was taken away is closed where it is, and the log goes on in the next, with the chunk that is open."""
+        self._note(Fault("LOG_LOST", f"{part.path}: {text}"))
+        self._go_on()
+        if self._part is None:
+            self.unwritten += part.writer.unsure_messages
+        else:
+            self._part.writer.put_open(part.writer.take_open())
+        part.leave()
+        goes_on = f"the log goes on in {self._name()}" if self._part else "the log waits for a place to go on"
+        self._owner.add_event(code, f"{part.path.name} {text}; {goes_on}")
+
+    def _name(self) -> str:
+        return part_path(self.path, self._number).name
+
+    def _give_up(self, part: PartFile, error: OSError) -> None:
+        """Close a file that cannot be written any more. Raises Fault LOG_WRITE unless patient."""
+        self._lost_s = self._owner.t_ns * 1e-9
+        text = (
+            f"{part.path.name}: {error.strerror}: nothing is recorded from {self._lost_s:.2f} s on, until there is room"
+        )
+        self.unwritten += part.writer.unsure_messages
+        part.close_without_index(lambda: self._owner.add_event("LOG_WRITE", text))
+        self._part = None
+        self._follows = part.writer.last_link
+        self._wait_s = _LOOK_S
+        fault = Fault("LOG_WRITE", f"{part.path}: {error.strerror}; {self._kept(part.path)}")
+        self._note(fault)
+        if not self._patient:
+            self._fault = None
+            raise fault
+
+    def _kept(self, path: Path) -> str:
+        """What is in the file that a fault has closed, and what to do."""
+        if self.whole_t_ns is None:
+            return "the log was closed before anything was recorded; free space, or choose another --log"
+        return (
+            f"the log was closed at {self.whole_t_ns * 1e-9:.2f} s, what came before is kept; free space, then "
+            f"`stickslip log recover {path}` gives it its index back"
+        )
+
+    def _has_room(self) -> bool:
+        try:
+            disk = os.statvfs(self.path.absolute().parent)
+        except OSError:
+            return False
+        return disk.f_bavail * disk.f_frsize > _ROOM_BYTES
+
+    def _go_on(self) -> None:
+        """Begin the next file; where that cannot be, the log waits twice as long before it tries again."""
+        before, self._part = self._part, None
+        if before is not None:
+            self._follows = before.writer.last_link
+        number = self._number + 1
+        self._begins = self._begins or uuid.uuid4().hex  # the first file was lost before its first chunk
+        part: PartFile | None = None
+        try:
+            while part is None:
+                try:
+                    part = PartFile(part_path(self.path, number), replace=False)
+                except FileExistsError:  # of another log
+                    number += 1
+            writer = part.writer
+            part.guarded(lambda: self._owner.begin(writer, number, self._begins, self._follows))
+        except (OSError, Fault) as error:
+            if part is not None:
+                part.abandon()
+            self._wait_s = min(2.0 * self._wait_s, _LONGEST_WAIT_S)
+            self._note(error if isinstance(error, Fault) else Fault("LOG_WRITE", f"{self.path}: {error.strerror}"))
+            return
+        self._part, self._number, self._began_ns = part, number, self._owner.t_ns
+        self._wait_s = _LOOK_S
+        if self.unwritten:
+            text = f"there is room again: {counted(self.unwritten, 'message')} since {self._lost_s:.2f} s were not recorded"
+            self.unwritten = 0
+            self._owner.add_event("LOG_WRITE", text)

@@ -1,0 +1,120 @@
+"""The files of one log: `run.mcap`, `run-0001.mcap`, `run-0002.mcap`, ... Each says whose part it is, and begins the rest."""
+
+import glob
+import json
+import re
+from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Metadata
+
+from bridge.log.library import HEAD, MAGIC
+from bridge.log.storage.chain import CHAIN, Chain, Stretch, chain_of
+
+PART = "part"  # the metadata record of every file but the first
+RECOVERED = "recovered"  # the metadata record of a file that `stickslip log recover` wrote; before the record above
+OF_FILES = frozenset({CHAIN, PART, RECOVERED})  # what a file says of itself and not of its run
+_BEGINNING_BYTES = 1 << 21  # within which the first link is: definitions, configurations and one chunk
+
+
+class Part(NamedTuple):
+    """What a file says of its place in a log of several."""
+
+    number: int  # of the file, from 0
+    begins: str  # SHA-256 of the first link of the log's first file
+    follows: str  # SHA-256 of the last link of the file before
+    recovered: bool = False  # it was written anew, and its links are others than when the next file was begun
+
+
+def part_path(first: Path, number: int) -> Path:
+    """The name of the file of this number in a log that begins with `first`."""
+    return first.with_name(f"{first.stem}-{number:04d}{first.suffix}") if number else first
+
+
+def part_of(path: Path) -> Part | None:
+    """What a file says of its place; number 0 for a first file. None where it says nothing that can be read."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(_BEGINNING_BYTES)
+        at = len(MAGIC) if data.startswith(MAGIC) else len(data)
+        recovered: str | None = None
+        while at + HEAD.size <= len(data):
+            opcode, length = HEAD.unpack_from(data, at)
+            at += HEAD.size
+            if opcode == Opcode.METADATA:
+                record = Metadata.read(ReadDataStream(BytesIO(data[at : at + length])))
+                if record.name == PART:
+                    value = {key: json.loads(text) for key, text in record.metadata.items()}
+                    place = int(value["number"]), str(value["begins"]), str(value["follows"])
+                    return Part(*place, recovered is not None)
+                if record.name == RECOVERED:
+                    recovered = record.metadata["begins"]
+                if record.name == CHAIN:
+                    return Part(0, recovered or record.metadata["sha256"], "", recovered is not None)
+            at += length
+    except Exception:
+        return None
+    return None
+
+
+def parts_of(path: Path) -> list[Path]:
+    """The files of a log from `path` on, in order; `path` alone where no other file says that it goes on from it."""
+    found = re.fullmatch(r"(.*)-(\d{4,})", path.stem)
+    others = _numbered(path.stem, path)
+    own = part_of(path) if others or found else None
+    if own is None:
+        return [path]
+    if own.number:
+        others = _numbered(found[1], path) if found else {}
+    rest = {number: other for number, other in others.items() if number > own.number}
+    mine = [rest[number] for number in sorted(rest) if _belongs(rest[number], number, own.begins)]
+    return [path, *mine]
+
+
+def later_names(path: Path) -> list[Path]:
+    """Files that are named as further files of the log `path`, in order."""
+    named = _numbered(path.stem, path)
+    return [named[number] for number in sorted(named)]
+
+
+def _numbered(stem: str, beside: Path) -> dict[int, Path]:
+    """Files beside another that are named as further files of the log `stem`."""
+    named = re.compile(rf"{re.escape(stem)}-(\d{{4,}}){re.escape(beside.suffix)}")
+    likely = beside.parent.glob(f"{glob.escape(stem)}-[0-9][0-9][0-9][0-9]*")
+    matches = ((named.fullmatch(other.name), other) for other in likely)
+    return {int(match[1]): other for match, other in matches if match}
+
+
+def _belongs(path: Path, number: int, begins: str) -> bool:
+    said = part_of(path)
+    return said is not None and said.number == number and said.begins == begins
+
+
+def chain_of_log(path: Path) -> Chain:
+    """What the chains of all files of a log say, and whether each goes on from the one before. Raises Fault BAD_LOG."""
+    parts = parts_of(path)
+    chains = [chain_of(part) for part in parts]
+    whole = chains[0]
+    before = part_of(path) if len(parts) > 1 else None
+    for part, chain in zip(parts[1:], chains[1:], strict=True):
+        said = part_of(part)
+        changed = [*whole.changed, *chain.changed]
+        changes = whole.changes + chain.changes
+        if said is not None and whole.last and said.follows != whole.last and not (before and before.recovered):
+            changed.append(Stretch(part.name, 0, 0))
+            changes += 1
+        before = said
+        whole = Chain(
+            whole.links + chain.links,
+            whole.first,
+            chain.last or whole.last,
+            changed,
+            changes,
+            whole.ended and chain.ended,
+            chain.covered_bytes,
+            whole.closed and chain.closed,
+        )
+    return whole

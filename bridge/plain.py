@@ -1,0 +1,18 @@
+"""Text from files as a terminal may show it: what could command the terminal is written out instead."""
+
+import re
+import sys
+
+# C0 but for tab and the line's end, DEL, C1, and the marks that turn the direction of writing or cannot be seen: each can hide or
+# forge what a person reads, and an escape code can do more (rename the window, answer in the person's name)
+_COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
+
+
+def plain(text: str) -> str:
+    """The text with every control character as its number in hexadecimal."""
+    return _COMMANDS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def say(line: str) -> None:
+    """Print a line on stderr, plain."""
+    print(plain(line), file=sys.stderr, flush=True)

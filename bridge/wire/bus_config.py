@@ -1,0 +1,58 @@
+"""Where the processes of one rig meet: endpoint and prefix of the bus, and whether the endpoint is this machine's alone."""
+
+import ipaddress
+import socket
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from bridge.config import Strict
+
+
+class BusConfig(Strict):
+    """Address and key prefix of the bus of one rig, and where the certificates are."""
+
+    endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d{1,5}$")] = "tcp/127.0.0.1:7447"
+    prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
+    certificates: str = Field(
+        default="",
+        description="Folder that `stickslip certs` made, for tls/ endpoints; empty: ~/.config/stickslip/certificates.",
+    )
+    insecure: bool = Field(
+        default=False,
+        description="true: a tcp/ endpoint asks nobody for a password, and others may reach it. Never on a shared network.",
+    )
+
+    @property
+    def port(self) -> int:
+        """The port of the endpoint."""
+        return int(self.endpoint.rpartition(":")[2])
+
+    @property
+    def encrypted(self) -> bool:
+        """Whether the endpoint is one of TLS."""
+        return self.endpoint.startswith("tls/")
+
+    @field_validator("endpoint")
+    @classmethod
+    def _port_exists(cls, endpoint: str) -> str:
+        if not 1 <= int(endpoint.rpartition(":")[2]) <= 65535:
+            raise ValueError(f"{endpoint!r}: the port must be from 1 to 65535; choose another, for example 7447")
+        return endpoint
+
+
+def address(endpoint: str) -> str:
+    """The address of an endpoint as a number, of IPv4 where its name has one; empty where the name is not known."""
+    host = endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):
+        return ""
+    places = [str(place[4][0]) for place in found if place[0] in {socket.AF_INET, socket.AF_INET6}]
+    return min(places, key=lambda place: ":" in place, default="")
+
+
+def is_loopback(endpoint: str) -> bool:
+    """Whether an endpoint can be reached from this machine alone; a name that is not known counts as one that can not."""
+    found = address(endpoint).partition("%")[0]
+    return bool(found) and ipaddress.ip_address(found).is_loopback

@@ -1,0 +1,62 @@
+"""The certificates of a tls/ endpoint: which files a role needs, and that nobody else can read its key."""
+
+import os
+import stat
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bridge.faults import Fault
+
+AUTHORITY = "authority"  # its certificate is everybody's; its key makes new roles and stays at home
+RIG = "rig"
+CLUSTER = "cluster"  # scheduler, workers and client of a Dask cluster; nothing on the bus
+
+
+class RoleFiles(NamedTuple):
+    """The files of one role in a folder of certificates."""
+
+    authority: Path
+    certificate: Path
+    key: Path
+
+
+def folder(given: str) -> Path:
+    """The folder of the certificates; that of the user's own configuration where none is given."""
+    if given:
+        return Path(given).expanduser()
+    home = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
+    return Path(home) / "stickslip" / "certificates"
+
+
+def files_of(role: str, place: Path) -> RoleFiles:
+    """The files of a role, by name."""
+    return RoleFiles(place / f"{AUTHORITY}.pem", place / f"{role}.pem", place / f"{role}.key")
+
+
+def checked(role: str, place: Path) -> RoleFiles:
+    """The files of a role. Raises Fault NOT_SECURE where one is missing, or where others can read the key."""
+    found = files_of(role, place)
+    for path in found:
+        if not path.is_file():
+            line = f"{path}: no such file, which role {role} needs at a tls/ endpoint"
+            raise Fault(
+                "NOT_SECURE", f"{line}; make it with `stickslip certs FOLDER`, and name the folder with --certs"
+            )
+    if os.name == "posix" and found.key.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise Fault(
+            "NOT_SECURE", f"{found.key}: others can read this key: its mode must be 0600; chmod 600 {found.key}"
+        )
+    return found
+
+
+def tls_settings(role: str, own: RoleFiles) -> dict[str, Any]:
+    """Zenoh's settings of a session at a tls/ endpoint; role `rig` listens."""
+    side = "listen" if role == RIG else "connect"
+    return {
+        "transport/link/tls/root_ca_certificate": str(own.authority),
+        "transport/link/tls/enable_mtls": True,
+        f"transport/link/tls/{side}_certificate": str(own.certificate),
+        f"transport/link/tls/{side}_private_key": str(own.key),
+        "transport/link/tls/verify_name_on_connect": True,
+        "transport/link/tls/close_link_on_expiration": False,
+    }

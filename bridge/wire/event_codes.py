@@ -1,0 +1,159 @@
+"""The codes of events on the bus and in logs: who says them, how bad they are, what they mean and what to do."""
+
+from typing import NamedTuple
+
+# how bad, in the letters of NAMUR NE 107
+FAILURE, CHECK, OUTSIDE, MAINTENANCE, NEWS = "F", "C", "S", "M", ""
+LETTERS = {
+    FAILURE: "failure: something was lost, or does not do its work",
+    CHECK: "check of function: a person's doing, or a test",
+    OUTSIDE: "outside of what it is made for",
+    MAINTENANCE: "needs a look before long",
+    NEWS: "news",
+}
+# reasons, in a controller's commands, that say the vibration does not do its work
+WEAK_REASONS = ("PIEZO_WEAK", "CANNOT_HELP", "HARMFUL")
+
+
+class EventCode(NamedTuple):
+    """One row of `EVENTS`."""
+
+    code: str
+    sources: str  # who says it: plant, controller, recorder
+    letter: str  # of LETTERS
+    help: str
+
+
+EVENTS = {
+    one.code: one
+    for one in (
+        EventCode(
+            "START", "plant, controller", NEWS, "the first block follows; the text says which scheduling was granted"
+        ),
+        EventCode("END", "plant, controller", NEWS, "the run is over, or no more commands come"),
+        EventCode(
+            "STALE",
+            "controller",
+            OUTSIDE,
+            "no new block came in time: the vibration is ramped to zero. A machine that stood still, a rig that hangs or a link "
+            "that is cut; FRESH says that blocks arrive again",
+        ),
+        EventCode(
+            "FRESH",
+            "plant, controller",
+            NEWS,
+            "blocks or commands arrive again, or every sample is a number again",
+        ),
+        EventCode("GUARD", "plant", CHECK, "the rig went to another state: `BEFORE -> STATE: CAUSE`"),
+        EventCode(
+            "FAULT",
+            "plant",
+            FAILURE,
+            "the guard tripped, or a check failed; the text has the cause. Nothing vibrates until "
+            "`stickslip reset`, and then `stickslip arm`",
+        ),
+        EventCode("HELD_BACK", "plant", OUTSIDE, "a limit of the guard holds the command back; the text has which"),
+        EventCode(
+            "FALLBACK",
+            "plant",
+            OUTSIDE,
+            "no fresh command: the rig ramps to zero by itself. Look at the controller and the link to it",
+        ),
+        EventCode(
+            "STATE_FOLDER",
+            "plant",
+            MAINTENANCE,
+            "a person's stop could not be kept over a restart; make the folder writable that the text names",
+        ),
+        EventCode(
+            "RIG_LOST",
+            "controller",
+            FAILURE,
+            "no block for 1 s, and the rig or the link to it is gone, as the text says",
+        ),
+        EventCode("RIG_BACK", "controller", NEWS, "blocks come again"),
+        EventCode("RIG_RESTARTED", "controller", OUTSIDE, "the rig counts its blocks anew, and is taken up again"),
+        EventCode("PAUSED", "plant, controller", OUTSIDE, "this process itself stood still for more than 0.25 s"),
+        EventCode("FOREIGN", "plant, controller, recorder", OUTSIDE, "a message that none of the known processes sent"),
+        EventCode(
+            "REPEATED", "plant, controller, recorder", OUTSIDE, "a message that was there already; it was dropped"
+        ),
+        EventCode(
+            "FLOOD", "plant, controller, recorder", OUTSIDE, "more messages came than can be read; some were dropped"
+        ),
+        EventCode("CLOCK", "controller, recorder", OUTSIDE, "the time of the blocks does not follow their numbers"),
+        EventCode(
+            "NOT_FINITE",
+            "controller",
+            OUTSIDE,
+            "a block holds a sample that is no number: the vibration is ramped to zero. Look at the sensor and at who reads it",
+        ),
+        EventCode(
+            "DRIVE_UNSEEN",
+            "controller",
+            OUTSIDE,
+            "a slip, while the drive position stands: its transducer is at its end, or loose, and no v_d means no vibration",
+        ),
+        EventCode("OPERATOR", "plant, controller", CHECK, "a person's word was taken: `ACTION by WHO`"),
+        EventCode("WATCH", "recorder", NEWS, "whether pauses of the machine are watched, on which cores, or why not"),
+        EventCode(
+            "PAUSE", "recorder", NEWS, "every core that the recorder may use stood still; the time is when it began"
+        ),
+        EventCode("CORE_PAUSE", "recorder", NEWS, "one core alone stood still"),
+        EventCode("GAP", "recorder", FAILURE, "messages were lost before they came to the log: a busy machine or link"),
+        EventCode(
+            "RESTART",
+            "recorder",
+            OUTSIDE,
+            "numbers went back by more than 256: the sender began anew, or there are two of them on one prefix",
+        ),
+        EventCode("DROPPED", "recorder", FAILURE, "the recorder was too slow, and messages are not in the log"),
+        EventCode(
+            "BAD_MESSAGE",
+            "plant, controller, recorder",
+            OUTSIDE,
+            "a message could not be read, and was dropped; compare its sender with PROTOCOL.md",
+        ),
+        EventCode(
+            "PLANT_LOST",
+            "recorder",
+            FAILURE,
+            "the rig left the bus without an END; the log was closed with all that came",
+        ),
+        EventCode(
+            "LOG_WRITE",
+            "recorder",
+            FAILURE,
+            "the log cannot be written, as the disk is full: control goes on, and nothing is recorded until there is room. A "
+            "second one says that there is, and how many messages are not in the log",
+        ),
+        EventCode(
+            "LOG_LOST",
+            "recorder",
+            FAILURE,
+            "the file of the log was deleted, renamed or cut by another program; the log goes on in the next file",
+        ),
+        EventCode(
+            "LOG_REPLACED",
+            "recorder",
+            FAILURE,
+            "another file took the place of the log; the log goes on in the next file",
+        ),
+        EventCode(
+            "DISK_SLOW",
+            "recorder",
+            MAINTENANCE,
+            "a chunk of the log took longer than 1 s to write; what came meanwhile waited, and nothing is lost without DROPPED",
+        ),
+    )
+}
+
+
+def harms(code: str) -> bool:
+    """Whether a run with such an event is not good."""
+    return code in EVENTS and EVENTS[code].letter == FAILURE
+
+
+def is_told(code: str) -> bool:
+    """Whether a verdict tells it: all that is more than news, and what this version does not know."""
+    return code not in EVENTS or EVENTS[code].letter not in {NEWS, CHECK}

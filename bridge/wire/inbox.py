@@ -1,0 +1,86 @@
+"""Bounded queues between the receiving threads of the bus and a loop; what does not fit is dropped and counted."""
+
+import queue
+import time
+from typing import NamedTuple
+
+from bridge.wire.topics import Topic
+
+# Rare messages of one topic that may wait. Too small: a burst of announcements is lost. Larger: who floods a topic is read for
+# longer before the next block, which 256 messages delay by less than 1 ms.
+_KEPT = 256
+
+
+class Received(NamedTuple):
+    """One received message."""
+
+    topic: Topic
+    payload: bytes
+    arrival_ns: int  # time.perf_counter_ns
+
+
+class _Room:
+    """How many messages of one kind came and went: each number has one writing thread, so that no lock is needed."""
+
+    def __init__(self, limit: int) -> None:
+        self.limit = limit
+        self.came = 0
+        self.went = 0
+
+
+class Inbox:
+    """A bounded queue between a receiving thread and a loop; a message that does not fit is dropped and counted.
+
+    Args:
+        limit: messages of `push` that may wait, of all topics together.
+        patient: wait instead of dropping, which blocks the sender. It is for lockstep, where no message may be lost and none is
+            late.
+
+    """
+
+    def __init__(self, limit: int, patient: bool = False) -> None:
+        self.dropped = 0
+        self.dropped_of: dict[str, int] = {}  # by topic
+        self._patient = patient
+        self._pushed = _Room(limit)
+        self._kept: dict[str, _Room] = {}
+        self._queue: queue.SimpleQueue[tuple[_Room, Received]] = queue.SimpleQueue()
+
+    def push(self, received: Received) -> None:
+        """Add a message; called by receiving threads."""
+        self._add(self._pushed, received)
+
+    def keep(self, received: Received) -> None:
+        """Add a rare message, for which the others leave room: 256 of each topic may wait besides what `push` has added."""
+        name = received.topic.name
+        if name not in self._kept:
+            self._kept[name] = _Room(_KEPT)
+        self._add(self._kept[name], received)
+
+    def _add(self, room: _Room, received: Received) -> None:
+        while self._patient and room.came - room.went >= room.limit:
+            time.sleep(0.001)
+        if room.came - room.went >= room.limit:
+            self.dropped += 1
+            self.dropped_of[received.topic.name] = self.dropped_of.get(received.topic.name, 0) + 1
+        else:
+            room.came += 1
+            self._queue.put((room, received))
+
+    def get(self, timeout_s: float) -> Received | None:
+        """The oldest message, or None when none came within `timeout_s`."""
+        try:
+            room, received = self._queue.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+        room.went += 1
+        return received
+
+    def get_nowait(self) -> Received | None:
+        """The oldest message, or None."""
+        try:
+            room, received = self._queue.get_nowait()
+        except queue.Empty:
+            return None
+        room.went += 1
+        return received

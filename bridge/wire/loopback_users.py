@@ -1,0 +1,108 @@
+"""Who may take part on a plain endpoint of this machine: a password for each role, made by the rig and found by our commands.
+
+The file is the dictionary that Zenoh reads, `ROLE:PASSWORD` a line, in a folder that only this user can enter. Who cannot read
+it cannot open a session.
+"""
+
+import contextlib
+import os
+import secrets
+import stat
+import tempfile
+from pathlib import Path
+
+from bridge.faults import Fault
+from bridge.wire.bus_config import address
+
+ROLES = ("controller", "recorder", "operator", "viewer")
+_FOLDER = "stickslip"
+
+
+def folders() -> list[Path]:
+    """Where the file may be, the best place first: the runtime folder, the cache, one for short-lived files."""
+    found: list[Path] = []
+    if runtime := os.environ.get("XDG_RUNTIME_DIR"):
+        found.append(Path(runtime) / _FOLDER)
+    # not `Path.home`, which fails for a user without a home
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    if os.path.isabs(cache):
+        found.append(Path(cache) / _FOLDER / "run")
+    found.append(Path(tempfile.gettempdir()) / f"{_FOLDER}-{os.getuid()}")
+    return found
+
+
+def file_name(endpoint: str) -> str:
+    """The name of the file of an endpoint: rigs on other ports have other passwords."""
+    port = endpoint.rpartition(":")[2]
+    return f"{address(endpoint).replace(':', '_')}-{port}.users"
+
+
+def password(endpoint: str, role: str) -> str | None:
+    """The password of a role at an endpoint; None where no rig of this user's has made one."""
+    newest = max((path for path in _files(endpoint) if _is_private(path, stat.S_ISREG)), key=_written_ns, default=None)
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        for line in newest.read_text().splitlines() if newest is not None else []:
+            name, _, word = line.partition(":")
+            if name == role and word:
+                return word
+    return None
+
+
+def make(endpoint: str) -> Path:
+    """Make the file of an endpoint, or take the one that is there, so that who knew a rig before its restart knows it again.
+
+    Raises Fault NOT_SECURE where no folder can hold it so that others cannot read it.
+    """
+    for path in _files(endpoint):
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not _is_private(path.parent, stat.S_ISDIR):
+                continue
+            if not _is_whole(path):
+                _write(path)
+            os.utime(path)
+            return path
+    places = ", ".join(str(folder) for folder in folders())
+    line = (
+        f"{endpoint}: its password cannot be kept where others cannot read it: {places} must be this user's, mode 0700"
+    )
+    raise Fault("NOT_SECURE", f"{line}; set XDG_RUNTIME_DIR to such a folder, or use a tls/ endpoint")
+
+
+def _files(endpoint: str) -> list[Path]:
+    return [folder / file_name(endpoint) for folder in folders()]
+
+
+def _is_private(path: Path, kind: object) -> bool:
+    """Whether a file or folder is of its kind, this user's, and closed to everybody else; a link is neither."""
+    with contextlib.suppress(OSError):
+        found = path.lstat()
+        return (
+            callable(kind) and bool(kind(found.st_mode)) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+        )
+    return False
+
+
+def _is_whole(path: Path) -> bool:
+    if not _is_private(path, stat.S_ISREG):
+        return False
+    known = [line.partition(":")[0] for line in path.read_text(errors="replace").splitlines()]
+    return known == list(ROLES)
+
+
+def _write(path: Path) -> None:
+    """Write new passwords, whole or not at all; what was there under the name is replaced, a link too."""
+    handle, part = tempfile.mkstemp(dir=path.parent)  # mode 0600
+    try:
+        with os.fdopen(handle, "w") as file:
+            file.writelines(f"{role}:{secrets.token_urlsafe(24)}\n" for role in ROLES)
+        os.replace(part, path)
+    except OSError:
+        os.unlink(part)
+        raise
+
+
+def _written_ns(path: Path) -> int:
+    with contextlib.suppress(OSError):
+        return path.stat().st_mtime_ns
+    return 0

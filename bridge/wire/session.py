@@ -1,0 +1,120 @@
+"""The settings of a Zenoh session: one listens, all others dial it; who may open a session, and what each may do."""
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+# Zenoh reads this when it is imported. One thread in place of five: a message hops from thread to thread on its way otherwise.
+os.environ.setdefault(
+    "ZENOH_RUNTIME",
+    "(rx: (worker_threads: 1), net: (handover: rx), acc: (handover: rx), tx: (handover: rx), app: (handover: rx))",
+)
+import zenoh
+
+from bridge.faults import Fault
+from bridge.wire import certificates, loopback_users
+from bridge.wire.access import access_control
+from bridge.wire.bus_config import BusConfig, is_loopback
+
+DIAL_S = 2.0  # largest duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
+# Bytes of a message that a session puts together from its parts; Zenoh drops a longer one. It is that of the longest message that
+# is read (bridge/wire/payloads.py). Larger: the rig relays it, and one that fills a queue of 16 parts of 64 kB, with the
+# congestion control BLOCK, holds up the only thread of the rig's session until its links break: 10 s with one of 3 MB.
+_LARGEST_BYTES = 1 << 18
+# In real time the rig relays nothing that would have to wait for a receiver.
+_NEVER_WAIT = [
+    {
+        "id": "never-wait",
+        "messages": ["put"],
+        "key_exprs": ["**"],
+        "flows": ["ingress"],
+        "overwrite": {"congestion_control": "drop"},
+    }
+]
+
+
+def session_settings(config: BusConfig, hub: bool, lockstep: bool, dial_s: float = DIAL_S) -> dict[str, Any]:
+    """The settings of a session, by Zenoh's key; `hub` is the session that listens, any other dials for `dial_s`."""
+    return {
+        "mode": "peer" if hub else "client",
+        "listen/endpoints": [config.endpoint] if hub else [],
+        "connect/endpoints": [] if hub else [config.endpoint],
+        "connect/timeout_ms": 0 if hub else round(dial_s * 1e3),
+        "connect/exit_on_failure": not hub,
+        "connect/retry": {"period_init_ms": 20, "period_max_ms": 20, "period_increase_factor": 1},
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        # Time [ms] after which a silent peer is dropped. Too long: puts wait for a frozen process. Too short: a computer that
+        # pauses for as long closes the link and makes it again, which loses messages (docs/method/bridge.md).
+        "transport/link/tx/lease": 10_000 if lockstep else 100,
+        "transport/link/tx/keep_alive": 4,
+        # Depth of the queues, 2 by default. Too small: late answers; counted: docs/method/bridge.md.
+        "transport/link/tx/queue/size/real_time": 16,
+        "transport/link/tx/queue/size/data": 16,
+        "transport/link/rx/max_message_size": _LARGEST_BYTES,
+        # Connections that say nothing, 100 by default for 10 s [ms] each: with 110 of them a person's stop finds no place.
+        "transport/unicast/accept_pending": 800,
+        "transport/unicast/accept_timeout": 1000,
+        # Waiting [us] for room in a queue before the parts of a long message are dropped, 50 000 by default: nothing else is
+        # relayed meanwhile.
+        "transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments": 1000,
+        "qos/network": _NEVER_WAIT if hub and not lockstep else [],
+        "transport/shared_memory/enabled": False,
+    }
+
+
+def session_config(
+    config: BusConfig, hub: bool, lockstep: bool, dial_s: float = DIAL_S, security: dict[str, Any] | None = None
+) -> zenoh.Config:
+    """The same as Zenoh wants it, with what `rig_security` or `role_security` says besides."""
+    result = zenoh.Config()
+    for key, value in (session_settings(config, hub, lockstep, dial_s) | (security or {})).items():
+        result.insert_json5(key, json.dumps(value))
+    return result
+
+
+def rig_security(config: BusConfig) -> dict[str, Any]:
+    """Settings of the session that listens: who may open a session to it, and what each role may do there.
+
+    Raises Fault NOT_SECURE for an endpoint that others can reach without TLS, and where a certificate or password is missing.
+    """
+    if config.encrypted:
+        return tls_rig_security(
+            config, certificates.checked(certificates.RIG, certificates.folder(config.certificates))
+        )
+    if config.insecure:
+        line = f"{config.endpoint}: --insecure: whoever reaches this port can stop and command the exciter"
+        print(f"stickslip: warning: {line}", file=sys.stderr, flush=True)
+        return {}
+    if not is_loopback(config.endpoint):
+        line = f"{config.endpoint}: others can reach it: must be an address of this machine alone, or tls/"
+        remedy = "make certificates with `stickslip certs FOLDER` and use --endpoint tls/HOST:PORT --certs FOLDER"
+        raise Fault("NOT_SECURE", f"{line}; {remedy}; --insecure allows it on a network that nobody else can reach")
+    return loopback_rig_security(config, loopback_users.make(config.endpoint))
+
+
+def tls_rig_security(config: BusConfig, own: certificates.RoleFiles) -> dict[str, Any]:
+    """Of a rig at a tls/ endpoint: roles are the common names of certificates."""
+    settings = certificates.tls_settings(certificates.RIG, own)
+    return settings | {"access_control": access_control(config.prefix, "cert_common_names")}
+
+
+def loopback_rig_security(config: BusConfig, users: Path) -> dict[str, Any]:
+    """Of a rig at an endpoint of this machine alone: roles are the names in the file of passwords."""
+    return {
+        "transport/auth/usrpwd": {"dictionary_file": str(users)},
+        "access_control": access_control(config.prefix, "usernames"),
+    }
+
+
+def role_security(config: BusConfig, role: str) -> dict[str, Any]:
+    """Settings of a session that dials, with what lets its role in; nothing where this user's rig has left no password.
+
+    Raises Fault NOT_SECURE for a tls/ endpoint whose certificates are not there.
+    """
+    if config.encrypted:
+        return certificates.tls_settings(role, certificates.checked(role, certificates.folder(config.certificates)))
+    word = loopback_users.password(config.endpoint, role)
+    return {"transport/auth/usrpwd": {"user": role, "password": word}} if word is not None else {}

@@ -1,0 +1,37 @@
+"""`stickslip certs`: an authority and a certificate for each role, for a bus beyond one computer."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.run.writable import check_output_folder
+
+
+def certs(
+    folder: Annotated[Path, typer.Argument(help="Where they go; made where it is not there.")],
+    hosts: Annotated[
+        list[str], typer.Option("--host", help="A further name or address of the rig's computer. Repeatable.")
+    ] = [],  # noqa: B006
+    as_json: Json = None,
+) -> None:
+    """Make certificates for the roles rig, controller, recorder, operator and viewer, for a bus over TLS; keys have mode 0600.
+
+    Where the folder has an authority already, that one signs; a certificate that is there is never replaced.
+    """
+
+    def work() -> None:
+        from cockpit.run.authority import make_certificates
+
+        check_output_folder("FOLDER", folder)
+        made = make_certificates(folder, hosts)
+        lines = [
+            f"made     {', '.join(name for name in made.files if name.endswith('.pem'))} and their keys in {made.folder}",
+            f"rig at   {', '.join(made.hosts)}",
+            f"until    {made.until}",
+            "next     give each computer authority.pem and the two files of its role; keep authority.key where nobody reads it",
+        ]
+        tell(as_json, made, lines)
+
+    carry_out(work, as_json)

@@ -1,0 +1,160 @@
+"""A small certificate authority for the bus of one rig: a certificate for each role, told apart by their common names."""
+
+import datetime
+import ipaddress
+import os
+import socket
+from pathlib import Path
+from typing import NamedTuple
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from bridge.faults import Fault
+from bridge.wire.certificates import AUTHORITY, CLUSTER, RIG, files_of
+from bridge.wire.loopback_users import ROLES
+from cockpit.run.writable import writing
+
+_AUTHORITY_DAYS = 3650
+_ROLE_DAYS = 825  # what browsers allow a certificate; longer: a key that was lost is good for longer
+_EARLIER = datetime.timedelta(minutes=5)  # valid from so long ago: clocks of two computers differ
+
+
+class Made(NamedTuple):
+    """What was made."""
+
+    folder: str
+    hosts: list[str]  # names and addresses at which the rig may be dialled
+    files: list[str]
+    until: str  # last day of the roles' certificates
+
+
+def make_certificates(folder: Path, hosts: list[str]) -> Made:
+    """Make the certificates of all roles, by the authority that is in the folder, or a new one.
+
+    Args:
+        folder: where they go; made where it is not there. Keys have mode 0600.
+        hosts: further names and addresses of the rig's computer.
+
+    Raises Fault CONFIG for a name that is none, LOG_WRITE where the folder does not allow it, NOT_SECURE where a certificate is
+    there already: who made a key anew would lock out whoever has the old one.
+
+    """
+    names = list(dict.fromkeys(["localhost", "127.0.0.1", "::1", socket.gethostname(), *hosts]))
+    alternatives = [_alternative(name) for name in names]
+    roles = (RIG, *ROLES, CLUSTER)
+    there = [path for role in roles for path in files_of(role, folder)[1:] if path.exists()]
+    if there:
+        line = f"{there[0]}: is there already, and would be lost"
+        raise Fault(
+            "NOT_SECURE", f"{line}; choose another folder, or remove the certificates of the roles that get new ones"
+        )
+    with writing(folder):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        authority, authority_key = _authority(folder)
+        for role in roles:
+            _make_role(role, folder, authority, authority_key, alternatives if role == RIG else [])
+    until = (_now() + datetime.timedelta(days=_ROLE_DAYS)).date().isoformat()
+    return Made(str(folder), names, sorted(path.name for path in folder.iterdir()), until)
+
+
+def _alternative(name: str) -> x509.GeneralName:
+    try:
+        return x509.IPAddress(ipaddress.ip_address(name))
+    except ValueError:
+        pass
+    try:
+        return x509.DNSName(name)
+    except ValueError:
+        raise Fault("CONFIG", f"--host {name}: must be a name in ASCII or an address; give that of the rig") from None
+
+
+def _authority(folder: Path) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
+    """The authority of a folder; made where there is none."""
+    certificate_path, key_path = folder / f"{AUTHORITY}.pem", folder / f"{AUTHORITY}.key"
+    if certificate_path.exists() or key_path.exists():
+        try:
+            certificate = x509.load_pem_x509_certificate(certificate_path.read_bytes())
+            key = serialization.load_pem_private_key(key_path.read_bytes(), None)
+        except (OSError, ValueError, TypeError) as error:
+            line = f"{folder}: its authority cannot be read ({error})"
+            raise Fault(
+                "NOT_SECURE", f"{line}; put {AUTHORITY}.pem and {AUTHORITY}.key there, or choose another"
+            ) from None
+        if not isinstance(key, ec.EllipticCurvePrivateKey):
+            raise Fault("NOT_SECURE", f"{key_path}: is not a key that `stickslip certs` made; choose another folder")
+        return certificate, key
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "stickslip authority")])
+    usage = x509.KeyUsage(
+        digital_signature=False, content_commitment=False, key_encipherment=False, data_encipherment=False,
+        key_agreement=False, key_cert_sign=True, crl_sign=True, encipher_only=False, decipher_only=False,
+    )  # fmt: skip
+    made = (
+        _builder(name, name, key, _AUTHORITY_DAYS)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(usage, critical=True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    _write(certificate_path, made.public_bytes(serialization.Encoding.PEM), 0o644)
+    _write(key_path, _pem(key), 0o600)
+    return made, key
+
+
+def _make_role(
+    role: str,
+    folder: Path,
+    authority: x509.Certificate,
+    authority_key: ec.EllipticCurvePrivateKey,
+    alternatives: list[x509.GeneralName],
+) -> None:
+    """Only the rig can be a server under a name of its computer, so that no other role can pass for the rig."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, role)])
+    server, client = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
+    uses = {RIG: [server], CLUSTER: [server, client]}.get(role, [client])
+    builder = (
+        _builder(name, authority.subject, key, _ROLE_DAYS)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(x509.ExtendedKeyUsage(uses), critical=False)
+        .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(authority_key.public_key()), critical=False)
+    )
+    if alternatives:
+        builder = builder.add_extension(x509.SubjectAlternativeName(alternatives), critical=False)
+    made = files_of(role, folder)
+    _write(made.key, _pem(key), 0o600)
+    _write(
+        made.certificate, builder.sign(authority_key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM), 0o644
+    )
+
+
+def _builder(name: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, days: int) -> x509.CertificateBuilder:
+    now = _now()
+    return (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(issuer)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - _EARLIER)
+        .not_valid_after(now + datetime.timedelta(days=days))
+    )
+
+
+def _now() -> datetime.datetime:
+    return datetime.datetime.now(datetime.UTC)
+
+
+def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    )
+
+
+def _write(path: Path, data: bytes, mode: int) -> None:
+    """Write a new file that nobody can read before it has its mode; one that is there, or a link, is an error."""
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
+        file.write(data)

@@ -1,0 +1,28 @@
+"""Slips in spite of all that the vibration can do: after some of them CANNOT_HELP is said, and it goes on.
+
+Fewer slips may be all that can be had, as on a track whose friction falls by more than any v_a makes up for, or where v_d changes
+faster than it can be followed. Only where nothing is gained at all `policy` ends the vibration.
+"""
+
+from bridge.kernel import Record, kernel
+from controller.codes import CANNOT_HELP, HELD
+
+_FEWEST = 2  # slips until it is said: one may be chance
+_REMEMBERED_S = 30.0  # since the last of them
+
+
+@kernel
+def note_failure(s: Record) -> None:
+    """Count a slip that no more vibration could have prevented."""
+    s.failed = s.failed + 1 if s.failed_left_s > 0.0 else 1
+    s.failed_left_s = _REMEMBERED_S
+    if s.failed >= _FEWEST:
+        s.reason = CANNOT_HELP
+
+
+@kernel
+def forget_failures(s: Record, block_s: float) -> None:
+    """Take back what was said once nothing came for long."""
+    s.failed_left_s = max(s.failed_left_s - block_s, 0.0)
+    if s.reason == CANNOT_HELP and s.failed_left_s == 0.0:
+        s.reason = HELD

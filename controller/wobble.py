@@ -1,0 +1,125 @@
+"""Whether friction falls with speed, asked by a small wobble of v_a while the vibration holds the slide.
+
+Friction under vibration is a mean over speeds from v_a - v_s to v_a + v_s. Where friction is the same at every speed, that mean
+depends on v_a / v_s alone, as nothing else has the unit of a velocity. So at a given force of the spring v_s follows v_a by
+the same share. Where friction falls with speed, more v_a takes off more than that, and v_s follows by more. It is there that the
+slide sticks or runs ahead when the vibration goes, and no vibration has to be taken away to find it out.
+
+The force has to be given: the wobble must be quick against the time in which the spring takes up what v_a takes off. Both
+answers are taken at the frequency of the wobble alone, under a Hann window, so that a slow trend of v_s does not count.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.estimate.windows import BINS, FORCE, SLIDE
+
+TWO_PI = 2.0 * math.pi
+DEPTH = 0.08  # of v_a: from a ratio of 1.2 it goes down to 1.10
+# Ratios about which v_a wobbles. Lower: v_a comes near v_s, which follows by more. Higher: the friction that falls is less felt.
+LEAST_ASKED, MOST_ASKED = 1.2, 1.3
+PERIODS = 4.0
+_NOISE = 0.02  # of v_d: noise of v_s in the windows that are compared, a quarter of the wobble
+_WINDOWS, _BLOCKS = 6.0, 8.0  # in a period, at least: a window then makes the wobble smaller by 3 %
+_EXCITER_PERIODS = 2.0  # in a window, at least
+_SMOOTHED = 0.973  # what windows of a sixth of a period leave of a wobble
+# v_s over v_a, as shares, from which friction falls with speed. Measured in the plant's model at a ratio of 1.2: PTFE 0.98 to
+# 1.01, steel 1.04 at 1 mm/s, 1.13 to 1.20 at 0.2 to 0.5 mm/s.
+_FALLS = 1.015
+_ASIDE = 0.2  # share of the question by which the answer may be out of step; more is no answer to it
+
+
+@kernel
+def can_ask(p: Record, longest_s: float) -> bool:
+    """Whether a period of at most `longest_s` is long enough, however little the noise."""
+    return max(_WINDOWS * p.window_s[0], _BLOCKS * p.block_s) <= longest_s
+
+
+@kernel
+def windows_for(p: Record, s: Record, speed_mps: float) -> int:
+    """The shortest windows that show v_s well enough; -1 for none."""
+    for level in range(p.levels):
+        if s.pushed[level] < BINS:
+            return -1
+        if p.window_s[level] * s.allowed_Hz >= _EXCITER_PERIODS and slide_noise_mps(p, s, level) <= _NOISE * speed_mps:
+            return level
+    return -1
+
+
+@kernel
+def begin_wobble(p: Record, s: Record, speed_mps: float, longest_s: float) -> bool:
+    """Begin to ask, if a period of at most `longest_s` holds windows that show v_s well enough."""
+    level = windows_for(p, s, speed_mps)
+    if level < 0:
+        return False
+    period_s = max(_WINDOWS * p.window_s[level], _BLOCKS * p.block_s)
+    if period_s > longest_s:
+        return False
+    s.wobble_level, s.wobble_period_s, s.wobble_s, s.wobbles = level, period_s, 0.0, 1
+    s.wobble_a[:] = 0.0
+    s.wobble_v[:] = 0.0
+    return True
+
+
+@kernel
+def wobble_factor(s: Record) -> float:
+    """Of v_a, now."""
+    return 1.0 + DEPTH * math.cos(TWO_PI * s.wobble_s / s.wobble_period_s) if s.wobbles == 1 else 1.0
+
+
+@kernel
+def wobble(p: Record, s: Record, speed_mps: float) -> bool:
+    """Take what this block tells of v_a and v_s; whether the wobble has ended."""
+    turn_rad = TWO_PI * s.wobble_s / s.wobble_period_s
+    late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s  # between the middles of both
+    weight = 1.0 - math.cos(turn_rad / PERIODS)
+    v_s = weight * slide_mps(p, s, s.wobble_level, speed_mps)
+    s.wobble_a[0] += weight * s.fast_mps * math.cos(turn_rad)
+    s.wobble_a[1] += weight * s.fast_mps * math.sin(turn_rad)
+    s.wobble_v[0] += v_s * math.cos(turn_rad - late_rad)
+    s.wobble_v[1] += v_s * math.sin(turn_rad - late_rad)
+    s.wobble_a[2] += weight * s.fast_mps
+    s.wobble_v[2] += v_s
+    s.wobble_s += p.block_s
+    if s.wobble_s < PERIODS * s.wobble_period_s:
+        return False
+    s.wobbles = 0
+    return True
+
+
+@kernel
+def friction_falls(s: Record) -> bool:
+    """Whether v_s followed the wobble by more than its share, or followed something else."""
+    a, v = s.wobble_a, s.wobble_v
+    with_it = a[0] * v[0] + a[1] * v[1]
+    aside = math.fabs(a[0] * v[1] - a[1] * v[0])
+    asked = a[0] * a[0] + a[1] * a[1]
+    return with_it * a[2] > _FALLS * _SMOOTHED * asked * v[2] or aside * a[2] > _ASIDE * asked * v[2]
+
+
+@kernel
+def slide_noise_mps(p: Record, s: Record, level: int) -> float:
+    """Noise of v_s in a window."""
+    weight = _weight_by_place(p, s, level) + _weight_by_force(p, s, level)
+    return 1.0 / math.sqrt(weight) if weight > 0.0 else math.inf
+
+
+@kernel
+def slide_mps(p: Record, s: Record, level: int, speed_mps: float) -> float:
+    """v_s in a window, by position and force, each by its noise."""
+    by_place, by_force = _weight_by_place(p, s, level), _weight_by_force(p, s, level)
+    place_mps = s.direction * s.slope[SLIDE, level]
+    force_mps = speed_mps - s.direction * s.slope[FORCE, level] / s.stiffness_N_per_m
+    return (by_place * place_mps + by_force * force_mps) / (by_place + by_force)
+
+
+@kernel
+def _weight_by_place(p: Record, s: Record, level: int) -> float:
+    noise_mps = s.noise[SLIDE, level]
+    return 1.0 / (noise_mps * noise_mps) if p.use_slide_position == 1 and noise_mps > 0.0 else 0.0
+
+
+@kernel
+def _weight_by_force(p: Record, s: Record, level: int) -> float:
+    noise_mps = s.noise[FORCE, level] / s.stiffness_N_per_m
+    return 1.0 / (noise_mps * noise_mps) if p.use_force == 1 and noise_mps > 0.0 else 0.0

@@ -1,0 +1,189 @@
+"""All relations of an evidence: what each leaves, which causes it has, what nothing explains."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.gap.prepare import Prepared
+from diagnosis.relations.base import base_relation
+from diagnosis.relations.drive import drive_relation
+from diagnosis.relations.exciter import exciter_relation
+from diagnosis.relations.motion import motion_relation
+from diagnosis.relations.outside import Pattern, burst_ratio, patterns_of, whitened_rows
+from diagnosis.relations.products import (
+    Noise,
+    Products,
+    band_edges_Hz,
+    band_of_rows,
+    noise_of,
+    products_of,
+    turned_back,
+    turned_piece,
+)
+from diagnosis.relations.relation import Floats, Missing, Relation, thinned
+from diagnosis.relations.search import NOTHING, Found, Ranking, chosen_of, ranked, reduced, without_each
+from diagnosis.relations.shares import Shares, model_columns, shares_of, sizes_of
+from diagnosis.relations.spring import spring_relation
+
+_FREE = 30.0  # spread of a pattern's coefficients, in rms of what is left: as good as free
+_SAME_SIZE = 0.1  # relative scatter of a size between runs that a formula a little beside the rig's makes
+_INFORMED = (
+    4.0  # information on a size, in inverse squares of it, from which a run is asked: a relative error of a half
+)
+
+
+class Trace(NamedTuple):
+    """One run of a relation in time, for a picture: what is left without and with the chosen causes, [rows]."""
+
+    run: int
+    t_s: Floats
+    without: Floats
+    with_causes: Floats
+
+
+class Answered(NamedTuple):
+    """One relation, searched. Sizes are rms of a row on the fitted runs, in the relation's unit."""
+
+    name: str
+    unit: str
+    noise: float  # of the freest model
+    described: float  # that the rig as described leaves
+    refitted: float  # that the rig without effects leaves, refitted
+    left: float  # with the chosen causes
+    chosen: Found
+    agreement: tuple[
+        float, ...
+    ]  # of each chosen cause: chance that its sizes in the runs differ as much where they are one
+    lost: tuple[float, ...]  # of each chosen cause: log evidence by which the set is worse without it
+    tried: int  # columns of effects
+    ranking: Ranking
+    patterns: tuple[Pattern, ...]
+    bursts: float  # mean over median of the local variance of what is left
+    nuisances: tuple[tuple[str, float, float], ...]  # sizes of those of one column, with their standard deviations
+    shares: Shares | None
+    trace: Trace
+
+
+class Relations(NamedTuple):
+    """The relations of an evidence, and those that its channels do not allow."""
+
+    answered: tuple[Answered, ...]
+    missing: tuple[Missing, ...]
+
+
+def relations_of(rig: RigTable, runs: list[Prepared]) -> Relations:
+    """Search every relation that the channels allow; fitted to the runs that are not held out."""
+    built = (
+        spring_relation(rig, runs),
+        motion_relation(rig, runs),
+        drive_relation(rig, runs),
+        exciter_relation(runs),
+        base_relation(rig, runs),
+    )
+    fitted = [i for i, run in enumerate(runs) if not run.holdout]
+    return Relations(
+        tuple(answered_of(thinned(one), fitted) for one in built if isinstance(one, Relation)),
+        tuple(one for one in built if isinstance(one, Missing)),
+    )
+
+
+def answered_of(relation: Relation, fitted: list[int]) -> Answered:
+    """One relation, searched on the runs `fitted` (indices) and judged on the others."""
+    products = products_of(relation)
+    held_out = [i for i in range(len(relation.left)) if i not in fitted and relation.pieces[i]]
+    fitted = [i for i in fitted if relation.pieces[i]]
+    rows = float(products.lengths[fitted].sum())
+    bare = products.values[fitted].sum(axis=(0, 1))
+    width = bare.shape[0] - 1
+    described = _rms(bare, np.zeros(width), rows)
+    free = noise_of(products, fitted, np.arange(width), _spreads(products, described))
+    chosen, noise = NOTHING, noise_of(products, fitted, *model_columns(products, ()))
+    ranking, lost = Ranking((), ()), ()
+    if relation.effects:
+        # the search has the noise of the freest model; what it chose is then judged by the noise that the choice leaves
+        cost = math.log(len(relation.effects) + 1)
+        chosen = chosen_of(ranked(reduced(products, fitted, free, relation.effects)), cost)
+        noise = noise_of(products, fitted, *model_columns(products, chosen.terms))
+        data = reduced(products, fitted, noise, relation.effects)
+        ranking = ranked(data)
+        chosen = chosen_of(ranking, cost)
+        lost = without_each(data, chosen)
+    size, deviation = sizes_of(products, fitted, noise, chosen.terms)
+    without, every = np.zeros(width), np.zeros(width)
+    without[model_columns(products, ())[0]] = sizes_of(products, fitted, noise, ())[0]
+    every[model_columns(products, chosen.terms)[0]] = size
+    return Answered(
+        name=relation.name,
+        unit=relation.unit,
+        noise=math.sqrt(free.square(products, fitted) / rows),
+        described=described,
+        refitted=_rms(bare, without, rows),
+        left=_rms(bare, every, rows),
+        chosen=chosen,
+        agreement=tuple(_agreement(products, fitted, noise, chosen, number) for number in range(len(chosen.terms))),
+        lost=lost,
+        tried=len(relation.effects),
+        ranking=ranking,
+        patterns=patterns_of(products, fitted, noise, chosen),
+        bursts=burst_ratio(whitened_rows(products, fitted, free, products.terms, every), relation.row_s),
+        nuisances=tuple(
+            (term.cause, float(size[place.start]), float(deviation[place.start]))
+            for term, place in zip(relation.nuisances, products.places, strict=False)
+            if place.stop - place.start == 1
+        ),
+        shares=shares_of(products, fitted, held_out, noise, chosen),
+        trace=_trace(products, (held_out or fitted)[0], without, every),
+    )
+
+
+def _spreads(products: Products, described: float) -> Floats:
+    """Spread of every column, [columns]; patterns are as good as free."""
+    free = _FREE * max(described, products.relation.resolution)
+    spreads = [
+        np.full(term.values[0].shape[1], term.spread if math.isfinite(term.spread) else free) for term in products.terms
+    ]
+    return np.concatenate([*spreads, np.zeros(0)])
+
+
+def _rms(bare: Floats, size: Floats, rows: float) -> float:
+    with_left = np.append(-size, 1.0)
+    return math.sqrt(max(float(with_left @ bare @ with_left), 0.0) / rows)
+
+
+def _agreement(products: Products, runs: list[int], noise: Noise, chosen: Found, number: int) -> float:
+    """Chance that the sizes of one chosen cause in each run alone differ as much as they do where they are one size."""
+    columns, _ = model_columns(products, chosen.terms)
+    size, _ = sizes_of(products, runs, noise, chosen.terms)
+    first = len(size) - sum(len(one) for one in chosen.sizes[number:])
+    own = slice(first, first + len(chosen.sizes[number]))
+    others = size.copy()
+    others[own] = 0.0
+    mine = size - others
+    found: list[tuple[float, float]] = []
+    for run in runs:
+        over = np.tensordot(1.0 / noise.variance, products.values[run], axes=1)
+        inner = over[columns[:, None], columns]
+        information = float(mine @ inner @ mine)
+        towards = float(mine @ (over[columns, -1] - inner @ others))
+        if information > _INFORMED:
+            found.append((towards / information, 1.0 / information))
+    if len(found) < 2:
+        return 1.0
+    value, variance = np.array(found).T
+    weight = 1.0 / (variance + _SAME_SIZE**2)
+    mean = float(weight @ value / weight.sum())
+    return float(chi2.sf(float(weight @ (value - mean) ** 2), len(value) - 1))
+
+
+def _trace(products: Products, run: int, without: Floats, with_causes: Floats) -> Trace:
+    relation = products.relation
+    piece = max(relation.pieces[run], key=lambda piece: piece[1] - piece[0])
+    length = piece[1] - piece[0]
+    band = band_of_rows(relation, length, band_edges_Hz(relation))
+    turned = turned_piece(relation, products.terms, run, piece, len(band)) * (band >= 0)[:, None]
+    left = np.stack([turned[:, -1] - turned[:, :-1] @ sizes for sizes in (without, with_causes)], axis=1)
+    rows = turned_back(left, length)
+    return Trace(run, (np.arange(*piece) + 0.5) * relation.row_s, rows[:, 0], rows[:, 1])

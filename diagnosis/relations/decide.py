@@ -1,0 +1,133 @@
+"""What the relations decide: causes that they name, and what they show that nothing in the library explains."""
+
+import math
+from typing import NamedTuple
+
+from diagnosis.relations.answer import Answered, Relations
+from diagnosis.relations.relation import OUTSIDE
+from diagnosis.relations.shares import Share
+
+# Log evidence by which a set must fall without a cause before the cause is named, beyond the logarithm of the number of
+# columns tried. Smaller: noise that is not quite even gets a name. Larger: small effects do not. Counted:
+# docs/method/relations.md.
+_DECIDES = 8.0
+_ADDS = 0.02  # share of the evidence of a set below which a further cause is what the first one's formula does not fit
+_SAME_SIZE = 0.01  # chance below which sizes that differ between runs take a name back
+# Log evidence of a pattern that nothing explains, and its size against the noise, from which it is told.
+_PATTERN, _PATTERN_OVER_NOISE = 25.0, 0.5
+_MISMATCH = 0.1  # share of what the named causes take that their formulas may leave as a pattern
+_BURSTS = 2.0  # mean over median of the local variance from which what is left comes in bursts
+# Relations whose patterns are not told: a base that shows slips in another way than by a mode is an ordinary mount.
+_COARSE = frozenset({"base"})
+_UNEVEN = "drive-speed-ripple"
+_BURSTING = ("spring", "motion")  # relations whose rows are short enough for that
+_NEAR = 5.0  # log evidence within which another cause would do as well
+_LEVELS = frozenset({"drive-stiffness"})
+# Causes that one relation alone cannot tell from a cause that it names.
+_ALIKE = {
+    "drive-stiffness": ("drive-stiffness", "force-sensor-gain", "frame-compliance"),
+    "accelerometer-gain": ("accelerometer-gain",),
+}
+
+
+class Decided(NamedTuple):
+    """A cause that a relation names."""
+
+    cause: str
+    relation: str
+    evidence: float  # natural logarithm by which the relation is worse without it
+    alike: tuple[str, ...]  # causes that this relation cannot tell from it, itself among them
+    share: Share | None  # on the held-out runs
+
+    @property
+    def known(self) -> bool:
+        """Whether the library has it."""
+        return self.cause not in OUTSIDE
+
+
+class Outside(NamedTuple):
+    """What a relation shows and nothing in the library explains."""
+
+    relation: str
+    what: str
+    size: float  # rms, in the unit of the relation
+    noise: float
+    unit: str
+    evidence: float
+
+
+class Decision(NamedTuple):
+    """What all relations together say; the largest evidence first."""
+
+    decided: tuple[Decided, ...]
+    outside: tuple[Outside, ...]
+
+
+def decision_of(relations: Relations) -> Decision:
+    """The names and the unexplained patterns of all relations."""
+    decided: list[Decided] = []
+    outside: list[Outside] = []
+    for one in relations.answered:
+        own = _decided(one)
+        pattern = _pattern(one, own)
+        if pattern is not None and one.name == "drive":  # any function of the place is an uneven drive
+            own, pattern = [Decided(_UNEVEN, one.name, pattern.evidence, (_UNEVEN,), None)], None
+        decided += own
+        outside += [_outside_cause(one, cause) for cause in own if not cause.known]
+        if pattern is not None and not any(not cause.known for cause in own):
+            outside.append(pattern)
+    if any(
+        cause.relation == "base" for cause in decided
+    ):  # a base with a mode of its own changes what an exciter delivers
+        decided = [cause for cause in decided if cause.relation != "exciter"]
+        outside = [left for left in outside if left.relation != "exciter"]
+    return Decision(
+        tuple(sorted(decided, key=lambda cause: -cause.evidence)),
+        tuple(sorted(outside, key=lambda left: -left.evidence)),
+    )
+
+
+def _decided(one: Answered) -> list[Decided]:
+    limit = _DECIDES + math.log(max(one.tried, 1))
+    shares = {} if one.shares is None else {(share.cause, share.form): share for share in one.shares.causes}
+    found: list[Decided] = []
+    for number, term in enumerate(one.chosen.terms):
+        lost, share = one.lost[number], shares.get((term.cause, term.form))
+        # a number beyond its tolerance: the refitted rig follows it, so it closes nothing that the baseline leaves
+        borne_out = share is None or share.share > share.null_90 or term.cause in _LEVELS
+        if lost > limit and lost > _ADDS * one.chosen.evidence and one.agreement[number] > _SAME_SIZE and borne_out:
+            found.append(Decided(term.cause, one.name, lost, _alike(one, term.cause), share))
+    return found
+
+
+def _alike(one: Answered, cause: str) -> tuple[str, ...]:
+    """Causes whose own best column comes within a few of log evidence of this one's, where it stands alone."""
+    known = _ALIKE.get(cause, (cause,))
+    if len(one.chosen.terms) > 1:
+        return known
+    best = next((found.evidence for found in one.ranking.singles if found.causes == (cause,)), 0.0)
+    near = [
+        found.causes[0]
+        for found in one.ranking.singles
+        if best - found.evidence < _NEAR and found.causes[0] not in OUTSIDE
+    ]
+    return tuple(dict.fromkeys((cause, *known, *near)))
+
+
+def _outside_cause(one: Answered, cause: Decided) -> Outside:
+    term = next(term for term in one.chosen.terms if term.cause == cause.cause)
+    taken = math.sqrt(max(one.refitted**2 - one.left**2, 0.0))
+    return Outside(one.name, f"{term.cause}: {term.form}", taken, one.noise, one.unit, cause.evidence)
+
+
+def _pattern(one: Answered, named: list[Decided]) -> Outside | None:
+    taken = math.sqrt(max(one.refitted**2 - one.left**2, 0.0)) if named else 0.0
+    for pattern in () if one.name in _COARSE else one.patterns:
+        if pattern.evidence > _PATTERN and pattern.rms > max(_PATTERN_OVER_NOISE * one.noise, _MISMATCH * taken):
+            return Outside(one.name, f"over {pattern.what}", pattern.rms, one.noise, one.unit, pattern.evidence)
+    if one.bursts > _BURSTS and one.name in _BURSTING:
+        quiet = one.noise / math.sqrt(one.bursts)
+        size = math.sqrt(max(one.left**2 - quiet**2, 0.0))
+        if size > max(_PATTERN_OVER_NOISE * quiet, _MISMATCH * taken):
+            return Outside(one.name, "in bursts", size, quiet, one.unit, one.bursts)
+    return None

@@ -1,0 +1,133 @@
+"""The drive relation: the drive's position less an even path between two changes of command."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import RESOLVED_M
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.gap.prepare import Prepared
+from diagnosis.relations.relation import Floats, Missing, Piece, Relation, Term, kept_blocks, pieces_of, wander
+from diagnosis.relations.shapes import hats, knots_of
+
+_HIGHEST_HZ = 60.0
+_DEPTH = 0.1  # typical share by which an uneven drive's speed swings
+_THIN = 10  # every how many rows the search for waves takes
+_WAVES = 2  # strongest waves over the place, and over time, that become columns
+_PITCHES_M = (2e-4, 8e-3)  # shortest and longest wave over the place
+_FREQUENCIES_HZ = (0.4, 30.0)
+_WANDER_M = 2e-7  # slow drift of a displacement sensor
+_FEWEST_TURNS = 2.0  # of a wave in the longest piece; a slower one is a wander of the sensor
+
+
+def drive_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
+    """The relation in m; `Missing` where a run has no drive position, or no drive ever moves evenly."""
+    if rig.drive == "force":
+        return Missing("drive", 'drive = "force": there is no drive that moves')
+    for run in runs:
+        if "drive_position_m" not in run.signals:
+            return Missing("drive", f"{run.file} has no drive_position_m: its path is taken as commanded")
+    pieces = tuple(_even(run) for run in runs)
+    fitted = [i for i, run in enumerate(runs) if not run.holdout and pieces[i]]
+    if not fitted:
+        return Missing("drive", "no stretch of constant speed is long enough")
+    place = [run.signals["drive_position_m"] for run in runs]
+    own_s = [(np.arange(len(s)) + 0.5) * BLOCK_S for s in place]
+    speed = [np.abs(run.commands.drive) for run in runs]
+    left = [_without_parabola(s, own) for s, own in zip(place, pieces, strict=True)]
+    rows = np.concatenate([left[i][slice(*piece)] for i in fitted for piece in pieces[i]])
+    if math.sqrt(float(np.mean(rows**2))) < RESOLVED_M:
+        return Missing("drive", "the drive position is the commanded path, not a measurement")
+    effects: list[Term] = []
+    travel_m = max((float(np.ptp(place[i][slice(*piece)])) for i in fitted for piece in pieces[i]), default=0.0)
+    if travel_m > 0.0:
+        grid = np.arange(max(1.0 / _PITCHES_M[1], _FEWEST_TURNS / travel_m), 1.0 / _PITCHES_M[0], 0.3 / travel_m)
+        for per_m in _strongest(place, left, pieces, fitted, grid):
+            angles = [2.0 * math.pi * per_m * s for s in place]
+            amplitude_m = _DEPTH / (2.0 * math.pi * per_m)
+            effects.append(
+                _wave("drive-speed-ripple", f"every {1e3 / per_m:.3g} mm", angles, None, pieces, amplitude_m)
+            )
+    longest_s = max((last - first for i in fitted for first, last in pieces[i]), default=0) * BLOCK_S
+    grid = np.arange(max(_FREQUENCIES_HZ[0], _FEWEST_TURNS / longest_s), _FREQUENCIES_HZ[1], 0.3 / longest_s)
+    for each_Hz in _strongest(own_s, left, pieces, fitted, grid):
+        angles = [2.0 * math.pi * each_Hz * t for t in own_s]
+        effects.append(
+            _wave("drive-speed-ripple", f"{each_Hz:.3g} Hz", angles, speed, pieces, _DEPTH / (2.0 * math.pi * each_Hz))
+        )
+    knots = knots_of(np.concatenate(place), 60)
+    slow = wander([len(s) for s in place], _WANDER_M)
+    return Relation(
+        name="drive", unit="m", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ, left=tuple(left), pieces=pieces,
+        nuisances=(
+            slow._replace(values=tuple(_without_parabola(one, own) for one, own in zip(slow.values, pieces, strict=True))),
+        ),
+        effects=tuple(effects),
+        patterns=(
+            Term("the place of the drive", "", tuple(
+                _without_parabola(hats(s, knots), own) for s, own in zip(place, pieces, strict=True)), math.nan),
+        ),
+        resolution=RESOLVED_M,
+    )  # fmt: skip
+
+
+def _even(run: Prepared) -> tuple[Piece, ...]:
+    kept = kept_blocks(run)
+    even = np.zeros(len(kept), np.bool_)
+    for segment in run.commands.segments:
+        even[segment.first : segment.last] = segment.drive_velocity_mps != 0.0
+    joints = {segment.first for segment in run.commands.segments}
+    found: list[Piece] = []
+    for first, last in pieces_of(kept & even):
+        cuts = sorted({first, last, *(joint for joint in joints if first < joint < last)})
+        found += [(a, b) for a, b in pairwise(cuts) if b - a >= 300]
+    return tuple(found)
+
+
+def _without_parabola(values: Floats, pieces: tuple[Piece, ...]) -> Floats:
+    """`values` [rows] or [rows, columns] less a parabola in each piece: speed as it was, and the bow of the sensor."""
+    result = np.zeros_like(values)
+    for first, last in pieces:
+        basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, last - first), 2)
+        basis, _ = np.linalg.qr(basis)
+        own = values[first:last]
+        result[first:last] = own - basis @ (basis.T @ own)
+    return result
+
+
+def _strongest(
+    over: list[Floats], left: list[Floats], pieces: tuple[tuple[Piece, ...], ...], runs: list[int], grid: Floats
+) -> list[float]:
+    """The waves over a variable that take most of what is left, apart from each other; from a grid of turns for its unit."""
+    if len(grid) == 0:
+        return []
+    rows = [(i, slice(first, last, _THIN)) for i in runs for first, last in pieces[i]]
+    at = np.concatenate([over[i][own] for i, own in rows])
+    values = np.concatenate([left[i][own] for i, own in rows])
+    power = np.array([abs(np.exp(-2j * math.pi * turns * at) @ values) ** 2 for turns in grid])
+    found: list[float] = []
+    for i in np.argsort(-power):
+        if all(abs(grid[i] - other) > 4.0 * abs(grid[-1] - grid[0]) / max(len(grid) - 1, 1) for other in found):
+            found.append(float(grid[i]))
+        if len(found) == _WAVES:
+            break
+    return found
+
+
+def _wave(
+    cause: str,
+    form: str,
+    angles: list[Floats],
+    factor: list[Floats] | None,
+    pieces: tuple[tuple[Piece, ...], ...],
+    amplitude: float,
+) -> Term:
+    values: list[Floats] = []
+    for i, angle in enumerate(angles):
+        own = np.stack([np.sin(angle), np.cos(angle), 0.5 * np.sin(2.0 * angle), 0.5 * np.cos(2.0 * angle)], axis=1)
+        if factor is not None:
+            own = own * factor[i][:, None]
+        values.append(_without_parabola(own, pieces[i]))
+    return Term(cause, form, tuple(values), amplitude, 0, "amplitude_m" if factor is None else "amplitude_s")

@@ -1,0 +1,65 @@
+"""The motion relation: acceleration of the slide less the second derivative of its position."""
+
+import math
+
+import numpy as np
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import scales_of
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.gap.prepare import Prepared
+from diagnosis.relations.relation import Missing, Relation, kept_blocks, lacking, pieces_of, term
+from diagnosis.relations.shapes import bend, calmed, free, near_slips, rate, slip_phase
+
+NEEDED = ("mass_accel_mps2", "mass_position_m")
+# Content above is noise of the position, whose second derivative grows with the square of the frequency.
+_HIGHEST_HZ = 60.0
+_RESOLUTION_MPS2 = 1e-4
+_SCALE = 0.008  # slope of the position sensor, relative
+_DELAY_S = 2e-4  # between the two channels
+_BEND_S2 = 1e-7
+_SKEW = 5e-4  # between two recorders of which one is timed by software
+_LOWEST_RAD_PER_S = 2.0 * math.pi * 0.35  # accelerometers begin at 0 to 0.5 Hz
+
+
+def motion_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:
+    """The relation in m/s2, away from vibration; `Missing` where a run lacks a channel or always vibrates."""
+    if why := lacking(NEEDED, runs):
+        return Missing("motion", why)
+    pieces = tuple(pieces_of(kept_blocks(run) & (run.commands.frequency_Hz == 0.0)) for run in runs)
+    if not any(own for own, run in zip(pieces, runs, strict=True) if not run.holdout):
+        return Missing("motion", "no stretch without vibration is long enough")
+    accel = [run.signals["mass_accel_mps2"] for run in runs]
+    position = [run.signals["mass_position_m"] for run in runs]
+    left = tuple(a - bend(x) for a, x in zip(accel, position, strict=True))
+    sticks = rig.drive == "spring"
+    near = [near_slips(x) if sticks else np.ones(len(x)) for x in position]
+    velocity = [rate(calmed(x, w)) for x, w in zip(position, near, strict=True)]
+    accel = [w * calmed(a, w) for a, w in zip(accel, near, strict=True)]  # a slide that sticks shows noise alone
+    jerk = [rate(a) for a in accel]
+    own_s = [(np.arange(len(a)) + 0.5) * BLOCK_S for a in accel]
+    whole_s = [t + run.before_s for t, run in zip(own_s, runs, strict=True)]
+    since = [slip_phase(v, scales_of(rig).slip_s if rig.drive == "spring" else 0.05) for v in velocity]
+    return Relation(
+        name="motion", unit="m/s2", row_s=BLOCK_S, highest_Hz=_HIGHEST_HZ,
+        left=left, pieces=pieces,
+        nuisances=(
+            term("scale of the position", "", accel, _SCALE),
+            term("delay", "", jerk, _DELAY_S),
+            term("bend", "", [rate(j) for j in jerk], _BEND_S2),
+            term("lowest frequency", "", velocity, _LOWEST_RAD_PER_S),
+        ),
+        effects=(
+            term("accelerometer-gain", "mass", accel, 0.2, 0, "ratio"),
+            *(
+                term("acceleration-clock", form, [-t * j for t, j in zip(times, jerk, strict=True)], _SKEW, 0, "skew")
+                for form, times in (("in each run", own_s), ("since the first run", whole_s))
+            ),
+        ),
+        patterns=(
+            free("the acceleration", accel, 12),
+            free("the velocity", velocity, 12),
+            free("the time since a slip", since, 14),
+        ),
+        resolution=_RESOLUTION_MPS2,
+    )  # fmt: skip

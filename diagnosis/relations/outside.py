@@ -1,0 +1,115 @@
+"""What no column of the library explains: free functions of one variable, with a variance by marginal likelihood, and bursts."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from diagnosis.relations.products import (
+    Noise,
+    Products,
+    band_edges_Hz,
+    band_of_rows,
+    turned_back,
+    turned_piece,
+    weighted,
+)
+from diagnosis.relations.relation import Floats, Term
+from diagnosis.relations.search import Found, nuisance_columns, nuisance_spreads
+
+_WINDOW_S = 0.1  # of a local variance
+_SPREADS = np.geomspace(1e-3, 1e2, 26)  # of a free function, relative to the noise of a row
+
+
+class Pattern(NamedTuple):
+    """A free function that the relation shows beside what was chosen."""
+
+    what: str  # the variable
+    evidence: float  # natural logarithm, against the chosen causes alone
+    rms: float  # of the function over the rows, in the relation's unit
+
+
+def patterns_of(products: Products, runs: list[int], noise: Noise, chosen: Found) -> tuple[Pattern, ...]:
+    """Every pattern of the relation beside the chosen causes, the largest evidence first."""
+    whole = weighted(products, runs, noise)
+    plain = products.values[runs].sum(axis=(0, 1))
+    rows = float(products.lengths[runs].sum())
+    places = {id(term): place for term, place in zip(products.terms, products.places, strict=True)}
+    model = np.concatenate([nuisance_columns(products), *(_columns(places[id(term)]) for term in chosen.terms)]).astype(
+        int
+    )
+    spreads = np.concatenate(
+        [
+            nuisance_spreads(products),
+            *(np.full(len(size), term.spread) for term, size in zip(chosen.terms, chosen.sizes, strict=True)),
+        ]
+    )
+    return tuple(
+        sorted(
+            (
+                _pattern(whole, plain, rows, model, spreads, term, _columns(places[id(term)]))
+                for term in products.relation.patterns
+            ),
+            key=lambda one: -one.evidence,
+        )
+    )
+
+
+def _columns(place: slice) -> np.ndarray:
+    return np.arange(place.start, place.stop)
+
+
+def _pattern(
+    whole: Floats, plain: Floats, rows: float, model: np.ndarray, spreads: Floats, term: Term, own: np.ndarray
+) -> Pattern:
+    everything = np.append(own, whole.shape[0] - 1)
+    free = whole[everything[:, None], everything]
+    if len(model):
+        inner = whole[model[:, None], model] + np.diag(1.0 / spreads**2)
+        scale = 1.0 / np.sqrt(np.diag(inner))
+        across = scale[:, None] * whole[model[:, None], everything]
+        free = free - across.T @ np.linalg.solve(inner * np.outer(scale, scale), across)
+    inner, towards = free[:-1, :-1], free[:-1, -1]
+    values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+    values = np.maximum(values, 0.0)
+    along = vectors.T @ towards
+    typical = math.sqrt(len(own) / max(float(values.sum()), 1e-300))  # size of a coefficient that is one noise of a row
+    sizes = typical * _SPREADS[:, None]
+    gained = (0.5 * along**2 * sizes**2 / (1.0 + values * sizes**2) - 0.5 * np.log1p(values * sizes**2)).sum(axis=1)
+    best = int(gained.argmax())
+    size = vectors @ (along / (values + 1.0 / float(sizes[best, 0]) ** 2))
+    shown = plain[own[:, None], own]
+    if len(model):  # a part that the nuisances could take as well is not the pattern's
+        across = plain[model[:, None], own]
+        shown = shown - across.T @ np.linalg.lstsq(plain[model[:, None], model], across, rcond=1e-12)[0]
+    square = float(size @ shown @ size) / max(rows, 1.0)
+    return Pattern(term.cause, float(gained[best]) - math.log(len(_SPREADS)), math.sqrt(max(square, 0.0)))
+
+
+def whitened_rows(
+    products: Products, runs: list[int], noise: Noise, terms: tuple[Term, ...], sizes: Floats
+) -> list[Floats]:
+    """What the terms leave of each piece of `runs`, in units of the noise, back in time: [rows] each, white without a gap."""
+    relation = products.relation
+    edges = band_edges_Hz(relation)
+    deviation = np.append(np.sqrt(noise.variance), np.inf)
+    found: list[Floats] = []
+    for run in runs:
+        for piece in relation.pieces[run]:
+            band = band_of_rows(relation, piece[1] - piece[0], edges)
+            turned = turned_piece(relation, terms, run, piece, len(band))
+            rest = (turned[:, -1] - turned[:, :-1] @ sizes) / deviation[band]
+            found.append(turned_back(rest[:, None], piece[1] - piece[0])[:, 0])
+    return found
+
+
+def burst_ratio(rows: list[Floats], row_s: float) -> float:
+    """Mean over median of the local variance over windows of 0.1 s: 1 for even noise, more where a few windows hold the rest."""
+    length = max(round(_WINDOW_S / row_s), 2)
+    local = [
+        (piece[: len(piece) // length * length].reshape(-1, length) ** 2).mean(axis=1)
+        for piece in rows
+        if len(piece) >= length
+    ]
+    values = np.concatenate(local) if local else np.ones(1)
+    return float(values.mean() / max(float(np.median(values)), 1e-30))

@@ -1,0 +1,126 @@
+"""One relation between channels as a regression: what it leaves of the rig as described, and the columns that may explain it."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d
+
+from diagnosis.gap.prepare import Prepared
+
+Floats = npt.NDArray[np.floating[Any]]
+Bools = npt.NDArray[np.bool_]
+Piece = tuple[int, int]  # rows [first, last) of a run, without a hole
+OUTSIDE = frozenset(
+    {"acceleration-clock", "force-amplifier", "loose-clamp"}
+)  # causes that no effect of the library makes
+END_BLOCKS = 20  # left out at the ends of a run
+_EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle
+# Rows of a piece. Shorter: its lowest frequencies are those of slips, and columns pass for noise. Longer: pieces are lost.
+_SHORTEST = 300
+_SPARE = 1.5  # by which the rows of a thinned relation still resolve more than its highest frequency
+_WAVES = 4  # half waves of a slow drift over a run
+
+
+class Term(NamedTuple):
+    """Columns of one cause in one formula, by run.
+
+    Arrays of `values` are [rows of the run, columns]: the relation's unit for each unit of the coefficients.
+    """
+
+    cause: str  # an effect of the library, one of OUTSIDE, or what a nuisance or pattern is
+    form: str
+    values: tuple[Floats, ...]
+    spread: float  # standard deviation of the coefficients before the data
+    sign: int = 0  # of the coefficient where the mechanism has one only
+    size: str = ""  # name with unit of the coefficient, as a parameter of an effect has
+    of_run: bool = False  # whether each run has its own coefficients, which no other run tells
+
+
+class Relation(NamedTuple):
+    """A relation over all runs of an evidence. Lists are [runs]; arrays of `left` are [rows of the run]."""
+
+    name: str
+    unit: str
+    row_s: float  # seconds from row to row
+    highest_Hz: float  # of the content that is compared
+    left: tuple[Floats, ...]  # what the rig as described leaves
+    pieces: tuple[tuple[Piece, ...], ...]
+    nuisances: tuple[Term, ...]  # sensors and tolerances
+    effects: tuple[Term, ...]
+    patterns: tuple[Term, ...]  # free functions of one variable, for what no effect explains
+    resolution: float  # least noise, one standard deviation a row: rounding of a channel is not below it
+    keeps_mean: bool = False  # whether the mean of a piece is compared, not only what varies in it
+
+
+class Missing(NamedTuple):
+    """A relation that the channels do not allow."""
+
+    name: str
+    why: str
+
+
+def term(cause: str, form: str, values: Sequence[Floats], spread: float, sign: int = 0, size: str = "") -> Term:
+    """A term of one column; `values` are [rows of the run] each."""
+    return Term(cause, form, tuple(np.asarray(one, np.float64)[:, None] for one in values), spread, sign, size)
+
+
+def lacking(needed: Sequence[str], runs: Sequence[Prepared]) -> str:
+    """Which run lacks which of the needed channels, in words; empty where none does."""
+    return next((f"{run.file} has no {name}" for run in runs for name in needed if name not in run.signals), "")
+
+
+def wander(lengths: list[int], spread: float) -> Term:
+    """Slow drift of a channel as a nuisance: `_WAVES` half waves over each run, together `spread` large."""
+    values: list[Floats] = []
+    for number, length in enumerate(lengths):
+        own = np.zeros((length, len(lengths) * _WAVES))
+        turns = np.outer(np.linspace(0.0, np.pi, length), np.arange(1, _WAVES + 1))
+        own[:, number * _WAVES : (number + 1) * _WAVES] = np.cos(turns)
+        values.append(own)
+    return Term("wander", "", tuple(values), spread / math.sqrt(_WAVES), of_run=True)
+
+
+def kept_blocks(run: Prepared) -> Bools:
+    """Marks the blocks away from changes of command and from the ends of the run, [blocks]."""
+    commands = run.commands
+    changes = np.zeros(len(commands.drive))
+    if any(segment.drive_velocity_mps != 0.0 for segment in commands.segments):
+        for command in (commands.drive, commands.frequency_Hz, commands.amplitude_m):
+            changes[1:] += np.diff(command) != 0.0
+    kept = maximum_filter1d(changes, 2 * _EDGE_BLOCKS + 1) == 0.0
+    kept[:END_BLOCKS] = kept[-END_BLOCKS:] = False
+    return kept
+
+
+def pieces_of(kept: Bools, shortest: int = _SHORTEST) -> tuple[Piece, ...]:
+    """The stretches that are kept throughout and have `shortest` rows at least."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], kept, [False])).astype(np.int8)))
+    return tuple(
+        (int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True) if last - first >= shortest
+    )
+
+
+def thinned(relation: Relation) -> Relation:
+    """The relation on means over as many rows as its highest frequency allows: all columns are averaged alike."""
+    count = int(0.5 / (_SPARE * relation.highest_Hz * relation.row_s))
+    if count < 2:
+        return relation
+
+    def mean(values: Floats) -> Floats:
+        rows = len(values) // count
+        return values[: rows * count].reshape(rows, count, *values.shape[1:]).mean(axis=1)
+
+    def fewer(terms: tuple[Term, ...]) -> tuple[Term, ...]:
+        return tuple(term._replace(values=tuple(mean(values) for values in term.values)) for term in terms)
+
+    return relation._replace(
+        row_s=count * relation.row_s,
+        left=tuple(mean(values) for values in relation.left),
+        pieces=tuple(tuple((-(-first // count), last // count) for first, last in own) for own in relation.pieces),
+        nuisances=fewer(relation.nuisances),
+        effects=fewer(relation.effects),
+        patterns=fewer(relation.patterns),
+    )

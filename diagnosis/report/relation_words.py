@@ -1,0 +1,76 @@
+"""The relations of a diagnosis in words."""
+
+from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, quantity
+from diagnosis.result import Diagnosis, RelationNumber, RelationRow, Remainder, RigNumber, Share
+
+
+def relation_lines(diagnosis: Diagnosis) -> list[str]:
+    """Lines for a person: every relation with its sizes and shares, what is left out, the refitted numbers."""
+    lines: list[str] = []
+    for row in diagnosis.relations:
+        lines.append(sizes_in_words(row))
+        lines += [f"  {share_in_words(one)}" for one in diagnosis.shares if one.signal == row.relation]
+    lines += [f"{one.relation}: left out: {one.why}" for one in diagnosis.left_out]
+    if diagnosis.remainder is not None:
+        lines.append(remainder_in_words(diagnosis.remainder))
+    return lines
+
+
+def number_lines(diagnosis: Diagnosis) -> list[str]:
+    """Every number that a relation or the baseline refits, beside the described one."""
+    lines = [number_in_words(one) for one in diagnosis.numbers]
+    lines += [rig_number_in_words(one) for one in diagnosis.rig if one.described and one.tolerance]
+    return lines
+
+
+def sizes_in_words(row: RelationRow) -> str:
+    """What a relation leaves as described, refitted and with its causes, beside its noise."""
+    sizes = [row.described, row.refitted, *([row.left] if row.causes else []), row.noise]
+    factor, unit = prefixed(min(sizes), row.unit)
+    described, refitted, *left, noise = (f"{size * factor:.3g}" for size in sizes)
+    caused = f", {left[0]} with {' and '.join(row.causes)}" if left else ""
+    return f"{row.relation}: {described} {unit}".rstrip() + f" as described, {refitted} refitted{caused}; noise {noise}"
+
+
+def share_in_words(share: Share) -> str:
+    """One share with its interval, and what chance would show."""
+    text = f"{share.what} {_percent(share.share)}"
+    if known := _between(share.interval_90):
+        text += f" (90 %: {known})"
+    return text if share.null_90 is None else f"{text}; chance alone shows up to {_percent(share.null_90)}"
+
+
+def _between(pair: tuple[float, float] | None) -> str:
+    return interval(None if pair is None else (max(pair[0], 0.0), max(pair[1], 0.0)))
+
+
+def _percent(share: float) -> str:
+    return percent(max(share, 0.0))
+
+
+def remainder_in_words(remainder: Remainder) -> str:
+    """What is left and where."""
+    factor, unit = prefixed(max(remainder.size, remainder.noise), remainder.unit)
+    size, noise = f"{remainder.size * factor:.3g} {unit}".rstrip(), f"{remainder.noise * factor:.3g}"
+    if not remainder.what:
+        return f"largest remainder: {size} in the {remainder.where}, where noise is {noise}: no pattern"
+    what = remainder.what.removeprefix("over ")
+    how = f"{remainder.what}" if remainder.what.startswith(("over ", "in ")) else f"({what})"
+    return f"{size} remain in the {remainder.where} {how}, where noise is {noise}: nothing in the library"
+
+
+def number_in_words(number: RelationNumber) -> str:
+    """A number of the rig as a relation shows it."""
+    word, unit = name_and_unit(number.name)
+    low, high = number.interval_90
+    factor, shown = prefixed(max(abs(number.refitted), abs(number.described)), unit)
+    digits = decimals_of((high - low) * factor) if high > low else None
+    inside = f"{fixed_digits(low * factor, digits)} to {fixed_digits(high * factor, digits)}"
+    value = fixed_digits(number.refitted * factor, digits)
+    return f"{word} {value} {shown} (90 %: {inside}) by the {number.relation}, described {quantity(number.described, unit)}"
+
+
+def rig_number_in_words(number: RigNumber) -> str:
+    """A number of the rig as the fits have it."""
+    word, unit = name_and_unit(number.name)
+    return f"{word} {quantity(number.retuned, unit)}, described {quantity(number.described, unit)}"

@@ -1,0 +1,125 @@
+"""The relations' part of an answer: shares of what differs, the remainder, refitted numbers, one picture."""
+
+import numpy as np
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.gap.prepare import Prepared
+from diagnosis.relations.answer import Answered, Relations
+from diagnosis.relations.decide import Decision
+from diagnosis.report.summary import summary
+from diagnosis.result import (
+    Curve,
+    Diagnosis,
+    LeftOut,
+    Picture,
+    RelationNumber,
+    RelationRow,
+    Remainder,
+    Share,
+)
+
+_SIGNALS = {"spring": "spring relation", "motion": "motion relation", "drive": "drive relation"}
+_POINTS = 1500  # of a curve
+_TWO_SIDED_90 = 1.645
+
+
+def with_relations(
+    done: Diagnosis, rig: RigTable, runs: list[Prepared], relations: Relations, decision: Decision
+) -> Diagnosis:
+    """The diagnosis with the relations' shares, remainder, numbers and picture, and with its sentences."""
+    found = done._replace(
+        shares=tuple(share for one in relations.answered for share in _shares(one)),
+        remainder=_remainder(relations, decision),
+        relations=tuple(
+            RelationRow(
+                signal_of(one.name), one.unit, one.described, one.refitted, one.left, one.noise, one.chosen.causes
+            )
+            for one in relations.answered
+        ),
+        left_out=tuple(LeftOut(signal_of(one.name), one.why) for one in relations.missing),
+        numbers=tuple(number for one in relations.answered for number in _numbers(one, rig)),
+        pictures=(*_pictures(relations, runs), *done.pictures),
+    )
+    return found._replace(summary=summary(found))
+
+
+def signal_of(relation: str) -> str:
+    """The name of a relation as the contract of the diagnosis has it."""
+    return _SIGNALS.get(relation, relation)
+
+
+def in_a_line(decision: Decision) -> str:
+    """What the relations decide, for a person who waits; empty where they decide nothing."""
+    if decision.outside:
+        first = decision.outside[0]
+        return f"{signal_of(first.relation)}: {first.what}, which nothing in the library makes"
+    if decision.decided:
+        first = decision.decided[0]
+        return f"{signal_of(first.relation)}: {first.cause}"
+    return ""
+
+
+def _shares(one: Answered) -> list[Share]:
+    if one.shares is None:
+        return []
+    signal = signal_of(one.name)
+    found = [Share(signal, cause.cause, cause.share, cause.interval_90, cause.null_90) for cause in one.shares.causes]
+    return [
+        *found,
+        Share(signal, "noise", one.shares.noise, None, None),
+        Share(signal, "unexplained", one.shares.unexplained, one.shares.unexplained_90, None),
+    ]
+
+
+def _remainder(relations: Relations, decision: Decision) -> Remainder | None:
+    """The unexplained pattern with the most evidence, or the relation with the largest unexplained share."""
+    by_name = {one.name: one for one in relations.answered}
+    if decision.outside:
+        first = decision.outside[0]
+        shares = by_name[first.relation].shares
+        share = None if shares is None else shares.unexplained
+        return Remainder(share, signal_of(first.relation), first.what, first.size, first.noise, first.unit)
+    if not by_name:
+        return None
+    worst = max(relations.answered, key=lambda one: one.left / one.noise)
+    size = float(np.sqrt(max(worst.left**2 - worst.noise**2, 0.0)))
+    share = None if worst.shares is None else worst.shares.unexplained
+    return Remainder(share, signal_of(worst.name), "", size, worst.noise, worst.unit)
+
+
+def _numbers(one: Answered, rig: RigTable) -> list[RelationNumber]:
+    known = rig.values()
+    extra = {"drive-stiffness": "drive_stiffness_N_per_m", "drive-damping": "drive_damping_Ns_per_m"}
+    moved: dict[str, tuple[float, float]] = {}
+    for name, size, deviation in one.nuisances:
+        if name in known:
+            moved[name] = (size, deviation)
+    for term, sizes, deviations in zip(one.chosen.terms, one.chosen.sizes, one.chosen.deviations, strict=True):
+        name = extra.get(term.cause)
+        if name is not None:
+            before = moved.get(name, (0.0, 0.0))
+            moved[name] = (before[0] + float(sizes[0]), float(np.hypot(before[1], deviations[0])))
+    found: list[RelationNumber] = []
+    for name, (size, deviation) in moved.items():
+        described = known[name] or 0.0
+        half = _TWO_SIDED_90 * deviation
+        value = described + size
+        found.append(RelationNumber(name, signal_of(one.name), described, value, (value - half, value + half)))
+    return found
+
+
+def _pictures(relations: Relations, runs: list[Prepared]) -> list[Picture]:
+    """The relation that leaves most above its noise, with and without its causes, over time."""
+    if not relations.answered:
+        return []
+    worst = max(relations.answered, key=lambda one: one.refitted / one.noise)
+    trace = worst.trace
+    thin = slice(None, None, max(len(trace.t_s) // _POINTS, 1))
+    curves = [Curve("rig without effects, refitted", trace.t_s[thin], trace.without[thin], "retuned")]
+    if worst.chosen.terms:
+        label = "with " + " and ".join(dict.fromkeys(worst.chosen.causes))
+        curves.append(Curve(label, trace.t_s[thin], trace.with_causes[thin], "effect"))
+    run = runs[trace.run].file.rsplit(".", 1)[0]
+    unit = f" / {worst.unit}" if worst.unit else ""
+    title = f"What the {signal_of(worst.name)} leaves in {run}"
+    return [Picture("residual", title, "time / s", f"left{unit}", tuple(curves))]

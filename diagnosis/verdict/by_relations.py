@@ -1,0 +1,114 @@
+"""A verdict of the contest in view of the relations, which decide what they can."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from diagnosis.fits.fit import Fit
+from diagnosis.fits.random_friction import is_random
+from diagnosis.relations.decide import Decided, Decision
+from diagnosis.verdict.judge import Verdict
+
+# Share of a relation on the held-out runs from which a known cause counts although something outside the library acts as well.
+_MOST = 0.5
+_LEAST_CLOSED = 0.5  # share of the held-out gap that two effects must close to stay named where they leave much
+# Effects that act in one relation alone: beside a cause that this relation names they are not there.
+_SEEN = {
+    "drive-damping": "spring",
+    "force-sensor-delay": "spring",
+    "force-sensor-lag": "spring",
+    "drive-hardening": "spring",
+    "force-sensor-drift": "spring",
+    "drive-speed-ripple": "drive",
+    "piezo-roll-off": "exciter",
+    "piezo-resonance": "exciter",
+    "piezo-sag": "exciter",
+}
+
+
+class Closed(NamedTuple):
+    """The best explanation of a contest that ended unexplained, and the share of the held-out gap that it closes."""
+
+    fit: Fit | None
+    share: float | None
+
+
+def in_view_of(verdict: Verdict, decision: Decision, fits: Sequence[Fit], nearest: Closed) -> Verdict:
+    """The verdict of the contest, corrected by the relations.
+
+    Args:
+        verdict: of the contest, after the held-out runs.
+        decision: what the relations decide.
+        fits: the best fit of each single effect and of each pair.
+        nearest: what came nearest where the verdict is "unexplained".
+
+    """
+    known = [cause for cause in decision.decided if cause.known]
+    if decision.outside:
+        held = [cause for cause in known if cause.share is not None and cause.share.share > _MOST]
+        if held and decision.outside[0].relation == held[0].relation:
+            return _named(verdict, "partly", held[:2], fits)
+        return _unexplained(verdict)
+    if known:
+        return _with_known(verdict, known, fits)
+    if verdict.kind == "unexplained" and _is_pair(nearest):
+        names = () if nearest.fit is None else nearest.fit.hypothesis.effects
+        if not set(names) & set(verdict.refuted):
+            return verdict._replace(kind="partly", named=nearest.fit)
+    return verdict
+
+
+def _is_pair(nearest: Closed) -> bool:
+    fit, share = nearest
+    return (
+        fit is not None
+        and share is not None
+        and share >= _LEAST_CLOSED
+        and len(fit.hypothesis.effects) > 1
+        and not is_random(fit.hypothesis)
+    )
+
+
+def _with_known(verdict: Verdict, known: list[Decided], fits: Sequence[Fit]) -> Verdict:
+    """The verdict where relations name effects of the library and leave nothing outside."""
+    names = list(dict.fromkeys(cause.cause for cause in known))
+    alike = {other for cause in known for other in cause.alike}
+    if verdict.kind in ("effect", "partly") and verdict.named is not None:
+        said = verdict.named.hypothesis.effects
+        if set(names) <= set(said) or (len(names) == 1 and alike & set(said)):
+            return verdict
+        seen = {effect for effect, relation in _SEEN.items() if relation in {cause.relation for cause in known}}
+        kept = [name for name in said if name not in seen and name not in names]
+        if not kept:
+            return _named(verdict, "effect", known[:2], fits)
+        both = (names[0], kept[0])
+        return _with_names(verdict, "effect", both, fits)
+    return _named(verdict, "partly" if verdict.kind == "unexplained" else "effect", known[:2], fits)
+
+
+def _named(verdict: Verdict, kind: str, causes: list[Decided], fits: Sequence[Fit]) -> Verdict:
+    return _with_names(verdict, kind, tuple(dict.fromkeys(cause.cause for cause in causes)), fits)
+
+
+def _with_names(verdict: Verdict, kind: str, names: tuple[str, ...], fits: Sequence[Fit]) -> Verdict:
+    own = next((fit for fit in fits if set(fit.hypothesis.effects) == set(names)), None)
+    top, value = next(iter(verdict.probabilities.items()))
+    first = names[0]
+    swapped = {top: verdict.probabilities.get(first, 0.0), first: value}
+    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    # a name without a fit has no size that a rig file could take, and no gap that it closes
+    return verdict._replace(
+        kind="effect" if kind == "effect" and own is not None else "partly",
+        named=own,
+        by_relations=() if own is not None else names,
+        probabilities=probabilities,
+        refuted=(),
+    )
+
+
+def _unexplained(verdict: Verdict) -> Verdict:
+    top, value = next(iter(verdict.probabilities.items()))
+    swapped = {top: verdict.probabilities["unexplained"], "unexplained": value}
+    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    return verdict._replace(
+        kind="unexplained", named=None, runner_up=verdict.named or verdict.runner_up, probabilities=probabilities
+    )

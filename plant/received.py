@@ -1,0 +1,87 @@
+"""The commands that a rig's process receives: those that mean something, in order; all others are counted, told and dropped."""
+
+import collections
+from typing import Any
+
+from bridge.faults import Fault
+from bridge.wire.complaints import BAD_MESSAGE, FLOOD, FOREIGN, Complaints
+from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
+from bridge.wire.topics import COMMAND
+from bridge.wire.zenoh_link import Received
+
+# Commands that may wait for a block; the oldest give way. Too small: a flood displaces the controller's own. Larger: reading a
+# flood takes more of the block, about 1 ms for 256.
+_WAITING = 256
+# beyond any exciter that vibrates a machine; a rig limits what is smaller to its own stroke and band
+_LARGEST_M = 1e-3
+_HIGHEST_HZ = 1e6
+
+
+class Commands:
+    """Between the receiving thread, which calls `push`, and the loop of the rig, which calls `take`.
+
+    Args:
+        complaints: where what is wrong is told.
+
+    """
+
+    def __init__(self, complaints: Complaints) -> None:
+        self._complaints = complaints
+        self._waiting: collections.deque[Received] = collections.deque(maxlen=_WAITING)
+        self._came = 0  # written by the receiving thread alone
+        self._read = 0
+        self._lost = 0
+        self._newest = 0  # block that the newest command answers
+
+    def push(self, received: Received) -> None:
+        """Add a command."""
+        self._waiting.append(received)
+        self._came += 1
+
+    def take(self, block: int) -> list[tuple[Received, int]]:
+        """The commands that came since the last call, each with the block that it answers.
+
+        `block`: the number of the next block; a command cannot answer it yet.
+        """
+        found: list[tuple[Received, int]] = []
+        for _ in range(len(self._waiting)):
+            received = self._waiting.popleft()
+            self._read += 1
+            answered = self.answered(received, block)
+            if answered is not None:
+                found.append((received, answered))
+        # of those that came, what was neither read nor waits; one that is being added now counts the next time
+        lost = self._came - self._read - len(self._waiting) - self._lost
+        if lost > 0:
+            self._lost += lost
+            self._complaints.note(
+                FLOOD, COMMAND.name, "more than can be read in a block: the oldest were dropped", lost
+            )
+        return found
+
+    def answered(self, received: Received, block: int) -> int | None:
+        """The block that a command answers; None for one that is dropped."""
+        try:
+            command: Any = COMMAND_LAYOUT.read(received.payload, COMMAND.name)[0]
+        except Fault as fault:
+            self._complaints.note(BAD_MESSAGE, COMMAND.name, f"{fault.line.partition(': ')[2]}: dropped")
+            return None
+        amplitude_m, frequency_Hz, answered = (
+            float(command.amplitude_m),
+            float(command.frequency_Hz),
+            int(command.block),
+        )
+        if not (0.0 <= amplitude_m <= _LARGEST_M and 0.0 <= frequency_Hz <= _HIGHEST_HZ):
+            text = f"{amplitude_m:g} m at {frequency_Hz:g} Hz is no vibration: dropped"
+            self._complaints.note(BAD_MESSAGE, f"{COMMAND.name} amplitude", text)
+            return None
+        if answered >= block:
+            text = f"answers block {answered}, which is still to come after block {block - 1}: dropped"
+            self._complaints.note(FOREIGN, f"{COMMAND.name} ahead", text)
+            return None
+        if answered < self._newest:
+            text = f"answers block {answered}, while block {self._newest} was answered: dropped"
+            self._complaints.note(FOREIGN, f"{COMMAND.name} behind", text)
+            return None
+        self._newest = answered
+        return answered

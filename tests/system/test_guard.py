@@ -1,0 +1,73 @@
+"""A rig by itself: nothing vibrates until a person arms it, and a person's stop outlasts its process."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridge.faults import FAULTS
+from tests.system.ports import free_endpoint
+
+COMMAND = [sys.executable, "-m", "cockpit"]
+
+pytestmark = pytest.mark.realtime
+SCENARIO = ["--scenario", "from-the-start", "--set", "duration_s=0"]
+
+
+@contextmanager
+def rig(endpoint: str, environment: dict[str, str], *more: str) -> Generator[subprocess.Popen[str]]:
+    arguments = [*COMMAND, "plant", *SCENARIO, "--wait-for", "", "--endpoint", endpoint, *more]
+    process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def say(word: str, endpoint: str) -> tuple[int, dict[str, Any]]:
+    """Exit status of a word, and what came of it; said again until the rig is there."""
+    command = [*COMMAND, word, "--json", "--endpoint", endpoint]
+    done = subprocess.run(command, timeout=60, check=False, capture_output=True, text=True)
+    until_s = time.monotonic() + 60.0
+    while done.returncode == FAULTS["NO_PEER"].exit_status and time.monotonic() < until_s:
+        done = subprocess.run(command, timeout=60, check=False, capture_output=True, text=True)
+    return done.returncode, json.loads(done.stdout)
+
+
+def test_a_rig_is_armed_by_a_person_and_a_stop_outlasts_its_process(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    environment = os.environ | {"XDG_STATE_HOME": str(tmp_path)}
+    with rig(endpoint, environment, "--set", "arm=false"):
+        status, seen = say("status", endpoint)
+        assert (status, seen["state"], seen["cause"]) == (1, "DISARMED", "POWER_UP")
+        status, armed = say("arm", endpoint)
+        assert (status, armed["state"], armed["cause"]) == (0, "ARMED", "CHECK_PASSED")
+        status, stopped = say("stop", endpoint)
+        assert (status, stopped["state"], stopped["cause"]) == (0, "FAULT", "STOP_BY_PERSON")
+    endpoint = free_endpoint()
+    with rig(endpoint, environment, "--set", "arm=true"):
+        status, seen = say("status", endpoint)
+        assert (seen["state"], seen["cause"]) == ("FAULT", "STOP_KEPT")
+        assert say("arm", endpoint)[0] == 1
+        assert say("reset", endpoint)[1]["state"] == "DISARMED"
+    endpoint = free_endpoint()
+    with rig(endpoint, environment, "--set", "arm=true"):
+        assert say("status", endpoint)[1]["state"] == "ARMED"
+
+
+def test_a_rig_whose_stop_could_not_be_kept_does_not_arm_itself(tmp_path: Path) -> None:
+    (tmp_path / "stickslip").write_text("a file in the way")
+    endpoint = free_endpoint()
+    with rig(endpoint, os.environ | {"XDG_STATE_HOME": str(tmp_path)}, "--set", "arm=true"):
+        assert say("status", endpoint)[1]["state"] == "DISARMED"

@@ -1,0 +1,101 @@
+"""A rig that dies and begins anew is taken up again; processes that stand still are told of rightly."""
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridge.log.logfile import read_run
+from bridge.wire.topics import COMMAND as COMMAND_TOPIC
+from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
+from tests.system.ports import free_endpoint
+from tests.system.run_under_way import COMMAND
+
+pytestmark = pytest.mark.realtime
+
+
+@contextmanager
+def processes(endpoint: str, log: Path) -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """A rig, a controller and a recorder that nobody watches."""
+    settings = ["--endpoint", endpoint, "--set", "duration_s=0", "--set", "controller.policy.enabled_from_s=0.0"]
+    started = {
+        role: subprocess.Popen(
+            [*COMMAND, role, *settings, *more], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for role, more in (
+            ("plant", ["--wait-for", "controller,recorder"]),
+            ("controller", []),
+            ("recorder", ["--log", str(log)]),
+        )
+    }
+    try:
+        yield started
+    finally:
+        for process in started.values():
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+
+
+def await_commands(endpoint: str) -> None:
+    inbox = Inbox(1000)
+    with Bus(BusConfig(endpoint=endpoint), "viewer", lockstep=False, patience_s=60.0) as viewer:
+        viewer.listen(COMMAND_TOPIC, inbox.push)
+        for _ in range(300):
+            assert inbox.get(60.0) is not None
+
+
+def test_a_rig_that_is_killed_and_started_again_is_taken_up_again(tmp_path: Path) -> None:
+    log, endpoint = tmp_path / "run.mcap", free_endpoint()
+    with processes(endpoint, log) as started:
+        await_commands(endpoint)
+        started["plant"].kill()
+        time.sleep(1.2)
+        settings = ["--endpoint", endpoint, "--set", "duration_s=2", "--wait-for", "controller"]
+        assert (
+            subprocess.run([*COMMAND, "plant", *settings], timeout=60, check=False, capture_output=True).returncode == 0
+        )
+        ends = {role: started[role].wait(20) for role in ("controller", "recorder")}
+    assert ends == {"controller": 0, "recorder": 0}
+    data = read_run(log)
+    codes = [event.code for event in data.events if event.source == "controller"]
+    assert [code for code in codes if code in {"RIG_RESTARTED", "RIG_BACK"}] == ["RIG_RESTARTED", "RIG_BACK"]
+    back = next(event for event in data.events if event.code == "RIG_BACK")
+    again = int(np.argmax(np.diff(data.sensors["sequence"].astype(np.int64)) < 0)) + 1
+    last_s = data.sensors["t_ns"][again - 1] * 1e-9
+    assert f"the link to the rig is down; last block at {last_s:.3f} s then" in back.text
+    assert len(data.sensors) - again > 1900
+    answered = data.applied["command_block"][again + 300 :].astype(np.int64)
+    assert (data.applied["sequence"][again + 300 :].astype(np.int64) - answered < 50).mean() > 0.9
+    # from nothing, and no faster than the slew limit of 1 nm a block
+    assert data.applied["amplitude_m"][again] == 0.0
+    assert np.abs(np.diff(data.applied["amplitude_m"][again:])).max() < 1.1e-9
+
+
+@pytest.mark.parametrize("role", ["plant", "controller"])
+def test_who_stood_still_says_so_and_the_run_goes_on(tmp_path: Path, role: str) -> None:
+    log, endpoint = tmp_path / "run.mcap", free_endpoint()
+    with processes(endpoint, log) as started:
+        await_commands(endpoint)
+        os.kill(started[role].pid, signal.SIGSTOP)
+        time.sleep(2.0)
+        os.kill(started[role].pid, signal.SIGCONT)
+        time.sleep(1.0)
+        await_commands(endpoint)
+        time.sleep(1.0)
+        assert all(process.poll() is None for process in started.values())
+        started["plant"].send_signal(signal.SIGTERM)
+        assert started["controller"].wait(20) == started["recorder"].wait(20) == 0
+    data = read_run(log)
+    paused = [event for event in data.events if event.code == "PAUSED"]
+    assert [event.source for event in paused] == [role]
+    assert 1.5 < float(paused[0].text.split(" for ")[1].split()[0]) < 4.0
+    if role == "plant":
+        assert "RIG_BACK" in {event.code for event in data.events}
+    assert [event.code for event in data.events if event.source == "controller"][-2:] == ["FRESH", "END"]

@@ -1,0 +1,117 @@
+"""The guard: which commands count, and what becomes of a vibration when they stop."""
+
+import math
+
+import pytest
+
+from bridge.guard.codes import (
+    ACTIVE,
+    ARMED,
+    ARMED_BY_SCENARIO,
+    COMMAND_LOST,
+    DISARMED,
+    NO_CAUSE,
+    SLEW_RATE,
+    VIBRATION_BEGAN,
+    VIBRATION_ENDED,
+)
+from bridge.guard.config import GuardConfig
+from bridge.guard.core import NO_COMMAND
+from tests.unit.bridge.guard.rigs import NANO, RUN, Rig
+
+
+def test_a_rig_powers_up_disarmed_and_lets_nothing_vibrate() -> None:
+    rig = Rig(arm=False)
+    rig.run(100)
+    assert (rig.s.state, rig.s.amplitude_m) == (DISARMED, 0.0)
+
+
+def test_a_vibration_begins_and_ends_at_the_slew_and_the_state_follows() -> None:
+    rig = Rig()
+    assert (rig.s.state, rig.s.cause) == (ARMED, ARMED_BY_SCENARIO)
+    rig.run(1)
+    assert (rig.s.state, rig.s.cause, rig.s.limit) == (ACTIVE, VIBRATION_BEGAN, SLEW_RATE)
+    assert rig.s.amplitude_m == pytest.approx(1 * NANO)
+    assert rig.s.frequency_Hz == 2600.0
+    rig.run(29)
+    assert rig.s.amplitude_m == pytest.approx(30 * NANO)
+    rig.run(1)
+    assert rig.s.limit == NO_CAUSE
+    rig.run(29, frequency_Hz=3000.0, amplitude_m=0.0)
+    assert (rig.s.state, rig.s.frequency_Hz) == (ACTIVE, 2600.0)
+    rig.run(2, amplitude_m=0.0)
+    assert (rig.s.state, rig.s.cause, rig.s.amplitude_m) == (ARMED, VIBRATION_ENDED, 0.0)
+
+
+def test_only_commands_of_this_run_count_that_are_newer_and_answer_a_block_that_was_sent() -> None:
+    rig = Rig()
+    rig.run(10)
+    assert rig.command()
+    assert not rig.command(run=RUN + 1)
+    assert not rig.command(run=0)
+    assert not rig.command(sequence=0)
+    assert not rig.command(block=10)
+    assert not rig.command(block=2**64 - 1)
+    assert not rig.command(block=2**62)
+    assert rig.command(block=0)
+    assert rig.s.refused == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("amplitude_m", math.nan), ("amplitude_m", math.inf), ("amplitude_m", -1.0), ("frequency_Hz", math.nan)],
+)
+def test_a_command_that_is_no_sense_is_refused(name: str, value: float) -> None:
+    rig = Rig()
+    rig.run(10)
+    assert not rig.command(**{name: value})
+    assert rig.s.refused == 1
+
+
+def test_a_controller_that_begins_anew_is_heard_once_the_old_one_is_silent() -> None:
+    rig = Rig()
+    rig.run(10)
+    assert rig.command(sequence=1000)
+    assert not rig.command(sequence=0)
+    for _ in range(60):
+        rig.block(9)
+    assert rig.s.fresh == 0
+    assert rig.command(sequence=0)
+
+
+def test_without_fresh_commands_it_fades_and_comes_back_but_not_after_half_a_second() -> None:
+    rig = Rig()
+    rig.run(100)
+    for _ in range(50):
+        rig.block(99)  # the command that answers block 99 acts from block 100 on: 50 blocks old at the last of these
+    assert rig.s.limit == NO_CAUSE
+    rig.block(99)
+    assert (rig.s.fresh, rig.s.limit) == (0, COMMAND_LOST)
+    for _ in range(30):
+        rig.block(99)
+    assert (rig.s.state, rig.s.amplitude_m) == (ARMED, 0.0)
+    rig.run(30)
+    assert rig.s.amplitude_m == pytest.approx(30 * NANO)
+    last = int(rig.s.block) - 1
+    for _ in range(50 + 500):
+        rig.block(last)
+    assert rig.s.state == ARMED
+    rig.block(last)
+    assert (rig.s.state, rig.s.cause) == (DISARMED, COMMAND_LOST)
+    rig.run(100)
+    assert (rig.s.state, rig.s.amplitude_m) == (DISARMED, 0.0)
+
+
+def test_a_rig_that_waits_for_its_first_controller_stays_armed() -> None:
+    rig = Rig()
+    for _ in range(2000):
+        rig.block(NO_COMMAND)
+    assert (rig.s.state, rig.s.limit) == (ARMED, NO_CAUSE)
+
+
+def test_an_exciter_without_a_slew_follows_at_once() -> None:
+    from tests.unit.bridge.guard.rigs import EXCITER
+
+    rig = Rig(GuardConfig(), exciter=EXCITER._replace(slew_m_per_s=0.0))
+    rig.run(1)
+    assert rig.s.amplitude_m == pytest.approx(30 * NANO)

@@ -1,0 +1,52 @@
+"""A person's stop outlasts the rig's process, for each rig by itself."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from bridge.guard.latch import StopLatch
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state" / "stickslip"
+
+
+def test_a_stop_is_kept_until_it_is_cleared() -> None:
+    assert not StopLatch("lathe").is_set
+    assert StopLatch("lathe").can_be_set() == ""
+    StopLatch("lathe").set("Ada")
+    assert StopLatch("lathe").is_set
+    assert '"by": "Ada"' in StopLatch("lathe").path.read_text()
+    StopLatch("lathe").clear()
+    StopLatch("lathe").clear()
+    assert not StopLatch("lathe").is_set
+
+
+def test_rigs_do_not_share_a_stop() -> None:
+    StopLatch("a/b").set("Ada")
+    assert not StopLatch("a_b").is_set
+    assert not StopLatch("lathe").is_set
+    assert StopLatch("a/b").is_set
+
+
+def test_the_folder_is_the_users_own(folder: Path) -> None:
+    StopLatch("lathe").set("Ada")
+    assert stat.S_IMODE(os.stat(folder).st_mode) == 0o700
+
+
+def test_a_folder_that_cannot_be_made_is_told(folder: Path) -> None:
+    folder.parent.write_text("a file in the way")
+    assert str(folder) in StopLatch("lathe").can_be_set()
+    with pytest.raises(NotADirectoryError):
+        StopLatch("lathe").set("Ada")
+
+
+def test_a_file_that_is_no_stop_of_ours_holds_too(folder: Path) -> None:
+    latch = StopLatch("lathe")
+    folder.mkdir(parents=True)
+    latch.path.symlink_to("nowhere")
+    assert latch.is_set

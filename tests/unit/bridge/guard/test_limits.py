@@ -1,0 +1,185 @@
+"""Every limit holds at its alarm level, and trips where its abort level is passed for longer than its time."""
+
+import math
+
+import pytest
+
+from bridge.guard.codes import (
+    ACTIVE,
+    ARMED,
+    BAND,
+    DRIVE_MAX,
+    DRIVE_RATIO,
+    DUTY,
+    FAULT,
+    HEAT,
+    LOUD,
+    NO_CAUSE,
+    OVERTRAVEL,
+)
+from bridge.guard.config import GuardConfig, HeatConfig, Level
+from bridge.guard.limits import exciter_gain
+from bridge.guard.senses import expect_drive
+from tests.unit.bridge.guard.rigs import EXCITER, NANO, Rig
+
+TWO_PI = 2.0 * math.pi
+FREE = Level(alarm=1e9, abort=1e9)
+
+
+def settled(rig: Rig, amplitude_m: float, frequency_Hz: float = 2600.0) -> None:
+    rig.run(110, frequency_Hz, amplitude_m)
+
+
+def test_the_stroke_is_held_at_its_alarm_and_trips_beyond_its_abort() -> None:
+    rig = Rig(GuardConfig(loud_ratio=FREE))
+    settled(rig, 149 * NANO)
+    assert (rig.s.state, rig.s.limit) == (ACTIVE, OVERTRAVEL)
+    assert rig.s.amplitude_m == pytest.approx(100 * NANO)
+    rig.run(200, amplitude_m=151 * NANO)
+    assert rig.s.state == ACTIVE
+    rig.run(1, amplitude_m=151 * NANO)
+    assert (rig.s.state, rig.s.cause) == (FAULT, OVERTRAVEL)
+    rig.run(100, amplitude_m=30 * NANO)
+    assert (rig.s.state, rig.s.amplitude_m) == (FAULT, 0.0)
+
+
+def test_what_passes_an_abort_level_now_and_then_does_not_trip() -> None:
+    rig = Rig(GuardConfig(loud_ratio=FREE))
+    for _ in range(10):
+        rig.run(199, amplitude_m=200 * NANO)
+        rig.run(1, amplitude_m=140 * NANO)
+    assert rig.s.state == ACTIVE
+
+
+def test_the_commanded_velocity_is_held() -> None:
+    level = Level(alarm=6e-4, abort=7e-4)
+    rig = Rig(GuardConfig(loud_ratio=FREE, velocity_mps=level))
+    settled(rig, 6.5e-4 / (TWO_PI * 2600.0))
+    assert (rig.s.state, rig.s.limit) == (ACTIVE, DRIVE_MAX)
+    assert TWO_PI * 2600.0 * rig.s.amplitude_m == pytest.approx(6e-4)
+    rig.run(300, amplitude_m=7.5e-4 / (TWO_PI * 2600.0))
+    assert (rig.s.state, rig.s.cause) == (FAULT, DRIVE_MAX)
+
+
+def test_without_a_level_of_its_own_the_velocity_is_bounded_by_the_stroke_alone() -> None:
+    rig = Rig(GuardConfig(loud_ratio=FREE))
+    settled(rig, 1e-7, 5000.0)
+    assert (rig.s.limit, rig.s.amplitude_m) == (NO_CAUSE, pytest.approx(100 * NANO))
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.5])
+def test_a_checked_gain_bounds_the_velocity_over_that_of_the_drive(gain: float) -> None:
+    rig = Rig(GuardConfig(loud_ratio=FREE))
+    rig.s.verified, rig.s.gain[:] = 1, gain
+    rig.v_d_mps = 2.5e-4
+    amplitude_m = 3.5 * 2.5e-4 / (TWO_PI * 4000.0) / gain
+    settled(rig, amplitude_m, 4000.0)
+    assert (rig.s.state, rig.s.limit) == (ACTIVE, DRIVE_RATIO)
+    assert gain * TWO_PI * 4000.0 * rig.s.amplitude_m == pytest.approx(3.0 * 2.5e-4, rel=0.02)
+    rig.v_d_mps = 1.75e-4  # the ratio of the same command is 5 when the old velocity is forgotten
+    rig.run(1500, 4000.0, amplitude_m)
+    assert (rig.s.state, rig.s.cause) == (FAULT, DRIVE_RATIO)
+
+
+def test_the_gain_between_tones_lies_on_a_straight_line() -> None:
+    rig = Rig(GuardConfig(check_Hz=[1000.0, 2000.0, 4000.0]))
+    rig.s.gain[:3] = 1.0, 2.0, 6.0
+    found = [exciter_gain(rig.p, rig.s, hertz) for hertz in (500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0, 5000.0)]
+    assert found == pytest.approx([1.0, 1.0, 1.5, 2.0, 4.0, 6.0, 6.0])
+
+
+def test_a_mount_that_resonates_trips_by_what_is_measured() -> None:
+    rig = Rig()
+    rig.gain = 5.0
+    rig.run(90)
+    assert rig.s.vibration_mps == pytest.approx(5.0 * TWO_PI * 2600.0 * 30 * NANO, rel=0.1)
+    rig.run(150)
+    assert (rig.s.state, rig.s.cause) == (FAULT, LOUD)
+
+
+def test_a_vibration_of_a_drive_that_stands_is_loud() -> None:
+    rig = Rig()
+    rig.v_d_mps = 0.0
+    rig.run(150)
+    assert (rig.s.state, rig.s.cause) == (FAULT, LOUD)
+
+
+@pytest.mark.parametrize("frequency_Hz", [499.0, 5001.0, 4700.0])
+def test_nothing_is_vibrated_outside_of_the_bands(frequency_Hz: float) -> None:
+    rig = Rig(GuardConfig(forbidden_Hz=[(4600.0, 4800.0)]))
+    rig.run(200, frequency_Hz)
+    assert (rig.s.state, rig.s.limit, rig.s.amplitude_m) == (ARMED, BAND, 0.0)
+    rig.run(1, frequency_Hz)
+    assert (rig.s.state, rig.s.cause) == (FAULT, BAND)
+
+
+@pytest.mark.parametrize("frequency_Hz", [500.0, 5000.0, 4599.0, 4801.0])
+def test_the_edges_of_the_bands_are_allowed(frequency_Hz: float) -> None:
+    rig = Rig(GuardConfig(forbidden_Hz=[(4600.0, 4800.0)], loud_ratio=FREE))
+    rig.run(300, frequency_Hz)
+    assert (rig.s.state, rig.s.limit) == (ACTIVE, NO_CAUSE)
+
+
+def test_warmth_follows_its_model_and_trips() -> None:
+    heat = HeatConfig(time_s=0.1, rise_max_K=5e-3)
+    rig = Rig(GuardConfig(heat=heat, loud_ratio=FREE))
+    volts2_Hz = 2600.0 * (30 * NANO / heat.stroke_m_per_V) ** 2
+    share = math.pi * heat.loss_tangent * heat.capacitance_F * volts2_Hz * heat.resistance_K_per_W / heat.rise_max_K
+    rig.run(1000)
+    assert rig.s.heat == pytest.approx(share, rel=0.01)
+    assert share < heat.alarm_share
+    warm = math.sqrt(0.9 / share)
+    rig.run(1000, amplitude_m=30 * NANO * warm)
+    assert (rig.s.state, rig.s.limit) == (ACTIVE, HEAT)
+    rig.run(1000, amplitude_m=30 * NANO * math.sqrt(1.2 / share))
+    assert (rig.s.state, rig.s.cause) == (FAULT, HEAT)
+
+
+def test_duty_is_the_share_of_the_time() -> None:
+    level = Level(alarm=0.4, abort=0.6, hold_s=0.0)
+    rig = Rig(GuardConfig(duty=level, duty_window_s=0.5, loud_ratio=FREE))
+    rig.run(300)
+    assert (rig.s.state, rig.s.limit, rig.s.duty) == (ACTIVE, DUTY, pytest.approx(1.0 - math.exp(-0.6), abs=0.01))
+    rig.run(200)
+    assert (rig.s.state, rig.s.cause) == (FAULT, DUTY)
+
+
+def test_by_default_no_duty_is_too_much() -> None:
+    rig = Rig(GuardConfig(duty_window_s=0.01, loud_ratio=FREE))
+    rig.run(1000)
+    assert (rig.s.state, rig.s.limit) == (ACTIVE, NO_CAUSE)
+
+
+def test_a_vibration_within_its_ratio_is_not_held() -> None:
+    rig = Rig(GuardConfig(loud_ratio=FREE))
+    rig.s.verified, rig.s.gain[:] = 1, 1.0
+    settled(rig, 30 * NANO)
+    assert (rig.s.state, rig.s.limit, rig.s.amplitude_m) == (ACTIVE, NO_CAUSE, pytest.approx(30 * NANO))
+
+
+def test_a_drive_position_that_is_no_number_leaves_the_velocity_to_be_forgotten() -> None:
+    rig = Rig()
+    rig.run(100)
+    before_mps = float(rig.s.drive_mps)
+    rig.nan.add("drive_position_m")
+    rig.run(1)
+    assert rig.s.drive_mps == before_mps  # a single such block changes nothing
+    rig.nan.clear()
+    rig.run(1)
+    assert math.isfinite(rig.s.drive_mps)
+
+
+def test_a_frequency_at_half_the_sample_rate_shows_no_amplitude() -> None:
+    rig = Rig(exciter=EXCITER._replace(frequency_max_Hz=10_000.0))
+    rig.run(50, frequency_Hz=10_000.0)
+    assert rig.s.vibration_mps == 0.0
+
+
+def test_a_velocity_that_the_drive_is_going_to_have_counts_before_it_moves() -> None:
+    rig = Rig()
+    rig.v_d_mps = 0.0
+    for _ in range(100):
+        expect_drive(rig.s, -5e-4)
+        rig.run(1)
+    assert rig.s.state == ACTIVE
+    assert rig.s.drive_mps == pytest.approx(5e-4, rel=0.01)

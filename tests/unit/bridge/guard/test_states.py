@@ -1,0 +1,155 @@
+"""The states of a rig, and the loop check that stands before ARMED."""
+
+import pytest
+
+from bridge.guard.codes import (
+    ACTIVE,
+    ARM,
+    ARMED,
+    ARMED_BY_PERSON,
+    CHECK_PASSED,
+    CHECKING,
+    COMMAND_LOST,
+    DISARM,
+    DISARMED,
+    DISARMED_BY_PERSON,
+    EXCITER_SILENT,
+    EXCITER_WILD,
+    FAULT,
+    LEAVE,
+    LOUD,
+    POWER_UP,
+    READY,
+    RESET,
+    RESET_BY_PERSON,
+    RUN_ENDED,
+    SENSOR_FROZEN,
+    SENSOR_NOT_FINITE,
+    STOP,
+    STOP_BY_PERSON,
+    STOP_KEPT,
+)
+from bridge.guard.config import GuardConfig
+from bridge.guard.core import NO_COMMAND
+from bridge.guard.records import build
+from bridge.guard.states import obey, trip
+from tests.unit.bridge.guard.rigs import EXCITER, Rig
+
+
+@pytest.mark.parametrize(
+    ("state", "word", "after", "cause"),
+    [
+        (DISARMED, ARM, CHECKING, ARMED_BY_PERSON),
+        (ARMED, ARM, CHECKING, ARMED_BY_PERSON),  # that its scenario armed, without a check
+        (READY, ARM, ARMED, ARMED_BY_PERSON),
+        (FAULT, RESET, DISARMED, RESET_BY_PERSON),
+        (ACTIVE, DISARM, DISARMED, DISARMED_BY_PERSON),
+        (CHECKING, DISARM, DISARMED, DISARMED_BY_PERSON),
+        (ACTIVE, LEAVE, DISARMED, RUN_ENDED),
+        *((state, STOP, FAULT, STOP_BY_PERSON) for state in (DISARMED, CHECKING, READY, ARMED, ACTIVE)),
+    ],
+)
+def test_a_word_leads_from_state_to_state(state: int, word: int, after: int, cause: int) -> None:
+    rig = Rig(arm=False)
+    rig.s.state = state
+    assert obey(rig.s, word)
+    assert (rig.s.state, rig.s.cause) == (after, cause)
+
+
+@pytest.mark.parametrize(
+    ("state", "word"),
+    [
+        (FAULT, ARM),
+        (FAULT, DISARM),
+        (FAULT, LEAVE),
+        (ARMED, ARM),
+        (ACTIVE, ARM),
+        (CHECKING, ARM),
+        (DISARMED, DISARM),
+        (DISARMED, LEAVE),
+        (ACTIVE, RESET),
+        (DISARMED, RESET),
+        (ACTIVE, 0),
+        (ACTIVE, 99),
+    ],
+)
+def test_other_words_change_nothing(state: int, word: int) -> None:
+    rig = Rig(arm=False)
+    rig.s.state, rig.s.verified = state, 1
+    assert not obey(rig.s, word)
+    assert (rig.s.state, rig.s.cause) == (state, POWER_UP)
+
+
+def test_a_stop_is_taken_in_fault_too_and_the_first_cause_of_a_fault_stays_otherwise() -> None:
+    rig = Rig()
+    trip(rig.s, LOUD)
+    trip(rig.s, SENSOR_FROZEN)
+    assert (rig.s.state, rig.s.cause) == (FAULT, LOUD)
+    assert obey(rig.s, STOP)
+    assert rig.s.cause == STOP_BY_PERSON
+
+
+def test_a_stop_that_was_kept_holds_at_power_up_even_where_the_scenario_arms() -> None:
+    _, state = build(GuardConfig(), EXCITER, 1, arm=True, stop_kept=True)
+    assert (state[0].state, state[0].cause) == (FAULT, STOP_KEPT)
+
+
+def test_the_check_measures_the_gain_and_arms() -> None:
+    rig = Rig(arm=False)
+    rig.gain = 0.7
+    obey(rig.s, ARM)
+    for _ in range(500):
+        rig.block(NO_COMMAND)
+        assert (rig.s.state, rig.s.amplitude_m) == (CHECKING, 0.0)
+    for _ in range(5 * 200 + 10):  # the last tone fades before the rig is ARMED
+        assert rig.s.state == CHECKING
+        rig.block(NO_COMMAND)
+    rig.block(NO_COMMAND)
+    assert (rig.s.state, rig.s.cause, rig.s.verified) == (ARMED, CHECK_PASSED, 1)
+    assert rig.s.amplitude_m == 0.0
+    assert rig.s.gain[:5] == pytest.approx([0.7] * 5, rel=0.03)
+    assert rig.p.tone_Hz[:5] == pytest.approx([1250.0, 2000.0, 2750.0, 3500.0, 4250.0])
+
+
+def test_tones_keep_out_of_forbidden_bands() -> None:
+    rig = Rig(GuardConfig(forbidden_Hz=[(3400.0, 4300.0)]))
+    assert list(rig.p.tone_Hz[: rig.p.tones]) == [1250.0, 2000.0, 2750.0]
+
+
+@pytest.mark.parametrize(
+    "channel", ["drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m"]
+)
+def test_a_channel_that_stands_or_is_no_number_fails_the_check(channel: str) -> None:
+    for broken, cause in (("frozen", SENSOR_FROZEN), ("nan", SENSOR_NOT_FINITE)):
+        rig = Rig(arm=False)
+        getattr(rig, broken).add(channel)
+        obey(rig.s, ARM)
+        for _ in range(501):
+            rig.block(NO_COMMAND)
+        assert (rig.s.state, rig.s.cause) == (FAULT, cause)
+
+
+@pytest.mark.parametrize(("gain", "cause"), [(0.0, EXCITER_SILENT), (25.0, EXCITER_WILD), (0.04, EXCITER_WILD)])
+def test_an_exciter_that_is_silent_or_wild_fails_the_check(gain: float, cause: int) -> None:
+    rig = Rig(arm=False)
+    rig.gain = gain
+    obey(rig.s, ARM)
+    for _ in range(800):
+        rig.block(NO_COMMAND)
+    assert (rig.s.state, rig.s.cause, rig.s.verified) == (FAULT, cause, 0)
+    for _ in range(20):
+        rig.block(NO_COMMAND)
+    assert rig.s.amplitude_m == 0.0
+
+
+def test_a_rig_that_a_person_armed_without_a_controller_is_disarmed_again() -> None:
+    rig = Rig(arm=False)
+    obey(rig.s, ARM)
+    for _ in range(500 + 5 * 200 + 10):
+        rig.block(NO_COMMAND)
+    assert rig.s.state == ARMED
+    for _ in range(500):
+        rig.block(NO_COMMAND)
+    assert rig.s.state == ARMED
+    rig.block(NO_COMMAND)
+    assert (rig.s.state, rig.s.cause) == (DISARMED, COMMAND_LOST)

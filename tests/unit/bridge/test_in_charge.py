@@ -1,0 +1,140 @@
+"""What a log says of nobody in charge, of a weak exciter, of a clock and of its own definitions: told by check and verdict."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bridge.log.in_charge import NO_COMMAND, in_charge
+from bridge.log.log_check import check_log
+from bridge.log.logfile import read_run
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_told
+from cockpit.judge.verdict import headline, in_words, judge
+from cockpit.run.in_process import run_onboard
+from cockpit.run.scenario import load_scenario
+from tests.logs import Tables, doctored, short_log, tables_of, write
+
+DIED = 300  # block after which the controller is gone
+
+
+@pytest.fixture(scope="module")
+def long_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("long") / "run.mcap"
+    run_onboard(load_scenario("from-the-start", ["duration_s=2.0"]), path, {})
+    return path
+
+
+def changed(path: Path, out: Path, change: Callable[[Tables], None]) -> Path:
+    run = read_run(path)
+    tables = tables_of(run)
+    change(tables)
+    write(out, tables, run, 100)
+    return out
+
+
+def controller_dies(tables: Tables) -> None:
+    for name in ("command", "trace"):
+        tables[name] = tables[name][: DIED * 3]
+    applied = tables["applied"]
+    applied["command_block"][DIED * 3 :] = DIED * 3 - 1
+    applied["fallback"][DIED * 3 + 50 :] = 1
+
+
+def test_a_controller_that_died_is_told_and_was_not_in_charge(long_run: Path, tmp_path: Path) -> None:
+    path = changed(long_run, tmp_path / "died.mcap", controller_dies)
+    verdict = judge(path)
+    assert not verdict.good
+    assert headline(verdict).startswith("the controller was in charge for 0.95 of 2.00 s only, then it was gone")
+    assert verdict.alone is not None
+    assert verdict.alone.seconds == pytest.approx(1.05)
+    words = "\n".join(in_words(verdict))
+    for said in ("with nobody in charge", "FALLBACK: ", "CONTROLLER_LOST: ", "UNANSWERED: 1099 blocks of 1999"):
+        assert said in words
+    assert {"fallback", "controller-lost", "unanswered"} <= {finding.kind for finding in check_log(path).findings}
+
+
+def test_a_sound_run_had_somebody_in_charge(long_run: Path) -> None:
+    verdict = judge(long_run)
+    assert verdict.good
+    assert (verdict.charge.fallback_s, verdict.charge.unanswered, verdict.charge.alone) == (0.0, 0, False)
+
+
+def test_a_short_fallback_is_told_and_no_fault(long_run: Path, tmp_path: Path) -> None:
+    def pause(tables: Tables) -> None:
+        tables["applied"]["fallback"][500:560] = 1
+
+    verdict = judge(changed(long_run, tmp_path / "pause.mcap", pause))
+    assert verdict.good
+    assert verdict.charge.longest_fallback_s == pytest.approx(0.06)
+    assert "FALLBACK: the rig was without a fresh command for 0.06 s, 1 time, first from 0.50 s on" in verdict.told[0]
+
+
+def test_the_way_out_of_a_rig_that_is_stopped_is_no_fallback(long_run: Path, tmp_path: Path) -> None:
+    def stopped(tables: Tables) -> None:
+        tables["applied"]["fallback"][-40:] = 1
+        tables["applied"]["command_block"][-40:] = NO_COMMAND
+
+    assert in_charge(read_run(changed(long_run, tmp_path / "out.mcap", stopped))).fallbacks == 0
+
+
+def test_a_rig_that_nobody_ever_commanded(long_run: Path, tmp_path: Path) -> None:
+    def nobody(tables: Tables) -> None:
+        tables["command"] = tables["command"][:0]
+        tables["applied"]["fallback"][:] = 1
+        tables["applied"]["command_block"][:] = NO_COMMAND
+
+    verdict = judge(changed(long_run, tmp_path / "nobody.mcap", nobody))
+    assert not verdict.good
+    assert "the controller was in charge for 0.00 of 2.00 s only" in headline(verdict)
+
+
+def test_a_weak_exciter_is_told(long_run: Path, tmp_path: Path) -> None:
+    def weak(tables: Tables) -> None:
+        tables["trace"]["reason"][500:1900] = wire.PIEZO_WEAK
+
+    path = changed(long_run, tmp_path / "weak.mcap", weak)
+    verdict = judge(path)
+    assert not verdict.good
+    assert headline(verdict).endswith("; PIEZO_WEAK")
+    assert any(fault.startswith("PIEZO_WEAK: for 1.40 s: v_a stays below") for fault in verdict.faults)
+    assert "piezo-weak" in {finding.kind for finding in check_log(path).findings}
+
+
+@pytest.mark.parametrize(("stands", "told"), [(True, "stands at "), (False, "jumps at 1 block, first 200 by -3000 ms")])
+def test_a_clock_that_jumps_or_stands_is_told(tmp_path: Path, stands: bool, told: str) -> None:
+    def change(tables: Tables) -> None:
+        t_ns = tables["sensors"]["t_ns"]
+        t_ns[:] += 3_000_000_000
+        t_ns[200:] = t_ns[199] if stands else t_ns[200:] - 3_000_000_000
+
+    path = doctored(tmp_path, change)
+    assert any(fault.startswith(f"CLOCK: t_ns of /sensors {told}") for fault in judge(path).faults)
+    assert "clock-jump" in {finding.kind for finding in check_log(path).findings}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (b"stickslip.Command", b"stickslip.Applied", "its schema is that of "),
+        (b"\n\x0fstickslip.proto", b"\n\xffstickslip.proto", "its schema "),
+        (b"frequency_Hz", b"amplitude_mm", "its schema gives field 4 as 'amplitude_mm': must be 'frequency_Hz'"),
+    ],
+    ids=["exchanged", "garbage", "renamed"],
+)
+def test_definitions_that_are_not_those_of_the_messages_are_found(
+    tmp_path: Path, old: bytes, new: bytes, told: str
+) -> None:
+    path = tmp_path / "run.mcap"
+    assert old in short_log()
+    path.write_bytes(short_log().replace(old, new))
+    assert any(told in finding.text for finding in check_log(path).findings if finding.kind == "schema")
+
+
+def test_every_code_has_its_letter_and_place() -> None:
+    assert {one.letter for one in EVENTS.values()} <= LETTERS.keys()
+    protocol = (Path(__file__).parents[3] / "bridge/wire/PROTOCOL.md").read_text(encoding="utf-8")
+    assert not [code for code in EVENTS if f"`{code}`" not in protocol]
+    assert (harms("GAP"), harms("STALE"), is_told("STALE"), is_told("START")) == (True, False, True, False)
+    assert is_told("OF_ANOTHER_VERSION")
+    assert not harms("OF_ANOTHER_VERSION")

@@ -1,0 +1,65 @@
+"""The question whether friction falls with speed, asked of a slide that follows v_a by a known share."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.config import validate
+from controller.config import ControllerConfig
+from controller.estimate.windows import DRIVE, FORCE, SLIDE
+from controller.records import build
+from controller.wobble import DEPTH, PERIODS, begin_wobble, can_ask, friction_falls, wobble, wobble_factor
+
+SPEED_MPS, RATIO = 5e-4, 1.2
+SMOOTHED = 0.973  # by windows of a sixth of a period
+
+
+def _start() -> tuple[Any, Any]:
+    params, state = build(validate(ControllerConfig, {}, "test"))
+    p, s = params[0], state[0]
+    s.direction, s.stiffness_N_per_m, s.allowed_Hz = 1, 11700.0, 4500.0
+    s.pushed[:], s.noise[SLIDE, :] = 100, 1e-3 * 0.35 ** np.arange(len(p.window_s))
+    s.noise[FORCE, :], s.noise[DRIVE, :] = 1e3, 1e-9
+    return p, s
+
+
+def _ask(follows: float, trend: float = 0.0, aside: float = 0.0) -> Any:
+    p, s = _start()
+    assert begin_wobble(p, s, SPEED_MPS, 1.0)
+    blocks, ended = 0, False
+    while not ended:
+        turn_rad = 2.0 * math.pi * s.wobble_s / s.wobble_period_s
+        s.fast_mps = RATIO * SPEED_MPS * wobble_factor(s)
+        late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s
+        answer = DEPTH * SMOOTHED * (follows * math.cos(turn_rad - late_rad) + aside * math.sin(turn_rad - late_rad))
+        s.slope[SLIDE, :] = SPEED_MPS * (1.0 + answer) * (1.0 + trend * s.wobble_s / s.wobble_period_s)
+        ended = wobble(p, s, SPEED_MPS)
+        blocks += 1
+    assert blocks * p.block_s == pytest.approx(PERIODS * s.wobble_period_s, abs=2.0 * p.block_s)
+    assert s.wobbles == 0
+    assert wobble_factor(s) == 1.0
+    return s
+
+
+@pytest.mark.parametrize(("follows", "falls"), [(0.7, False), (1.0, False), (1.06, True), (1.2, True)])
+@pytest.mark.parametrize("trend", [0.0, 0.01, -0.01])
+def test_a_slide_that_follows_by_more_than_its_share_tells_a_fall_of_friction(
+    follows: float, falls: bool, trend: float
+) -> None:
+    assert friction_falls(_ask(follows, trend)) == falls
+
+
+def test_what_does_not_answer_in_step_is_no_answer() -> None:
+    assert friction_falls(_ask(1.0, aside=0.5))
+
+
+def test_nothing_is_asked_where_the_spring_is_quicker_or_the_noise_larger() -> None:
+    p, s = _start()
+    assert not can_ask(p, 5e-3)
+    assert can_ask(p, 0.1)
+    assert not begin_wobble(p, s, SPEED_MPS, 5e-3)
+    s.noise[SLIDE, :] = 1.0
+    assert not begin_wobble(p, s, SPEED_MPS, 1.0)
+    assert s.wobbles == 0

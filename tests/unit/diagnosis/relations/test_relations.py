@@ -1,0 +1,146 @@
+"""Relations on made runs whose cause is known: it is named, and nothing else; what the library lacks is told as outside."""
+
+import numpy as np
+import pytest
+
+from diagnosis.relations.answer import Relations, relations_of
+from diagnosis.relations.decide import Decision, decision_of
+from tests.unit.diagnosis.relations.kinematic import BLOCK_S, STIFFNESS_N_PER_M, Signals, rig, runs
+
+T_S = (np.arange(8000) + 0.5) * BLOCK_S
+
+
+def answer(cause=None) -> tuple[Relations, Decision]:
+    found = relations_of(rig(), runs(cause))
+    return found, decision_of(found)
+
+
+def test_without_a_cause_nothing_is_named_and_the_noise_is_that_of_the_sensors():
+    found, decision = answer()
+    assert decision == Decision((), ())
+    assert [one.name for one in found.answered] == ["spring", "motion", "drive", "exciter", "base"]
+    spring = found.answered[0]
+    # means over two blocks, up to 120 of 250 Hz, of force noise and of two displacement sensors on the spring
+    whole_N = np.hypot(6e-3, STIFFNESS_N_PER_M * 3e-8 * np.sqrt(2.0))
+    assert spring.noise == pytest.approx(whole_N / np.sqrt(2.0) * np.sqrt(120.0 / 250.0), rel=0.1)
+    assert spring.shares is not None
+    assert spring.shares.unexplained < 0.2
+
+
+def drifts(_: int, signals: Signals) -> None:
+    signals["drive_force_N"] += 0.3 * (1.0 - np.exp(-T_S / 4.0))
+
+
+def is_late(_: int, signals: Signals) -> None:
+    signals["drive_force_N"] = np.interp(T_S - 2e-3, T_S, signals["drive_force_N"])
+
+
+def hardens(_: int, signals: Signals) -> None:
+    signals["drive_force_N"] += 3e-4 * signals["drive_force_N"] ** 3 / 15.0
+
+
+def sags(_: int, signals: Signals) -> None:
+    signals["base_shake_mps2"] *= 1.0 - 0.15 * signals["drive_force_N"] / 17.0
+
+
+def reads_high(_: int, signals: Signals) -> None:
+    signals["mass_accel_mps2"] *= 1.1
+
+
+def is_uneven(_: int, signals: Signals) -> None:
+    wave_m = 5e-6 * np.sin(2.0 * np.pi * signals["drive_position_m"] / 1e-3)
+    signals["drive_position_m"] += wave_m
+    signals["drive_force_N"] += STIFFNESS_N_PER_M * wave_m
+
+
+@pytest.mark.parametrize(
+    ("cause", "name", "relation"),
+    [
+        (drifts, "force-sensor-drift", "spring"),
+        (is_late, "force-sensor-delay", "spring"),
+        (hardens, "drive-hardening", "spring"),
+        (sags, "piezo-sag", "exciter"),
+        (reads_high, "accelerometer-gain", "motion"),
+        (is_uneven, "drive-speed-ripple", "drive"),
+    ],
+)
+def test_a_cause_is_named_by_its_relation_alone(cause, name: str, relation: str):
+    _, decision = answer(cause)
+    assert [one.relation for one in decision.decided] == [relation]
+    assert name in decision.decided[0].alike  # a delay of 2 ms and three low-passes differ by less than these runs show
+    assert len(decision.decided[0].alike) <= 2
+    assert decision.outside == ()
+    share = decision.decided[0].share
+    assert share is not None
+    assert share.null_90 < share.interval_90[0] <= share.share <= share.interval_90[1] <= 1.0
+
+
+def test_the_size_of_a_drift_is_near_the_true_one():
+    found, _ = answer(drifts)
+    spring = found.answered[0]
+    drift = next(i for i, term in enumerate(spring.chosen.terms) if term.cause == "force-sensor-drift")
+    shown_N = spring.chosen.terms[drift].values[0][:, 0] * spring.chosen.sizes[drift][0]
+    # the wander that ordinary sensors have takes a part of it
+    assert np.ptp(shown_N) == pytest.approx(0.3 * (1.0 - np.exp(-2.0)), rel=0.3)
+
+
+def saturates(_: int, signals: Signals) -> None:
+    signals["drive_force_N"] -= 0.1 * np.maximum(signals["drive_force_N"] - 12.0, 0.0)
+
+
+def runs_fast(_: int, signals: Signals) -> None:
+    signals["mass_accel_mps2"] = np.interp(T_S * (1.0 + 4e-4), T_S, signals["mass_accel_mps2"])
+
+
+def drops_out(number: int, signals: Signals) -> None:
+    for first in np.random.default_rng(number).integers(0, 7900, 12):
+        signals["drive_force_N"][first : first + 10] *= 0.9
+
+
+@pytest.mark.parametrize(
+    ("cause", "relation", "what"),
+    [
+        (saturates, "spring", "force-amplifier: from 1"),
+        (runs_fast, "motion", "acceleration-clock: in each run"),
+        (drops_out, "spring", "in bursts"),
+    ],
+)
+def test_what_the_library_lacks_is_told_as_outside(cause, relation: str, what: str):
+    _, decision = answer(cause)
+    assert [one.relation for one in decision.outside] == [relation]
+    assert decision.outside[0].what.startswith(what)
+    assert decision.outside[0].size > decision.outside[0].noise > 0.0 or decision.outside[0].evidence > 25.0
+    assert not any(one.known for one in decision.decided)
+
+
+def test_a_pattern_that_no_column_explains_is_told_with_its_variable():
+    def steps(_: int, signals: Signals) -> None:
+        signals["drive_force_N"] += 0.05 * np.sin(2.0 * np.pi * signals["drive_force_N"] / 1.5)
+
+    _, decision = answer(steps)
+    assert [(one.relation, one.what) for one in decision.outside] == [("spring", "over the extension")]
+    assert decision.outside[0].size == pytest.approx(0.05 / np.sqrt(2.0), rel=0.3)
+
+
+def test_a_size_that_differs_between_runs_takes_the_name_back():
+    def in_one_run(number: int, signals: Signals) -> None:
+        if number == 0:
+            hardens(number, signals)
+
+    _, decision = answer(in_one_run)
+    assert "drive-hardening" not in {one.cause for one in decision.decided}
+
+
+def test_channels_that_are_missing_leave_their_relations_out_and_are_told():
+    lacking = [
+        run._replace(signals={name: run.signals[name] for name in ("drive_force_N", "drive_position_m")})
+        for run in runs()
+    ]
+    found = relations_of(rig(), lacking)
+    assert [one.name for one in found.answered] == ["drive"]
+    assert {one.name: one.why for one in found.missing} == {
+        "spring": "run-01.csv has no mass_position_m",
+        "motion": "run-01.csv has no mass_accel_mps2",
+        "exciter": "run-01.csv has no base_accel_mps2 that is fast enough",
+        "base": "run-01.csv has no base_accel_mps2",
+    }

@@ -1,0 +1,71 @@
+"""On every way out of its loop the rig's process fades the vibration to zero first."""
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import APPLIED, COMMAND
+from bridge.wire.topics import Outgoing, Topic
+from cockpit.run.scenario import load_rig
+from plant.app import _Process
+from plant.node import PlantNode
+
+
+class Wire:
+    """Keeps what is sent."""
+
+    def __init__(self) -> None:
+        self.sent: dict[str, list[bytes]] = {}
+
+    def publisher(self, topic: Topic) -> Callable[[bytes], None]:
+        return self.sent.setdefault(topic.name, []).append
+
+    def listen(self, topic: Topic, receive: Any) -> None:
+        pass
+
+
+class Commanded(PlantNode):
+    """A rig whose controller wants 30 nm, until it fails at a block."""
+
+    fails_at = 10**9
+    failed = False
+
+    def advance(self, _commands: list[bytes], *times: int) -> tuple[Outgoing, Outgoing]:
+        if self.block == self.fails_at and not self.failed:
+            self.failed = True
+            raise RuntimeError("the converter is gone")
+        wanted = COMMAND.blank()
+        wanted["run"], wanted["sequence"], wanted["block"] = 1, self.block, max(self.block - 1, 0)
+        wanted["frequency_Hz"], wanted["amplitude_m"] = 2600.0, 3e-8
+        return super().advance([wanted.tobytes()] if self.block and not self.failed else [], *times)
+
+
+def left(node: Commanded, blocks: int, stop: threading.Event) -> Any:
+    """What was applied in each block, to the end of the process."""
+    bus: Any = Wire()
+    process = _Process(node, bus, None)
+    if node.fails_at < blocks:
+        with pytest.raises(RuntimeError, match="converter"):
+            process.realtime(blocks, stop)
+    else:
+        process.realtime(blocks, stop)
+    return np.frombuffer(b"".join(bus.sent["applied"]), APPLIED.dtype)
+
+
+@pytest.mark.parametrize("way", ["end", "fault"])
+def test_the_vibration_fades_at_its_own_rate_before_the_process_ends(way: str) -> None:
+    node = Commanded(load_rig("paper-c45-c45", []), 1, arm=True)
+    node.warm_up()
+    if way == "fault":
+        node.fails_at = 60
+    applied = left(node, 60 if way == "end" else 100, threading.Event())
+    assert applied["amplitude_m"][59] == pytest.approx(3e-8)
+    assert applied["amplitude_m"][-1] == 0.0
+    assert len(applied) == pytest.approx(90, abs=2)
+    assert np.diff(applied["amplitude_m"]).min() > -1.001e-9
+    assert applied["guard_state"][-1] == wire.DISARMED
+    assert applied["cause"][-1] == wire.RUN_ENDED

@@ -1,0 +1,82 @@
+"""Commands that mean nothing are dropped one by one, counted and told; those of the controller pass."""
+
+import math
+
+import pytest
+
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.complaints import Complaints
+from bridge.wire.inbox import Received
+from bridge.wire.topics import COMMAND
+from plant.received import Commands
+
+
+def commands() -> tuple[Commands, list[str]]:
+    told: list[str] = []
+    return Commands(Complaints(lambda code, text: told.append(f"{code} {text}"))), told
+
+
+def command(block: int, amplitude_m: float = 3e-8, frequency_Hz: float = 2600.0) -> Received:
+    payload = wire.Command(block=block, amplitude_m=amplitude_m, frequency_Hz=frequency_Hz).SerializeToString()
+    return Received(COMMAND, payload, 0)
+
+
+def test_what_answers_a_block_that_was_passes() -> None:
+    made, told = commands()
+    for block in (5, 6, 6, 9):
+        made.push(command(block))
+    assert [answered for _, answered in made.take(10)] == [5, 6, 6, 9]
+    assert made.take(11) == []
+    assert told == []
+
+
+@pytest.mark.parametrize(
+    ("amplitude_m", "frequency_Hz"),
+    [
+        (math.nan, 2600.0),
+        (math.inf, 2600.0),
+        (-1e-9, 2600.0),
+        (1e300, 2600.0),
+        (1e-8, math.nan),
+        (1e-8, math.inf),
+        (1e-8, -1.0),
+    ],
+)
+def test_what_is_no_vibration_is_dropped(amplitude_m: float, frequency_Hz: float) -> None:
+    made, told = commands()
+    for _ in range(100):
+        made.push(command(9, amplitude_m, frequency_Hz))
+    made.push(command(9))
+    assert [answered for _, answered in made.take(10)] == [9]
+    assert len(told) == 1
+    assert told[0].startswith("BAD_MESSAGE command amplitude: ")
+
+
+def test_blocks_to_come_and_blocks_long_past_are_dropped() -> None:
+    made, told = commands()
+    for block in (9, 10, 2**63, 2**64 - 1, 3, 8):
+        made.push(command(block))
+    assert [answered for _, answered in made.take(10)] == [9]
+    assert told == [
+        "FOREIGN command ahead: answers block 10, which is still to come after block 9: dropped",
+        "FOREIGN command behind: answers block 3, while block 9 was answered: dropped",
+    ]
+
+
+def test_rubbish_is_dropped() -> None:
+    made, told = commands()
+    made.push(Received(COMMAND, b"\xff" * 12, 0))
+    made.push(Received(COMMAND, b"\xff" * 100_000, 0))
+    assert made.take(10) == []
+    assert told[0].startswith("BAD_MESSAGE command: 12 bytes are no Command")
+
+
+def test_of_a_flood_the_newest_are_read_and_the_rest_is_told() -> None:
+    made, told = commands()
+    for _ in range(1000):
+        made.push(command(3))
+    made.push(command(9))
+    assert [answered for _, answered in made.take(10)][-1] == 9
+    assert told == ["FLOOD command: more than can be read in a block: the oldest were dropped (745 times)"]
+    assert made.take(11) == []
+    assert len(told) == 1
