@@ -13,7 +13,7 @@ from controller.estimate.learning import begin, forces, spring, stiffness
 from controller.estimate.motion import drive_velocity
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, begin_anew, note_steps, push
 from controller.limits import allow
-from controller.need import way_of
+from controller.needs.need import way_of
 from controller.policy import decide
 from controller.vibration import measure, skip
 

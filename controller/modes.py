@@ -3,7 +3,7 @@
 from bridge.kernel import Record, kernel
 from controller.codes import EXCITE, WATCH
 from controller.frequency import cheapest
-from controller.need import swing_held, way_of
+from controller.needs.need import swing_held, way_of
 
 _RETRY_S = 60.0  # until a vibration that could not help is tried again; doubles
 

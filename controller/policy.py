@@ -35,10 +35,10 @@ from controller.codes import (
     WATCH,
 )
 from controller.config import MODES
-from controller.failures import forget_failures, note_failure
 from controller.frequency import cheapest
 from controller.modes import enter, excite, stop_helping, tune_to
-from controller.need import (
+from controller.needs.failures import forget_failures, note_failure
+from controller.needs.need import (
     follow_swing,
     grows,
     is_needed,
@@ -50,8 +50,8 @@ from controller.need import (
     swing_held,
     way_of,
 )
-from controller.probe import STEADY_S, begin_probe, probe
-from controller.wobble import LEAST_ASKED, slide_mps, slide_noise_mps, windows_for, wobble_factor
+from controller.needs.probe import STEADY_S, begin_probe, probe
+from controller.needs.wobble import LEAST_ASKED, slide_mps, slide_noise_mps, windows_for, wobble_factor
 
 TWO_PI = 2.0 * math.pi
 ON_DEMAND, WHILE_MOVING, START_ONLY, SETTLE = range(len(MODES))

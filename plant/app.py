@@ -7,16 +7,17 @@ import time
 from bridge.faults import Fault
 from bridge.guard.codes import RESET, STOP
 from bridge.guard.latch import StopLatch
+from bridge.guard.received import Commands
 from bridge.guard.tell import Teller
+from bridge.plain import say
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.complaints import Complaints
+from bridge.wire.complaints import FOREIGN, Complaints
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, OPERATOR, PLANT_EVENT, SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from plant.config import RigConfig
 from plant.node import PlantNode
-from plant.received import Commands
 
 PEER_TIMEOUT_S = 30.0  # a first start compiles the controller's kernels
 _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
@@ -157,11 +158,17 @@ class _Process:
             else:
                 self._latch.clear()
         except OSError as error:
-            self.event("STATE_FOLDER", f"{self._latch.path}: {error.strerror}: the word does not outlast a restart")
+            text = f"{self._latch.path}: {error.strerror}: the word does not outlast a restart"
+            self.event("STATE_FOLDER", text)
+            say(f"stickslip: warning: STATE_FOLDER: {text}")
 
     def _tell(self) -> None:
-        for code, text in self._teller.news(self._node.applied):
+        applied = self._node.applied
+        for code, text in self._teller.news(applied):
             self.event(code, text)
+        if refused := int(applied.commands_refused):
+            text = "of another run, or not newer than the last: refused; is a controller of an earlier run still there?"
+            self._complaints.note(FOREIGN, f"{COMMAND.name} of another run", text, refused)
 
     def realtime(self, blocks: int, stop: threading.Event) -> None:
         """Advance one block a period under the newest command; on every way out the vibration fades to zero first."""

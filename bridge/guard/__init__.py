@@ -9,6 +9,7 @@ It is a process stop and no safety function: an emergency stop belongs into the 
     senses   drive velocity and vibration velocity, from the rig's own samples
     check    the loop check: sensors alive, exciter answers, its gain
     core     `accept` a command, `look` at a block, `allow` a vibration
+    received the commands as they come from the bus, those that mean something
     latch    a person's stop, kept over restarts
 
 `core` and what it calls are pure: no clock, no file, no bus. A device adapter calls them as `plant.step` does.

@@ -43,7 +43,10 @@ def see_vibration(p: Record, s: Record, block: Record) -> None:
 
 @kernel
 def _square_at(samples: Record, step_rad: float) -> float:
-    """Square of the amplitude of the sine of `step_rad` a sample that fits the samples best."""
+    """Square of the amplitude of the sine of `step_rad` a sample that fits the samples best.
+
+    Not shared with the controller, which fits the same: one mistake must not blind both.
+    """
     c, sn, turn_c, turn_sn = 1.0, 0.0, math.cos(step_rad), math.sin(step_rad)
     cos_cos, cos_sin, sin_sin, with_cos, with_sin = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(samples.shape[0]):

@@ -137,7 +137,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
     """Say what is wrong with a log; exit status 0 when nothing is, 1 with findings, 7 when it is no run log."""
 
     def work() -> int:
-        from bridge.log.log_check import check_log
+        from bridge.log.check.log_check import check_log
         from bridge.log.storage.chain import chain_in_words
         from bridge.wire.topics import BY_NAME
 

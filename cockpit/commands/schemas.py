@@ -285,7 +285,7 @@ JSON = (
     Format("reproduce-result", "`stickslip reproduce --json`.", _reproduce),
     Format("example-result", "`stickslip example --json`.", _result_of("cockpit.commands.example", "Example")),
     Format("log-info-result", "`stickslip log info --json`.", _log_info),
-    Format("log-check-result", "`stickslip log check --json`.", _result_of("bridge.log.log_check", "LogCheck")),
+    Format("log-check-result", "`stickslip log check --json`.", _result_of("bridge.log.check.log_check", "LogCheck")),
     Format("log-recover-result", "`stickslip log recover --json`.", _log_recover),
     Format("log-export-result", "`stickslip log export --json`.", _result_of("bridge.tables.export", "Exported")),
     Format(

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
+from bridge.log.check.signal_range import look
 from bridge.log.finding import Finding
-from bridge.log.signal_range import look
 from bridge.units import counted, percent
 from diagnosis.evidence.manifest import RigTable, RunTable
 from diagnosis.evidence.sign_and_unit import apparent_stiffness_N_per_m

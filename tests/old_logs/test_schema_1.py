@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.tables.export import export
 from cockpit.judge.verdict import judge

@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from bridge.faults import Fault
 from bridge.log import recorder
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import read_run
 from bridge.log.recover import recover

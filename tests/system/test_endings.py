@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from cockpit.run import processes as orchestra
 from tests.logs import short_log

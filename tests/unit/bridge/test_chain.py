@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.recover import recover
 from bridge.log.storage.chain import chain_in_words, chain_of

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.log.check.log_check import check_log
 from bridge.log.in_charge import NO_COMMAND, in_charge
-from bridge.log.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_told

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import FAULTS, Fault
+from bridge.log.check.log_check import check_log
 from bridge.log.library import LIBRARY
-from bridge.log.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.recover import recover

@@ -11,7 +11,7 @@ from mcap.writer import Writer
 from typer.testing import CliRunner
 
 from bridge.faults import Fault
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from cockpit.commands.log import log_app
 from cockpit.judge.verdict import in_words, judge

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridge.faults import Fault
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.recover import recover

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from bridge.faults import Fault
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from cockpit.judge.verdict import judge
 from cockpit.run.replay import replay_log

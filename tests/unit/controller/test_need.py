@@ -7,7 +7,7 @@ import pytest
 
 from bridge.config import validate
 from controller.config import ControllerConfig
-from controller.need import (
+from controller.needs.need import (
     follow_swing,
     grows,
     is_needed,

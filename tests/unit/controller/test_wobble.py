@@ -9,8 +9,8 @@ import pytest
 from bridge.config import validate
 from controller.config import ControllerConfig
 from controller.estimate.windows import DRIVE, FORCE, SLIDE
+from controller.needs.wobble import DEPTH, PERIODS, begin_wobble, can_ask, friction_falls, wobble, wobble_factor
 from controller.records import build
-from controller.wobble import DEPTH, PERIODS, begin_wobble, can_ask, friction_falls, wobble, wobble_factor
 
 SPEED_MPS, RATIO = 5e-4, 1.2
 SMOOTHED = 0.973  # by windows of a sixth of a period

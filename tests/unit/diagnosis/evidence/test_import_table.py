@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from bridge.config import validate
 from bridge.faults import Fault
-from bridge.log.log_check import check_log
+from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.tables.export import export
 from bridge.tables.readers import read_table

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
+from bridge.log.check.schema_check import schema_findings
+from bridge.log.check.signal_range import Signal, SignalLook
 from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.in_charge import ChargeWatch
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, Piece, block_period_ns, check_log_file, iter_pieces
 from bridge.log.metadata import configuration_of, is_number, number_of
-from bridge.log.schema_check import schema_findings
-from bridge.log.signal_range import Signal, SignalLook
 from bridge.log.storage.chain import Chain, chain_findings
 from bridge.log.storage.parts import chain_of_log
 from bridge.log.topic_watch import TopicWatch

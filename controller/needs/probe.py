@@ -1,7 +1,7 @@
 """The probe: whether the vibration is needed at all.
 
-First a wobble of v_a asks whether friction falls with speed (`controller.wobble`). Only where it does not is the vibration faded
-out, no faster than the slide follows. Where the spring takes up the friction too quickly for the question, the fade itself is
+First a wobble of v_a asks whether friction falls with speed (`controller.needs.wobble`). Only where it does not is the
+vibration faded out, no faster than the slide follows. Where the spring takes up the friction too quickly for the question, the fade itself is
 the question: a slide that sticks, runs ahead or begins to swing on the way needs the vibration, one that follows down to
 nothing does not.
 """
@@ -11,8 +11,8 @@ import math
 from bridge.kernel import Record, kernel
 from controller.codes import EXCITE, HELD, NOT_NEEDED, PROBE, SMOOTH, STICK, STILL_NEEDED, WATCH
 from controller.modes import enter, excite
-from controller.need import is_needed, note_needed, note_needless, settling_s, swing_held
-from controller.wobble import LEAST_ASKED, MOST_ASKED, begin_wobble, can_ask, friction_falls, wobble
+from controller.needs.need import is_needed, note_needed, note_needless, settling_s, swing_held
+from controller.needs.wobble import LEAST_ASKED, MOST_ASKED, begin_wobble, can_ask, friction_falls, wobble
 
 STEADY_S = 0.2  # of constant v_d before and during a probe
 _LAST = 1.02  # ratio of a fading vibration down to which the mean friction grows

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
+from bridge.guard.received import Commands
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import Complaints
 from bridge.wire.inbox import Received
 from bridge.wire.topics import COMMAND
-from plant.received import Commands
 
 
 def commands() -> tuple[Commands, list[str]]:

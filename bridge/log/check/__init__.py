@@ -1,0 +1,1 @@
+"""What is wrong with a log: its bytes and schemas, its signals' ranges, and all findings together in `log_check`."""
