@@ -1,9 +1,9 @@
 """The probe: whether the vibration is needed at all.
 
-First a wobble of v_a asks whether friction falls with speed (`controller.needs.wobble`). Only where it does not is the
-vibration faded out, no faster than the slide follows. Where the spring takes up the friction too quickly for the question, the fade itself is
-the question: a slide that sticks, runs ahead or begins to swing on the way needs the vibration, one that follows down to
-nothing does not.
+First a wobble of v_a asks whether friction falls with speed (`controller.needs.wobble`). Only where it does not is
+the vibration faded out, no faster than the slide follows. Where the spring takes up the friction too quickly for the
+question, the fade itself is the question: a slide that sticks, runs ahead or begins to swing on the way needs the
+vibration, one that follows down to nothing does not.
 """
 
 import math

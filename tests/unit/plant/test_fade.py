@@ -33,13 +33,14 @@ class Commanded(PlantNode):
 
     fails_at = 10**9
     failed = False
+    run_of_controller = 1
 
     def advance(self, _commands: list[bytes], *times: int) -> tuple[Outgoing, Outgoing]:
         if self.block == self.fails_at and not self.failed:
             self.failed = True
             raise RuntimeError("the converter is gone")
         wanted = COMMAND.blank()
-        wanted["run"], wanted["sequence"], wanted["block"] = 1, self.block, max(self.block - 1, 0)
+        wanted["run"], wanted["sequence"], wanted["block"] = self.run_of_controller, self.block, max(self.block - 1, 0)
         wanted["frequency_Hz"], wanted["amplitude_m"] = 2600.0, 3e-8
         return super().advance([wanted.tobytes()] if self.block and not self.failed else [], *times)
 
@@ -69,3 +70,13 @@ def test_the_vibration_fades_at_its_own_rate_before_the_process_ends(way: str) -
     assert np.diff(applied["amplitude_m"]).min() > -1.001e-9
     assert applied["guard_state"][-1] == wire.DISARMED
     assert applied["cause"][-1] == wire.RUN_ENDED
+
+
+def test_a_controller_of_another_run_moves_nothing_and_is_told() -> None:
+    node = Commanded(load_rig("paper-c45-c45", []), 1, arm=True)
+    node.run_of_controller = 2
+    bus: Any = Wire()
+    _Process(node, bus, None).realtime(50, threading.Event())
+    assert np.frombuffer(b"".join(bus.sent["applied"]), APPLIED.dtype)["amplitude_m"].max() == 0.0
+    events = [wire.Event.FromString(payload) for payload in bus.sent["event/plant"]]
+    assert any(event.code == "FOREIGN" and "of another run" in event.text for event in events)
