@@ -119,6 +119,7 @@ def test_as_the_plants_kernel(ladder, tables, name, form):
     assert worst(found, expected) < ROUNDING
 
 
+@pytest.mark.slow
 def test_as_the_plants_kernel_on_a_rough_surface_and_with_a_tail(ladder):
     rig, _ = ladder
     tail = [{"coulomb_force_N": rig.coulomb_force_N * share, "stribeck_tail": 0.3} for share in (1.0, 1.004)]
