@@ -32,6 +32,7 @@ _INBOX_LIMIT = 256
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
 _GIVEN_UP_S = 30.0  # without a rig this process ends then, as long as one waits for a rig at the start
 _HEADER_S = 1.0  # longest wait for what the rig says of itself; one that says nothing costs all of it
+_LINKS_S = 0.5  # for links to be made again: clients dial every 20 ms
 _TOLD_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token costs all of it
 _AT_ONCE_S = 0.05  # time for a second controller of the same moment to appear, and the period of looking again
 _SAID_AGAIN_S = 0.4  # between two answers to one word of an operator, who says it every 0.5 s until it is answered
@@ -108,6 +109,7 @@ class _Process:
         self._restarts = 0
         self._rig_came = 0
         self._rig_lost = ""  # why, from when it was told until blocks come again
+        self._owed_due_s = 0.0
         self._owed: list[tuple[str, str]] = []  # events that wait until the links stand
         self._stale = False  # told, and not yet FRESH
         self._in_time = 0  # blocks in a row without a stale step, of those that FRESH waits for
@@ -191,7 +193,8 @@ class _Process:
         if not self._stale:
             return
         self._in_time += 1
-        if self._in_time * self._block_s >= self._stale_after_s:
+        links_stand = not self._owed or time.monotonic() > self._owed_due_s
+        if self._in_time * self._block_s >= self._stale_after_s and links_stand:
             self._pay()
             self.event("FRESH", f"blocks arrive again, {self._in_time} in time")
             self._stale = False
@@ -200,6 +203,7 @@ class _Process:
         """Tell that this process itself stood still."""
         if not self._lockstep:
             self._stale, self._in_time = True, 0
+            self._owed_due_s = time.monotonic() + _LINKS_S  # blocks that waited in the old link come first
             text = f"this controller stood still for {paused_s:.2f} s; the rig had no command meanwhile"
             self._tell_later("PAUSED", text)
 
