@@ -8,7 +8,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo quick test test-realtime test-others nightly control warm check docs reference bench bench-quick blind real bless lock proto schemas clean
+.PHONY: demo quick test test-realtime test-others nightly mutants coverage-guard control faults warm check docs reference bench bench-quick blind real bless lock proto schemas clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -32,13 +32,22 @@ test-others: NICE = nice -n 19
 test-others:
 	@$(PARALLEL) -m "not realtime and not nightly"
 
-nightly: check warm bench ## everything: an hour or so
+nightly: check warm bench $(VENV)/.ready-viewers ## everything: an hour or so
 	@$(BIN)/pytest -m realtime
 	@$(PARALLEL) -m "not realtime"
-	@$(MAKE) --no-print-directory control
+	@$(MAKE) --no-print-directory coverage-guard control faults
+
+mutants: $(READY) ## an hour or so: of the changed conditions of the guard at most a tenth may go unnoticed by its unit tests
+	@$(NICE) $(BIN)/python -m tests.mutants
+
+coverage-guard: $(READY) ## every branch of the guard, by its unit tests alone
+	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest tests/unit/bridge/guard -p no:cacheprovider --cov=bridge.guard --cov-branch --cov-report=term-missing --cov-fail-under=100
 
 control: $(READY) ## the controller on the whole bank, beside its rivals; fails where a bar is missed
 	@$(BIN)/stickslip bench control --report runs/control.html --json runs/control.json
+
+faults: $(READY) ## every fault of deploy/faults in simulated time: docs/quality/faults.md
+	@$(BIN)/stickslip bench faults --report docs/quality/faults.md
 
 warm: $(READY)
 	@$(BIN)/python -m tests.warm_up
@@ -83,12 +92,18 @@ $(VENV)/.ready-bench: $(READY) requirements-bench.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
 	@touch $@
 
+$(VENV)/.ready-viewers: $(READY) requirements-viewers.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-viewers.lock
+	@touch $@
+
 lock: ## needs uv
 	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes --no-annotate --no-header -o requirements.lock
 	uv pip compile pyproject.toml --extra bench --universal --python-version 3.11 --generate-hashes --no-annotate --no-header -c requirements.lock -o requirements-bench.lock
+	uv pip compile pyproject.toml --extra viewers --universal --python-version 3.11 --generate-hashes --no-annotate --no-header -c requirements.lock -o requirements-viewers.lock
 
 proto: $(READY) ## after a change of bridge/wire/stickslip.proto
-	$(BIN)/python -m grpc_tools.protoc -I bridge/wire --python_out=bridge/wire --pyi_out=bridge/wire bridge/wire/stickslip.proto
+	$(BIN)/python -m grpc_tools.protoc -I bridge/wire --python_out=bridge/wire --pyi_out=bridge/wire \
+		--include_source_info --descriptor_set_out=bridge/wire/stickslip.desc bridge/wire/stickslip.proto
 
 schemas: $(READY) ## after a change of a format
 	$(BIN)/stickslip schema --out deploy/schemas

@@ -6,5 +6,6 @@ tables/   CSV, Parquet, MATLAB and TDMS, in and out
 
 config    strict TOML                              faults   codes, exit statuses and help
 files     checks before reading, atomic writing    units    units in names, numbers in words
+provenance   what made a page or a picture: version, command, date, hashes
 kernel, kernel_cache   compiled code; where it is kept, and what renews it
 """

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from numba.core.caching import UserProvidedCacheLocator
 
-from bridge.plain import say
+from bridge.plain import ANOTHER_COMPILES, COMPILED, COMPILING, say
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("bridge", "controller", "plant", "diagnosis", "cockpit")
@@ -92,16 +92,17 @@ def compile_once(what: str, compiling: Callable[[], object]) -> None:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            _say(f"another process compiles the kernels of {what}: waiting for it")
+            _say(f"{ANOTHER_COMPILES}{what}: waiting for it")
             fcntl.flock(lock, fcntl.LOCK_EX)
         except OSError:  # a file system without locks: each process compiles
             pass
         if not done.exists():
-            _say(f"compiling the kernels of {what}, once for this version")
+            _say(f"{COMPILING}{what}, once for this version")
         compiling()
         for old in folder.glob(f"{what}-*"):
             old.unlink(missing_ok=True)
         done.touch()
+    _say(f"{COMPILED}{what}")
 
 
 def _say(words: str) -> None:

@@ -7,6 +7,11 @@ import sys
 # forge what a person reads, and an escape code can do more (rename the window, answer in the person's name)
 _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
 
+# what a process says on stderr of its compiled kernels; who has started it reads these words
+COMPILING = "compiling the kernels of "
+ANOTHER_COMPILES = "another process compiles the kernels of "
+COMPILED = "compiled are the kernels of "
+
 
 def plain(text: str) -> str:
     """The text with every control character as its number in hexadecimal."""

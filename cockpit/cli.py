@@ -16,13 +16,16 @@ from cockpit.commands.example import example
 from cockpit.commands.explain import explain
 from cockpit.commands.json_option import JsonGroup
 from cockpit.commands.log import log_app
+from cockpit.commands.look import look
 from cockpit.commands.person import arm, disarm, reset, status, stop
-from cockpit.commands.pictures import plot, reproduce, stability
+from cockpit.commands.pictures import plot, reproduce, review, stability
 from cockpit.commands.processes import controller, plant, record
 from cockpit.commands.replay import replay_command
 from cockpit.commands.run import run
 from cockpit.commands.scenarios import scenarios
 from cockpit.commands.schema import schema
+from cockpit.commands.stress.fault import fault
+from cockpit.commands.stress.soak import soak
 from cockpit.run.child_process import guarded, prepare_stdout
 
 app = typer.Typer(
@@ -59,6 +62,13 @@ app.command("stop")(stop)
 app.command("reset")(reset)
 app.command("status")(status)
 app.command(
+    "fault",
+    epilog=_examples(
+        "stickslip fault --list", "stickslip fault base-accel-half --for 5", "stickslip fault controller-frozen-2-s"
+    ),
+)(fault)
+app.command("soak", epilog=_examples("stickslip soak --hours 1 --report soak.md", "stickslip soak --minutes 3"))(soak)
+app.command(
     "certs",
     epilog=_examples(
         "stickslip certs ~/.config/stickslip/certificates --host rig.lab",
@@ -77,9 +87,18 @@ app.command(
 app.command(
     "plot",
     epilog=_examples(
-        "stickslip plot runs/paper-c45-c45.mcap", "stickslip plot runs/paper-c45-c45.mcap --out figure.pdf"
+        "stickslip plot runs/paper-c45-c45.mcap",
+        "stickslip plot runs/paper-c45-c45.mcap --out figure.pdf --style paper --from 7s --to 10s --data figure.csv",
+        "stickslip plot runs/a.mcap --vs runs/b.mcap --signals drive_force_N,amplitude_m --out both.svg",
     ),
 )(plot)
+app.command(
+    "review",
+    epilog=_examples(
+        "stickslip review runs/paper-c45-c45.mcap",
+        "stickslip review runs/before.mcap runs/after.mcap --out compared.html",
+    ),
+)(review)
 app.command("map")(stability)
 app.command(
     "diagnose",
@@ -90,6 +109,14 @@ app.command(
         "stickslip diagnose evidence/ --jobs 2 --report reports",
     ),
 )(diagnose)
+app.command(
+    "look",
+    epilog=_examples(
+        "stickslip look tribometer.csv",
+        "stickslip look tribometer.csv --speed 0.5mm/s --load 94.5N --out look.html --out slips.xlsx",
+        "stickslip look tribometer.csv --out map.toml",
+    ),
+)(look)
 app.command("example", epilog=_examples("stickslip example runs/example", "stickslip diagnose runs/example"))(example)
 app.add_typer(
     log_app,

@@ -12,6 +12,7 @@ probe          fading out, to see whether vibration is needed at all
 failures       slips in spite of all that can be done, and that it is said
 policy         the wanted v_a
 amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
+trips/         what is taken for a fault of a sensor or the exciter, and what is done then
 limits         the allowed vibration
 core           one step of all of these
 telemetry      the state for plots and the memory for replay

@@ -9,6 +9,9 @@ import math
 
 from bridge.kernel import Record, kernel
 from controller.codes import CHECKING, HELD, PIEZO_WEAK
+from controller.trips.band import banded, is_known, note_known
+from controller.trips.delivered import is_even, note_command
+from controller.trips.doubts import ACCELEROMETER
 
 TWO_PI = 2.0 * math.pi
 REMEMBERED = 512  # steps of the command: 0.1 s of blocks of 0.25 ms
@@ -39,6 +42,7 @@ def listen(p: Record, s: Record) -> None:
     delay = s.loop_delay_steps if s.loop_delay_steps >= 0 else 0
     sent_m = s.sent_m[(at - 1 - delay) % REMEMBERED]
     expected_mps = TWO_PI * s.allowed_Hz * sent_m
+    note_command(s, expected_mps)
     s.expected_mps += p.filter_share * (expected_mps - s.expected_mps)
     silent = s.allowed_m == 0.0 and s.guard_state != CHECKING  # the rig's own check vibrates
     s.silent_steps = s.silent_steps + 1 if silent else 0
@@ -56,7 +60,8 @@ def listen(p: Record, s: Record) -> None:
     s.heard_steps = s.heard_steps + 1 if heard and s.listening == 0 else 0
     # a command that came late once may come earlier or later the next time, by half of its delay and more
     unsteady_steps = s.loop_delay_steps // 2
-    if s.heard_steps < max(p.settle_steps, unsteady_steps) or s.demodulated_Hz != s.allowed_Hz:
+    doubted = s.doubted & ACCELEROMETER != 0
+    if s.heard_steps < max(p.settle_steps, unsteady_steps) or s.demodulated_Hz != s.allowed_Hz or doubted:
         s.loud_steps = 0
         return
     i = s.candidate
@@ -66,6 +71,8 @@ def listen(p: Record, s: Record) -> None:
         now = math.log(s.vibration_velocity_mps / s.expected_mps)
         share = min(p.learn_share, 1.0 / (1.0 + unsteady_steps))
         s.log_gain[i] += share * (_bounded(now) - s.log_gain[i])
+        if is_even(p, s) and not is_known(p, s, i):
+            note_known(p, s, i, math.exp(now))
     _hold_down(p, s, i, expected_mps)
 
 
@@ -118,19 +125,23 @@ def amplitude(p: Record, s: Record) -> None:
         _judge_piezo(p, s, weak=False)
         return
     model_m = velocity_mps / (TWO_PI * s.wanted_Hz)
-    if s.gain_known[s.candidate] == 1:
+    doubted = s.doubted & ACCELEROMETER != 0
+    if doubted and s.known_steps[s.candidate] > 0:
+        s.wanted_m = model_m / s.known_gain[s.candidate]
+    elif s.gain_known[s.candidate] == 1:
         s.wanted_m = model_m * math.exp(-s.log_gain[s.candidate])
     else:
         delay_s = _UNKNOWN_DELAY_S if s.loop_delay_steps < 0 else (s.loop_delay_steps + 1) * p.block_s + SETTLE_S
         if s.heard_steps == 0:  # what is heard is believed first: as much again is on its way
             s.growth = min(s.growth * _GROWTH ** (p.block_s / delay_s), 1.0)
         s.wanted_m = model_m * s.growth
+    s.wanted_m = banded(p, s, s.wanted_m, model_m)
     largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz))
     settled = s.free_steps > s.loop_delay_steps + p.settle_steps
     tried = s.growth >= 1.0 or s.gain_known[s.candidate] == 1
     unheard = settled and tried and s.vibration_velocity_mps < 0.02 * velocity_mps
-    s.at_limit = 1 if s.wanted_m > largest_m or unheard else 0
-    weak = (s.at_limit == 1 or unheard) and s.vibration_velocity_mps < _ALARM_RATIO * s.held_mps
+    s.at_limit = 1 if s.wanted_m > largest_m or unheard or s.banded == 1 or doubted else 0
+    weak = s.at_limit == 1 and not doubted and s.vibration_velocity_mps < _ALARM_RATIO * s.held_mps
     _judge_piezo(p, s, weak)
 
 

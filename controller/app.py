@@ -1,12 +1,12 @@
 """The controller process: blocks in, commands out. The command leaves first; all other messages follow."""
 
 import threading
-import time
 from collections.abc import Callable
 
 from bridge.faults import Fault
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.clock import time
 from bridge.wire.complaints import FOREIGN
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import (
@@ -24,11 +24,11 @@ from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
 from controller.doubts import Doubts
 from controller.node import ControllerNode
-from controller.rig_header import refuse_another_rig
+from controller.rig_header import RigAgain, refuse_another_rig
 
 # Blocks that may wait for the controller. Too small: a short pause loses blocks. Larger: commands answer older blocks.
 # A step with its messages takes 0.04 ms (median of Trace.lateness_ns), so 256 blocks are answered within 11 ms.
-_INBOX_LIMIT = 256
+INBOX_LIMIT = 256
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
 _GIVEN_UP_S = 30.0  # without a rig this process ends then, as long as one waits for a rig at the start
 _HEADER_S = 1.0  # longest wait for what the rig says of itself; one that says nothing costs all of it
@@ -59,7 +59,7 @@ def run(
     node.warm_up()
     with Bus(bus_config, "controller", lockstep, stop) as bus:
         bus.serve_header(header)
-        process = _Process(config, node, bus, lockstep)
+        process = ControllerProcess(config, node, bus, lockstep)
         process.prepare()
         _refuse_a_second(bus, bus_config.endpoint)
         refuse_another_rig(bus.headers(["plant"], _HEADER_S, stop).get("plant"), config)
@@ -93,20 +93,33 @@ def _refuse_a_second(bus: Bus, endpoint: str) -> None:
             raise Fault("ENDPOINT_BUSY", f"{line}; end that one, or choose another --endpoint or --prefix")
 
 
-class _Process:
-    def __init__(self, config: ControllerConfig, node: ControllerNode, bus: Bus, lockstep: bool) -> None:
+class ControllerProcess:
+    """The loop of a controller on a bus.
+
+    Args:
+        config, node: the controller.
+        bus: its session.
+        lockstep: whether each block waits for its command.
+        inbox: where its messages wait, if it is not one of its own.
+
+    """
+
+    def __init__(
+        self, config: ControllerConfig, node: ControllerNode, bus: Bus, lockstep: bool, inbox: Inbox | None = None
+    ) -> None:
         self._node = node
         self._bus = bus
         self._lockstep = lockstep
         self._block_s = config.block_s
         self._stale_after_s = config.limits.stale_after_s
-        self._inbox = Inbox(_INBOX_LIMIT)
+        self._inbox = inbox or Inbox(INBOX_LIMIT)
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
-        self._doubts = Doubts(node, self._inbox, self.event)
+        self._doubts = Doubts(node, self._inbox, self.event, lockstep)
         self._said_s: dict[str, float] = {}  # what operators were answered within the last second, and when
         self._end_said_s: float | None = None
         self._restarts = 0
+        self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
         self._rig_lost = ""  # why, from when it was told until blocks come again
         self._owed_due_s = 0.0
@@ -125,6 +138,9 @@ class _Process:
         self._bus.listen(ANNOUNCE, self._inbox.keep)
         for topic in (PLANT_EVENT, OPERATOR):
             self._bus.listen(topic, self._inbox.keep)
+
+    def _rig_header(self) -> wire.Header | None:
+        return self._bus.headers(["plant"], _HEADER_S, threading.Event()).get("plant")
 
     def event(self, code: str, text: str) -> None:
         """Publish an event with a code and a text."""
@@ -172,10 +188,12 @@ class _Process:
                         # now, as the plant sends its first block only when the recorder listens
                         self.event("START", granted)
                 self._doubts.look()
+                self._rig_again.refuse()
             if realtime.was_paused(waited_until_s, waited_until_s):
                 self._tell_own_pause(time.monotonic() - waited_until_s)
                 heard_s = time.monotonic()
-            if time.monotonic() < due_s:
+            # a rig that has left wakes nobody: it is known at the latest when its next block does not come
+            if time.monotonic() < due_s or self._ended:
                 continue
             self._mind_the_plant(heard_s)
             if started and not self._lockstep:
@@ -245,6 +263,8 @@ class _Process:
             command = node.block(received.payload, received.arrival_ns)
             if command is not None:
                 self._send[COMMAND.name](command.payload)
+                if not self._lockstep:
+                    realtime.let_the_bus_send()
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
                 self._tell_of_block(before)
             return command is not None
@@ -260,6 +280,8 @@ class _Process:
         """Tell what the block that was just answered shows; `before` is the number of the one before it."""
         node = self._node
         self._tell_unreadable()
+        for code, text in node.news():
+            self.event(code, text)
         if node.slipped_unmoved:
             text = f"block {node.last_block}: a slip, while the drive position stands: {_UNSEEN}"
             self._doubts.complaints.note("DRIVE_UNSEEN", SENSORS.name, text)
@@ -267,6 +289,7 @@ class _Process:
             self._restarts = node.restarts
             text = f"block {node.last_block} after block {before}: taken up again, windows begin anew"
             self._tell_later("RIG_RESTARTED", text)
+            self._rig_again.begin()
         if self._rig_lost:  # why is said again, as nobody heard it while the link was down
             self._tell_later("RIG_BACK", f"blocks come again, from block {node.last_block} on; {self._rig_lost}")
             self._rig_lost = ""

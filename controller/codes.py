@@ -29,6 +29,14 @@ BLIND, CANNOT_HELP, HARMFUL, MOVING, START_OF_MOVE, SETTLING, NEEDED_BEFORE = (
     )
 )
 NOT_ARMED = int(wire.NOT_ARMED)
+OPEN_LOOP, CLIPPED, SWAPPED, FROZEN, RESONANCE, FORCE_DOUBTED, DRIVE_DOUBTED, TRAVEL_END, NOISE = (
+    int(reason)
+    for reason in (
+        *(wire.OPEN_LOOP, wire.CLIPPED, wire.SWAPPED, wire.FROZEN, wire.RESONANCE),
+        *(wire.FORCE_DOUBTED, wire.DRIVE_DOUBTED, wire.TRAVEL_END, wire.NOISE),
+    )
+)
+GAIN_LIMIT, HELD_OPEN_LOOP, NO_DRIVE = (int(limit) for limit in (wire.GAIN_LIMIT, wire.HELD_OPEN_LOOP, wire.NO_DRIVE))
 NO_GUARD, CHECKING, ARMED, ACTIVE = (int(state) for state in (wire.NO_GUARD, wire.CHECKING, wire.ARMED, wire.ACTIVE))
 
 # bits of a frame's events, as Trace.events
@@ -38,3 +46,4 @@ STALE = 4
 STOP = 8
 RESET = 16
 ANNOUNCED = 32
+LATE = 64

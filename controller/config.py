@@ -65,6 +65,16 @@ class AmplitudeConfig(Strict):
     gone = {"gain": "the exciter's gain is learnt"}
 
     filter_s: Positive = Field(default=0.005, description="Time constant of the demodulated amplitude.")
+    gain_band: Annotated[float, Field(ge=1.1, le=3.0)] = Field(
+        default=1.4,
+        description="Factor by which the exciter's gain may change either way. The stroke is never more than this times what "
+        "the known gain asks for; beyond it the accelerometer is doubted.",
+    )
+    known_gain: Positive | None = Field(
+        default=None,
+        description="Delivered over commanded v_a of the exciter as it is mounted, the same at every frequency. Not given: as "
+        "measured when it first vibrates.",
+    )
     accel_bandwidth_Hz: Positive = Field(
         default=10000.0,
         description="Of the base accelerometer; its roll-off at the vibration's frequency is corrected.",
@@ -86,6 +96,10 @@ class LimitsConfig(Strict):
     # the carrier of the displacement transducers is 4.8 kHz: a vibration near it beats with it
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
         default=[(4600.0, 5000.0)], description="Bands [low, high] in which nothing is vibrated."
+    )
+    travel_m: Two | None = Field(
+        default=None,
+        description="Lowest and highest place of the drive in which it is vibrated. Not given: everywhere.",
     )
     # silence after which the vibration ramps down: longer vibrates a rig that has frozen, shorter ramps down for a late block
     stale_after_s: Annotated[float, Field(gt=0, le=5.0)] = Field(
@@ -126,6 +140,8 @@ class ControllerConfig(Strict):
                 f"limits.stale_after_s = {limits.stale_after_s:g}: must hold {_FEWEST_SILENT_BLOCKS} blocks of "
                 f"{self.block_s:g} s, or every block comes too late; raise it"
             )
+        if limits.travel_m is not None and limits.travel_m[1] <= limits.travel_m[0]:
+            raise ValueError(f"limits.travel_m = {list(limits.travel_m)}: the second must be above the first")
         for low, high in limits.forbidden_Hz:
             if high <= low:
                 raise ValueError(f"limits.forbidden_Hz: [{low}, {high}]: the second must be above the first")

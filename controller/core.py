@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
 from controller.amplitude import FIRST_SHARE, REMEMBERED, amplitude, listen
-from controller.codes import BLOCK
+from controller.codes import BLOCK, LATE
 from controller.estimate.contact import contact
 from controller.estimate.learning import begin, forces, spring, stiffness
 from controller.estimate.motion import drive_velocity
@@ -15,6 +15,9 @@ from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, begin_anew, n
 from controller.limits import allow
 from controller.needs.need import way_of
 from controller.policy import decide
+from controller.trips.band import begin_known
+from controller.trips.doubts import end_trips
+from controller.trips.watch import restrain, told_reason, watch
 from controller.vibration import measure, skip
 
 _STEPS_LOOK = 16  # blocks for one look at the resolution, which does not change
@@ -37,7 +40,7 @@ def step(
     Args:
         params, state: one record each of `controller.records.PARAMS` and `STATE`.
         sensors: one sensor block; not read when `events` has no BLOCK.
-        events: bits of `controller.codes`: BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED.
+        events: bits of `controller.codes`: BLOCK, GAP, STALE, STOP, RESET, ANNOUNCED, LATE.
         gap_blocks: number of lost blocks just before this block.
         t_ns: time of the frame.
         command, trace: one message record each; all is filled except the trace's lateness.
@@ -47,6 +50,7 @@ def step(
     s: Record = state[0]
     if s.steps == 0:
         _begin(p, s)
+    end_trips(p, s, events)
     force_N = 0.0
     usable = True
     if events & BLOCK:
@@ -63,7 +67,11 @@ def step(
             measure(p, s, block.base_accel_mps2)
             listen(p, s)
             force_N = _look(p, s, block)
+            if events & LATE:
+                s.even_steps = 0  # what was commanded lately is not what this block shows
+            watch(p, s, block)
             decide(p, s, t_ns, force_N, p.block_s)
+            restrain(p, s)
             amplitude(p, s)
     allow(p, s, events, s.wanted_Hz, s.wanted_m if usable else math.nan)
     s.sent_m[s.steps % REMEMBERED] = s.allowed_m
@@ -76,7 +84,7 @@ def step(
     c.amplitude_m = s.allowed_m
     c.mode = s.mode
     c.limit = s.limit
-    c.reason = s.reason
+    c.reason = told_reason(s)
     c.run = s.run
 
     t: Record = trace[0]
@@ -87,7 +95,7 @@ def step(
     t.gap_blocks = gap_blocks
     t.state = s.contact
     t.mode = s.mode
-    t.reason = s.reason
+    t.reason = c.reason
     t.limit = s.limit
     t.slips = s.slips
     t.score = s.score
@@ -119,6 +127,8 @@ def step(
 def _begin(p: Record, s: Record) -> None:
     """What of the memory is not zero at the start."""
     begin(p, s)
+    begin_known(p, s)
+    s.followed = -1
     s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
     s.silent_steps = p.silence_steps  # nothing was ever commanded
     s.level, s.swing_level = -1, -1

@@ -6,6 +6,9 @@ from bridge.kernel import Record, kernel
 from controller.codes import (
     BLOCK,
     FREQUENCY_BAND,
+    GAIN_LIMIT,
+    HELD_OPEN_LOOP,
+    NO_DRIVE,
     NO_LIMIT,
     NOT_FINITE,
     OPERATOR_STOP,
@@ -16,6 +19,7 @@ from controller.codes import (
     STALE_INPUT,
     STOP,
 )
+from controller.trips.doubts import ACCELEROMETER, DRIVE
 
 TWO_PI = 2.0 * math.pi
 
@@ -80,5 +84,19 @@ def allow(p: Record, s: Record, events: int, wanted_Hz: float, wanted_m: float) 
     if slewed_m != target_m and limit == NO_LIMIT:
         limit = SLEW
     s.allowed_m = slewed_m
+    if limit == NO_LIMIT:
+        limit = _of_trips(s)
     s.limit = limit
     s.free_steps = s.free_steps + 1 if limit == NO_LIMIT else 0
+
+
+@kernel
+def _of_trips(s: Record) -> int:
+    """What holds the amplitude back because of what is doubted."""
+    if s.doubted & DRIVE:
+        return NO_DRIVE
+    if s.wanted_m == 0.0:
+        return NO_LIMIT
+    if s.doubted & ACCELEROMETER:
+        return HELD_OPEN_LOOP
+    return GAIN_LIMIT if s.banded == 1 else NO_LIMIT

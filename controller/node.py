@@ -13,11 +13,13 @@ from bridge.wire.messages import sensor_block
 from bridge.wire.payloads import sequence_and_time
 from bridge.wire.topics import ANNOUNCE, COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
 from controller.announced import take_announcement
-from controller.codes import ANNOUNCED, BLOCK, GAP, RESET, STALE, STOP
+from controller.codes import ANNOUNCED, BLOCK, GAP, LATE, RESET, STALE, STOP
 from controller.config import ControllerConfig
 from controller.core import step
 from controller.records import build
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
+from controller.trips.age import MARGIN_NS, Age
+from controller.trips.tell import TripTeller
 
 _ANEW_BLOCKS = 1024  # that count as lost before the first block of a rig that was restarted: every window begins anew
 _MOST_GAP_BLOCKS = 1 << 20  # lost blocks that are counted at once; more do not fit into a trace
@@ -52,6 +54,8 @@ class ControllerNode:
         self._wrong_lengths_ns: list[int] = []
         self._operator_events = 0
         self._announced = 0  # the bit ANNOUNCED where announcements came since the last frame
+        self._teller = TripTeller()
+        self.age = Age()
         self.slipped_unmoved = False  # in the last step a slip began while the drive position stood
 
     @property
@@ -134,9 +138,14 @@ class ControllerNode:
             gap_blocks = min(lost, _MOST_GAP_BLOCKS)
             if expected is not None:
                 self._check_clock(t_ns - self.block_t_ns, lost)
+        if verdict is Verdict.ANEW or self.clock_jump_ns:
+            self.age.forget()
+        self.age.note(arrival_ns, t_ns)
         self.block_t_ns = self.t_ns = t_ns
         sensors = self._layout.record(payload)
-        events = BLOCK | (GAP if gap_blocks else 0) | self._operator_events
+        events = (
+            BLOCK | (GAP if gap_blocks else 0) | (LATE if self.age.late_ns > MARGIN_NS else 0) | self._operator_events
+        )
         return self._step(sensors, events, gap_blocks)
 
     def _check_clock(self, apart_ns: int, lost: int) -> None:
@@ -171,6 +180,10 @@ class ControllerNode:
         self.steps += 1
         self.slipped_unmoved = state.slips > slips_before and state.moving == 0
         return Outgoing(COMMAND, self._command.tobytes())
+
+    def news(self) -> list[tuple[str, str]]:
+        """Codes and texts of trips and limits that the last step began, or ended."""
+        return self._teller.news(self._trace[0])
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
         """The messages after the command: the trace, and at their rates the plotted state and a snapshot of the memory."""

@@ -37,13 +37,14 @@ from controller.codes import (
 from controller.config import MODES
 from controller.frequency import cheapest
 from controller.modes import enter, excite, stop_helping, tune_to
-from controller.needs.failures import forget_failures, note_failure
+from controller.needs.failures import forget_failures, note_failure, note_lesson
 from controller.needs.need import (
     follow_swing,
     grows,
     is_needed,
     is_needless,
     is_wound_up,
+    needless_from_mps,
     note_needed,
     raise_ratio,
     settling_s,
@@ -63,6 +64,9 @@ _RISING = 1.05  # held over measured v_d up to which the drive does not slow dow
 _ABOVE_SLIDE, _FASTEST = 1.1, 1.6  # v_a over v_s of a slide that is late, up to this share of v_d
 _TURNING_S = 0.05  # that a drive stands at most where it turns
 _STARTING_S = 0.15  # of a vibration in which the contact still lets go of what it held
+_REAL_STICK = (
+    0.25  # of the expected stick, after which the force is 5 % up: from then on it contradicts that none is needed
+)
 _CALM_SHARE = 6.0  # sticks, as long as expected, without an event until the vibration counts as one that helps
 _LEAST_CALM_S, _MOST_CALM_S = 0.5, 4.0
 _LOOK_STEPS = 16  # blocks for one look at which windows show a swing
@@ -205,11 +209,16 @@ def _watch(p: Record, s: Record, way: int, speed_mps: float, ahead_mps: float, b
         excite(p, s, BLIND, p.v_ratio)
     elif is_needed(s, speed_mps):
         excite(p, s, NEEDED_BEFORE, 0.0)
-    elif s.needless_from_mps[way] > 0.0 and not steady:
+    elif needless_from_mps(s) > 0.0 and not steady:
         pass  # a pair that did without may stick while the drive speeds up or slows down
     elif s.slip_began == 1 or (s.contact == STICK and not is_needless(s, speed_mps)):
         excite(p, s, STICK_SEEN, p.v_ratio)
-    elif s.stick_began == 1 and s.slid_s > max(s.expected_stick_s, STEADY_S):  # it slid at this speed, and sticks again
+    # it slid at this speed, and sticks again: for longer than a slide that only swings on its spring is slow
+    elif (
+        s.contact == STICK
+        and s.stick_s > _REAL_STICK * s.expected_stick_s
+        and s.slid_s > max(s.expected_stick_s, STEADY_S)
+    ):
         note_needed(s, speed_mps)
         excite(p, s, STICK_SEEN, p.v_ratio)
     s.slid_s = s.slid_s + block_s if s.contact == SMOOTH and steady else 0.0 if not steady else s.slid_s
@@ -232,8 +241,9 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
         s.waiting_s = STEADY_S
         note_failure(s)
     if s.mode_s > starting_s and begun and s.waiting_s == 0.0:
-        if s.slip_began == 1 and s.steady_s > STEADY_S:
+        if s.slip_began == 1:
             note_needed(s, speed_mps)
+            note_lesson(s)
         s.waiting_s = max(0.05, 3.0 * s.window_s, 2.0 * max(s.loop_delay_steps, 0) * block_s)
         _more(p, s, way, _SLIP_STEP if s.slip_began == 1 else _STICK_STEP)
         if s.mode != EXCITE:

@@ -19,6 +19,7 @@ from controller.config import (
     forbidden_bands_Hz,
 )
 from controller.estimate.windows import BINS, LEVELS, ROWS
+from controller.trips import band, delivered, doubts, frozen, spring
 
 _BIN_S = 1e-4  # shortest bin: a window of four sees the slips of a drive of 50 N/um
 _TICK_S = 1e-3  # the contact is judged so often, whatever the length of a block
@@ -35,6 +36,7 @@ _PARAMS_FLOATS = (
     *("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
     *("least_ratio", "most_ratio", "start_s", "settle_s"),
     *("filter_share", "learn_share", "accel_bandwidth_Hz", "accel_range_mps2"),
+    *("gain_band", "told_gain", "follow_share", "travel_low_m", "travel_high_m"),
     *("v_ratio", "amplitude_max_m", "velocity_max_mps", "slew_m_per_step", "frequency_min_Hz", "frequency_max_Hz"),
 )
 _PARAMS_INTS = (
@@ -47,6 +49,16 @@ _PARAMS_INTS = (
     ),
     *("use_force", "use_slide_position", "mode", "enabled_from_ns", "candidates", "bands"),
     *("silence_steps", "settle_steps", "loud_steps"),
+    *(
+        "known_steps",
+        "low_steps",
+        "high_steps",
+        "passed_steps",
+        "frozen_steps",
+        "spring_level",
+        "broken_steps",
+        "first_steps",
+    ),
 )
 PARAMS = np.dtype(
     [(name, "f8") for name in _PARAMS_FLOATS]
@@ -69,6 +81,8 @@ STATE = np.dtype(
             "f8",
             (ROWS, LEVELS),
         ),  # of a slope: sigma, or that of a shorter window carried on, and the resolution; 0: unknown
+        ("law_mps", "f8", (LEVELS,)),  # sigma of the slope of x_s + F / k_d - x_d, which is 0 but for noise
+        ("agreements", "i8", (LEVELS,)),  # that it was learnt from
         ("pushed", "i8", (LEVELS,)),
         ("differences", "i8", (LEVELS,)),  # that sigma was learnt from
         ("resolution", "f8", (ROWS,)),
@@ -196,6 +210,37 @@ STATE = np.dtype(
         ("loop_delay_steps", "i8"),  # -1 while unknown
         ("at_limit", "i8"),
         ("weak_s", "f8"),  # for which the piezo was too weak; below 0: for which it was not
+        # trips
+        ("trip", "i8"),  # Reason of the first that holds; 0: none
+        ("doubted", "i8"),  # bits of `controller.trips.doubts`
+        ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a, and the steps that it is a mean of
+        ("known_steps", "i8", (MOST_CANDIDATES,)),
+        ("banded", "i8"),  # whether the band holds the amplitude back
+        ("even_steps", "i8"),  # for which the command that is heard has been even
+        ("followed", "i8"),  # candidate of the next
+        ("followed_gain", "f8"),  # as measured, over a second
+        ("low_steps", "i8"),
+        ("high_steps", "i8"),  # of too much v_a; below 0: told, and so long until it is over
+        ("rest_mps2_2", "f8"),  # mean square beside the sine, over a second
+        ("rest_steps", "i8"),  # for which there is far more of it
+        ("kept_mps", "f8", (ROWS,)),  # of slide and drive, when they last kept the spring's law
+        ("kept_N_per_m", "f8"),  # stiffness then
+        ("broken_steps", "i8"),  # for which the law is broken
+        ("broken_drive", "i8"),  # of them, those in which the drive is what changed, less the others
+        ("spring_level", "i8"),  # windows that show it
+        ("bend_m", "f8"),  # of the drive's place from sample to sample, mean
+        ("bent", "i8"),  # looks in a row with much more of it
+        ("slip_count", "f8"),  # in the last second
+        ("unbelieved_s", "f8"),  # for which slips count as noise
+        ("noise_told_s", "f8"),  # for which it is told that noise became larger
+        ("outside", "i8"),  # whether the drive is outside of its travel
+        ("first_sample", "f8", (doubts.CHANNELS,)),
+        ("seen_block", "i8"),  # that these are of
+        ("first_seen", "i8"),
+        ("same_steps", "i8", (doubts.CHANNELS,)),
+        ("lively", "f8", (doubts.CHANNELS, 2)),  # share of looks that showed noise, at rest and in motion
+        ("looks", "i8", (doubts.CHANNELS, 2)),
+        ("looked", "i8"),  # looks at any channel
         # limits
         ("allowed_Hz", "f8"),
         ("allowed_m", "f8"),
@@ -253,6 +298,17 @@ def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]
     p.filter_share = 1.0 - math.exp(-config.block_s / amplitude.filter_s)
     p.learn_share = config.block_s / (config.block_s + LEARN_S)
     p.silence_steps, p.settle_steps, p.loud_steps = steps(SILENCE_S), steps(SETTLE_S), steps(LOUD_S)
+    p.spring_level = max(math.ceil(math.log2(spring.SHORTEST_S / (BINS * p.bin_s))), 0)
+    p.travel_low_m, p.travel_high_m = limits.travel_m or (-math.inf, math.inf)
+    p.broken_steps, p.first_steps = steps(spring.HOLD_S), max(steps(spring.FIRST_S), delivered.SOME)
+    p.told_gain = amplitude.known_gain or 0.0
+    p.gain_band, p.follow_share = amplitude.gain_band, min(delivered.SOME * config.block_s / delivered.FOLLOW_S, 1.0)
+    p.known_steps, p.low_steps, p.high_steps = (
+        steps(band.KNOWN_S),
+        steps(delivered.HOLD_S),
+        steps(delivered.LOUD_HOLD_S),
+    )
+    p.passed_steps, p.frozen_steps = steps(delivered.PASSED_S), max(steps(frozen.HOLD_S), frozen.FEWEST)
     p.accel_range_mps2 = amplitude.accel_range_mps2
     p.accel_bandwidth_Hz = amplitude.accel_bandwidth_Hz
     for name in ("v_ratio", "amplitude_max_m", "velocity_max_mps", "frequency_min_Hz", "frequency_max_Hz"):
@@ -263,6 +319,6 @@ def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]
     p.candidate_Hz[: len(candidates)] = candidates
     bands = forbidden_bands_Hz(limits)
     p.bands = len(bands)
-    for row, band in enumerate(bands):
-        p.band_Hz[row] = band
+    for row, ends_Hz in enumerate(bands):
+        p.band_Hz[row] = ends_Hz
     return params, record(STATE)

@@ -2,6 +2,8 @@
 
 import contextlib
 import json
+import threading
+from collections.abc import Callable
 from typing import Any
 
 from bridge.faults import Fault
@@ -29,3 +31,33 @@ def refuse_another_rig(header: wire.Header | None, config: ControllerConfig) -> 
         if isinstance(theirs, int | float) and abs(theirs - ours) > 0.01 * ours:
             line = f"header/plant: rig.solver.{name} = {theirs:g}: must be controller.{name} = {ours:g}"
             raise Fault("CONFIG", f"{line}; set both to the same number")
+
+
+class RigAgain:
+    """Asks a rig that began anew what it is, beside the loop, which waits for no answer.
+
+    Args:
+        ask: what the rig says of itself; None where it says nothing. It may take a second.
+        config: of the controller.
+
+    """
+
+    def __init__(self, ask: Callable[[], wire.Header | None], config: ControllerConfig) -> None:
+        self._ask = ask
+        self._config = config
+        self._refusal: Fault | None = None
+
+    def begin(self) -> None:
+        """Ask now; the answer comes by itself."""
+        threading.Thread(target=self._compare, name="rig again", daemon=True).start()
+
+    def refuse(self) -> None:
+        """Raise the Fault of `refuse_another_rig` once an answer shows it."""
+        if self._refusal is not None:
+            raise self._refusal
+
+    def _compare(self) -> None:
+        try:
+            refuse_another_rig(self._ask(), self._config)
+        except Fault as fault:
+            self._refusal = fault

@@ -63,6 +63,13 @@ def _velocity(p: Record, frequency_Hz: float, in_phase_mps2: float, quadrature_m
 
 
 @kernel
+def velocity_of(p: Record, frequency_Hz: float, samples: Record) -> float:
+    """v_a of one block of an accelerometer [m/s], by itself."""
+    a, b = _fit(samples, TWO_PI * frequency_Hz * p.sample_s, 0.0)
+    return _velocity(p, frequency_Hz, a, b)
+
+
+@kernel
 def skip(p: Record, s: Record, blocks: int) -> None:
     """Turn the demodulator's phase through lost blocks, during which the exciter went on."""
     s.phase_rad = (s.phase_rad + TWO_PI * s.allowed_Hz * p.block_s * blocks) % TWO_PI

@@ -1,31 +1,37 @@
 """The plant process: the rig on the bus, paced to the wall clock or in lockstep with the controller."""
 
+import collections
 import secrets
 import threading
-import time
+from collections.abc import Sequence
 
 from bridge.faults import Fault
 from bridge.guard.codes import RESET, STOP
+from bridge.guard.config import wider
 from bridge.guard.latch import StopLatch
 from bridge.guard.received import Commands
 from bridge.guard.tell import Teller
 from bridge.plain import say
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.complaints import FOREIGN, Complaints
+from bridge.wire.clock import time
+from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
 from bridge.wire.payloads import parsed
-from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, OPERATOR, PLANT_EVENT, SENSORS
+from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, FAULT, OPERATOR, PLANT_EVENT, SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from plant.config import RigConfig
+from plant.faults.line import Message
+from plant.faults.orders import Orders
+from plant.faults.table import FaultTable
 from plant.node import PlantNode
 
-PEER_TIMEOUT_S = 30.0  # a first start compiles the controller's kernels
 _ANSWER_TIMEOUT_S = 5.0  # lockstep: longest wait for the command that answers a block
 _GOODBYE_S = 3.0  # longest wait for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
 _LONGEST_FADE_BLOCKS = 1000  # an exciter that does not come to rest within them never will
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
 _LINKS_S = 0.5  # for links to be made again: clients dial every 20 ms
+_ON_THE_WAY = 256  # commands of a block that a fault of the bus may take
 _PAUSE_NS = 250_000_000  # a block that is due and leaves so much later: this process stood still
 
 
@@ -40,24 +46,26 @@ def run(
     stop: threading.Event,
     arm: bool,
     latch: StopLatch | None,
+    faults: Sequence[FaultTable] = (),
 ) -> int:
     """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set; how many blocks.
 
     Args:
         arm: start ARMED, as a simulated rig may whose scenario says so.
         latch: where a person's stop is kept over restarts; None: nowhere, as in a run of `stickslip run`.
+        faults: that the rig and its bus have on purpose.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
 
     """
     why_not = latch.can_be_set() if latch is not None else ""
     run_number = 1 if lockstep else secrets.randbits(63) | 1  # in lockstep the same run gives the same log
-    node = PlantNode(rig, seed, run_number, arm and not why_not, latch is not None and latch.is_set)
+    node = PlantNode(rig, seed, run_number, arm and not why_not, latch is not None and latch.is_set, faults)
     node.warm_up()
     blocks = round(duration_s / rig.solver.block_s) if duration_s > 0 else 2**62
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
-        process = _Process(node, bus, latch)
+        process = PlantProcess(node, bus, latch)
         # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -65,12 +73,14 @@ def run(
         else:
             granted = realtime.claim(realtime.core(0))
         bus.announce()
-        wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
+        wait_for_peers(bus, bus_config, wait_for, stop)
         process.event("START", granted)
         if why_not:
             process.event(
                 "STATE_FOLDER", f"{why_not}: a stop cannot be kept over a restart, so nothing is armed by itself"
             )
+        if wide := wider(rig.guard):
+            process.event("WIDE_LIMITS", wide)
         advance = process.lockstep if lockstep else process.realtime
         advance(blocks, stop)
         process.end()
@@ -78,26 +88,38 @@ def run(
     return node.block
 
 
-def wait_for_peers(bus: Bus, endpoint: str, roles: list[str], stop: threading.Event) -> None:
+def wait_for_peers(bus: Bus, config: BusConfig, roles: list[str], stop: threading.Event) -> None:
     """Wait until all `roles` are on the bus, or `stop` is set. Raises Fault NO_PEER."""
-    until_s = time.monotonic() + PEER_TIMEOUT_S
+    until_s = time.monotonic() + config.wait_s
     missing = bus.wait_for(roles, 0.0)
     while missing and time.monotonic() < until_s and not stop.is_set():
         missing = bus.wait_for(roles, 0.2)
     if missing and not stop.is_set():
-        raise Fault("NO_PEER", f"{endpoint}: no {' and no '.join(sorted(missing))} within {PEER_TIMEOUT_S:g} s")
+        line = f"{config.endpoint}: no {' and no '.join(sorted(missing))} within {config.wait_s:g} s"
+        raise Fault("NO_PEER", f"{line}; start what is missing, or give it longer with --wait S")
 
 
-class _Process:
+class PlantProcess:
+    """The loop of a rig on a bus.
+
+    Args:
+        node: the rig.
+        bus: its session.
+        latch: where a person's stop is kept; None: nowhere.
+
+    """
+
     def __init__(self, node: PlantNode, bus: Bus, latch: StopLatch | None) -> None:
         self._node = node
         self._latch = latch
         self._teller = Teller()
-        self._words = Inbox(16)
+        self._words, self._orders = Inbox(16), Inbox(16)
+        self._injected = Orders(node.faults)
         self._bus = bus
         self._complaints = Complaints(self.event)
         self._commands = Commands(self._complaints)
         self._answers = Inbox(64)
+        self._on_the_way: collections.deque[Received] = collections.deque(maxlen=_ON_THE_WAY)
         self._events = 0
         self._paused = ""  # what is to be told of a pause
         self._paused_told_s = 0.0
@@ -107,9 +129,11 @@ class _Process:
         self._send_event = bus.publisher(PLANT_EVENT)
         bus.listen(COMMAND, self._receive)
         bus.listen(OPERATOR, self._words.push)
+        bus.listen(FAULT, self._orders.push)
 
     def _receive(self, received: Received) -> None:
-        self._commands.push(received)
+        # a fault of the bus takes them first, in the loop
+        (self._on_the_way.append if self._node.faults.on_the_bus else self._commands.push)(received)
         self._answers.push(received)
 
     def event(self, code: str, text: str) -> None:
@@ -130,6 +154,28 @@ class _Process:
         self._paused = f"this rig stood still for {late_ns * 1e-9:.2f} s; the blocks that were due followed at once"
         self._paused_told_s = time.monotonic() + _LINKS_S
 
+    def _send(self, sensors: bytes, applied: bytes, in_time: bool = False) -> None:
+        """Send the messages of a block, through the faults of the bus, if any act, and tell what is new."""
+        faults = self._node.faults
+        self._announce()
+        if faults.on_the_bus:
+            for message in faults.on_the_way("blocks", [Message(sensors)], self._node.block - 1):
+                self._send_sensors(message.payload)
+        else:
+            self._send_sensors(sensors)
+        if in_time:
+            realtime.let_the_bus_send()
+        self._send_applied(applied)
+        self._tell()
+        for code, text in faults.news():
+            self.event(code, text)
+
+    def _let_commands_arrive(self) -> None:
+        """Let a fault of the bus pass on the commands that it took."""
+        there = [Message(one.payload, one) for one in _taken(self._on_the_way)]
+        for message in self._node.faults.on_the_way("commands", there, self._node.block - 1):
+            self._commands.push(message.of._replace(payload=message.payload))
+
     def _announce(self) -> None:
         for message in self._node.announcements:
             self._send_announce(message.payload)
@@ -148,6 +194,14 @@ class _Process:
             if self._latch is not None and said.action in (STOP, RESET):
                 # in a thread, as a slow disk must not hold up the fade
                 threading.Thread(target=self._keep_word, args=(said.action, said.who), name="latch").start()
+
+    def _take_orders(self) -> None:
+        """Take the faults that a person asks for, from the block after the next on; what is none is told and dropped."""
+        while (received := self._orders.get_nowait()) is not None:
+            try:
+                self._injected.take(received.payload, self._node.block + 1)
+            except Fault as fault:
+                self._complaints.note(BAD_MESSAGE, FAULT.name, f"{fault.line.partition(': ')[2]}: dropped")
 
     def _keep_word(self, word: int, who: str) -> None:
         if self._latch is None:
@@ -185,9 +239,7 @@ class _Process:
                 return
             late_ns = pacer.wait(tick)
             sensors, applied = node.advance([], 0, 0, late_ns)
-            self._send_sensors(sensors.payload)
-            self._send_applied(applied.payload)
-            self._tell()
+            self._send(sensors.payload, applied.payload)
 
     def _advance_to(self, blocks: int, stop: threading.Event) -> None:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
@@ -198,6 +250,9 @@ class _Process:
             late_ns = pacer.wait(tick)
             tick += 1
             self._obey()
+            self._take_orders()
+            if node.faults.on_the_bus or self._on_the_way:
+                self._let_commands_arrive()
             commands: list[bytes] = []
             round_trip_ns = 0
             late_commands = 0
@@ -208,10 +263,7 @@ class _Process:
                     late_commands += round_trip_ns > _LATE_NS
             sensors, applied = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
-            self._announce()
-            self._send_sensors(sensors.payload)
-            self._send_applied(applied.payload)
-            self._tell()
+            self._send(sensors.payload, applied.payload, in_time=late_ns < node.block_ns)
             self._complaints.tell_when_due()
             if late_ns - late_before_ns > _PAUSE_NS:
                 self._note_pause(late_ns)
@@ -227,10 +279,7 @@ class _Process:
         while node.block < blocks and not stop.is_set():
             self._obey()
             sensors, applied = node.advance(commands)
-            self._announce()
-            self._send_sensors(sensors.payload)
-            self._send_applied(applied.payload)
-            self._tell()
+            self._send(sensors.payload, applied.payload)
             commands = [self._answer(node.block - 1, stop)]
 
     def _answer(self, block: int, stop: threading.Event) -> bytes:
@@ -245,3 +294,8 @@ class _Process:
         if stop.is_set():
             return b""
         raise Fault("LOCKSTEP_STALLED", f"block {block}: no command answered it within {_ANSWER_TIMEOUT_S:g} s")
+
+
+def _taken(there: collections.deque[Received]) -> list[Received]:
+    """All that waits, oldest first; a receiving thread may add more meanwhile."""
+    return [there.popleft() for _ in range(len(there))]

@@ -1,6 +1,7 @@
 """The rig as a participant of the bus: commands in, sensor blocks and the applied vibration out."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,12 @@ from bridge.wire.messages import CHANNELS, sensor_block
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
+from plant.faults.schedule import Faults
+from plant.faults.table import FaultTable
 from plant.inputs import Inputs, RigInputs
+from plant.piezo import base_velocity_mps
 from plant.records import NO_COMMAND, TRUTH, build, guard_records
-from plant.step import step
+from plant.step import act, report
 
 _VELOCITY = TRUTH.index("true_velocity_mps")
 _BATCH_BLOCKS = 64  # noise and drive velocity are drawn for so many blocks at once; fewer cost more time a block
@@ -34,10 +38,19 @@ class PlantNode:
         run: number that each command must carry.
         arm: start ARMED, as only a simulated rig may.
         stop_kept: start in FAULT, as a person's stop of an earlier run holds.
+        faults: that the rig has on purpose.
 
     """
 
-    def __init__(self, config: RigConfig, seed: int, run: int = 1, arm: bool = False, stop_kept: bool = False) -> None:
+    def __init__(
+        self,
+        config: RigConfig,
+        seed: int,
+        run: int = 1,
+        arm: bool = False,
+        stop_kept: bool = False,
+        faults: Sequence[FaultTable] = (),
+    ) -> None:
         self.block_ns = round(config.solver.block_s * 1e9)
         self.block = 0  # number of the next block
         self._config = config
@@ -45,6 +58,7 @@ class PlantNode:
         self._guard_params, self._guard_state = guard_records(config, run, arm, stop_kept)
         self._inputs = RigInputs(config, seed)
         samples = config.solver.samples_per_block
+        self.faults = Faults(faults, seed, config.solver.block_s, samples, self._params)
         self._analogue = np.empty((len(CHANNELS), samples))
         self.truth = np.empty((len(TRUTH), samples))  # of the last block, rows as plant.records.TRUTH
         nothing = np.zeros(1, np.int64)
@@ -66,10 +80,12 @@ class PlantNode:
         accept(self._guard_params[0], guard[0], self._command[0])
         expect_drive(guard[0], 0.0)
         obey(guard[0], LEAVE)
-        step(
-            self._params, self._state.copy(), self._guard_params, guard, 0.0, self._command, 0, 0, self._drawn.noise[0], 0, 0, 0,
-            self._analogue, self.truth, sensor_block(self._drawn.noise.shape[2]).blank(), APPLIED_LAYOUT.blank(),
+        state, sensors = self._state.copy(), sensor_block(self._drawn.noise.shape[2]).blank()
+        act(
+            self._params, state, self._guard_params, guard, 0.0, self._command, 0, 0, self._drawn.noise[0],
+            self._analogue, self.truth, sensors,
         )  # fmt: skip
+        report(self._params, state, self._guard_params, guard, 0, 0, 0, 0, sensors, APPLIED_LAYOUT.blank())
 
     def advance(
         self, commands: list[bytes], commands_late: int = 0, round_trip_ns: int = 0, late_ns: int = 0
@@ -81,6 +97,9 @@ class PlantNode:
         Raises Fault BAD_MESSAGE when the command cannot be read, CONFIG when the state becomes NaN or infinite, so that the
         rig cannot be stepped.
         """
+        faults = self.faults
+        if faults.busy:
+            faults.begin_block(self.block)
         accepted = 0
         for payload in commands:
             command = COMMAND_LAYOUT.read(payload, COMMAND.name)
@@ -97,11 +116,18 @@ class PlantNode:
         ]
         for row in range(first, self._announced):
             expect_drive(self._guard_state[0], announce[row].drive_velocity_mps)
-        step(
+        act(
             self._params, self._state, self._guard_params, self._guard_state, velocity_mps[at], self._command, accepted,
-            int(delay_blocks[at]), noise[at], commands_late, round_trip_ns, late_ns, self._analogue, self.truth,
+            int(delay_blocks[at]), noise[at], self._analogue, self.truth, self._sensors,
+        )  # fmt: skip
+        if faults.busy:
+            faults.spoil(self._sensors, self.block)
+        report(
+            self._params, self._state, self._guard_params, self._guard_state, accepted, commands_late, round_trip_ns, late_ns,
             self._sensors, self._applied,
         )  # fmt: skip
+        if faults.busy:
+            faults.misdate((self._sensors, self._applied), self.block)
         if not math.isfinite(self.truth[_VELOCITY, -1]):  # NaN anywhere in the state reaches the velocity within a step
             raise no_number(self._config, self.block)
         self.block += 1
@@ -121,6 +147,11 @@ class PlantNode:
         self._state["command_block"] = NO_COMMAND
         self._state["line_count"] = 0
         self.obey(LEAVE)
+
+    @property
+    def vibration_mps(self) -> float:
+        """The velocity amplitude v_a that the base truly has at the end of the last block [m/s]."""
+        return base_velocity_mps(self._params[0], self._state[0])
 
     @property
     def at_rest(self) -> bool:

@@ -81,3 +81,20 @@ class GuardConfig(Strict):
         if sorted(set(self.check_Hz)) != self.check_Hz:
             raise ValueError(f"check_Hz = {self.check_Hz}: must rise")
         return self
+
+
+_WEAKER_IF_LARGER = ("velocity_ratio", "loud_ratio", "band_hold_s", "drive_memory_s", "command_lost_s")
+
+
+def wider(config: GuardConfig) -> str:
+    """The limits that protect less than the defaults, in words; empty: none does."""
+    default = GuardConfig()
+    found: list[str] = []
+    for name in _WEAKER_IF_LARGER:
+        ours, theirs = getattr(config, name), getattr(default, name)
+        if isinstance(ours, Level):
+            parts = [(f"{name}.{part}", getattr(ours, part), getattr(theirs, part)) for part in Level.model_fields]
+        else:
+            parts = [(name, ours, theirs)]
+        found += [f"{key} = {value:g} (default {usual:g})" for key, value, usual in parts if value > usual]
+    return ", ".join(found)

@@ -2,12 +2,14 @@
 
 library, live            what every log begins with; whether one is being recorded
 mcap_chunks, runlog      writing in small chunks, so that a kill costs at most one chunk
+viewers                  topics for the viewers of other programs
 storage                  the files of a log: which they are, what is done where one fails, whether a byte was changed
 block_rows               the messages of many blocks as the bytes of a chunk
 screen                   which messages go into a log
 recorder                 the process that writes every message on the bus
 log_reader, logfile      reading without seeking, whole or cut; its topics as arrays
 chunk_messages           where the messages are in the bytes of chunks
+reading                  chunks of any compression, and the definitions of channels
 damage, recover          what could not be read; a cut log made whole
 log_check, topic_watch   faults of a log: all of them; those in the numbers and times of one topic
 signal_range             range, clipping and dead stretches of one signal, for logs and evidence

@@ -9,14 +9,15 @@ from mcap.opcode import Opcode
 
 from bridge.wire.messages import Records
 
-_FIELDS_BYTES = 22  # of a message record, between its length and its payload
+FIELDS_BYTES = 22  # of a message record, between its length and its payload
+HEAD_BYTES = 9 + FIELDS_BYTES  # with the opcode and the length itself
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 
 class Rows(NamedTuple):
     """The message records of a stretch of a chunk, and where they begin."""
 
-    data: bytes
+    data: memoryview  # of bytes
     entries: dict[int, npt.NDArray[Any]]  # by channel: log time [ns] and offset in `data` of each message
     first_ns: int
     last_ns: int
@@ -27,22 +28,26 @@ def _record(payload_bytes: int) -> np.dtype[Any]:
     return np.dtype([*head, ("publish_ns", "<u8"), ("payload", f"V{payload_bytes}")])
 
 
-def _fill(place: npt.NDArray[Any], channel: int, messages: Records) -> None:
+def _fill(place: npt.NDArray[Any], channel: int, messages: Records, log_ns: npt.NDArray[np.int64]) -> None:
     """Write message records into the places for them; `place` has the shape of their order."""
     payloads = messages.view(f"V{messages.dtype.itemsize}").reshape(place.shape)
     place["opcode"], place["channel"] = Opcode.MESSAGE, channel
-    place["length"] = _FIELDS_BYTES + messages.dtype.itemsize
+    place["length"] = FIELDS_BYTES + messages.dtype.itemsize
     place["sequence"] = (messages["sequence"] & 0xFFFFFFFF).reshape(place.shape)
-    place["log_ns"] = place["publish_ns"] = messages["t_ns"].reshape(place.shape)
+    place["publish_ns"] = messages["t_ns"].reshape(place.shape)
+    place["log_ns"] = log_ns.reshape(place.shape)
     place["payload"] = payloads
 
 
-def rows(each: Mapping[int, Records], after: Mapping[int, Records]) -> Rows:
-    """Lay messages out in order of time; the simulated time is their log time.
+def rows(
+    each: Mapping[int, Records], after: Mapping[int, Records], log_ns: npt.NDArray[np.int64] | None = None
+) -> Rows:
+    """Lay messages out in order of time.
 
     Args:
         each: by channel, the messages of topics that every block has, [blocks].
         after: by channel, those of topics that have one after every so many blocks, [blocks / so many]; may be empty.
+        log_ns: log time of the blocks, where `after` is empty; the time of the run if not given.
 
     """
     blocks = len(next(iter(each.values())))
@@ -50,7 +55,7 @@ def rows(each: Mapping[int, Records], after: Mapping[int, Records]) -> Rows:
     block = np.dtype([(str(channel), _record(table.dtype.itemsize)) for channel, table in each.items()])
     last = [(str(channel), _record(table.dtype.itemsize)) for channel, table in after.items()]
     group = np.dtype([("blocks", block, (blocks // groups,)), *last])
-    laid_out = np.zeros(groups, group)
+    laid_out = np.empty(groups, group)  # without gaps, and every place is filled
     starts = np.arange(groups, dtype=np.uint64) * np.uint64(group.itemsize)
     of_block = np.arange(blocks // groups, dtype=np.uint64) * np.uint64(block.itemsize)
     entries: dict[int, npt.NDArray[Any]] = {}
@@ -62,10 +67,11 @@ def rows(each: Mapping[int, Records], after: Mapping[int, Records]) -> Rows:
         *((channel, after[channel], laid_out[str(channel)], group, starts) for channel in after),
     ]
     for channel, messages, place, outer, offsets in places:
-        _fill(place, channel, messages)
+        log_times = messages["t_ns"] if log_ns is None else log_ns
+        _fill(place, channel, messages, log_times)
         fields: Any = outer.fields
         entries[channel] = np.empty(len(messages), _INDEX_ENTRY)
-        entries[channel]["log_time"] = messages["t_ns"]
+        entries[channel]["log_time"] = log_times
         entries[channel]["offset"] = (offsets + np.uint64(fields[str(channel)][1])).ravel()
-    times = next(iter(each.values()))["t_ns"]
-    return Rows(laid_out.tobytes(), entries, int(times[0]), int(times[-1]))
+    times = next(iter(each.values()))["t_ns"] if log_ns is None else log_ns
+    return Rows(laid_out.view(np.uint8).data, entries, int(times[0]), int(times[-1]))

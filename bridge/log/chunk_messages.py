@@ -29,10 +29,18 @@ Column = npt.NDArray[np.int64]
 
 
 class Chunked(NamedTuple):
-    """A chunk, uncompressed."""
+    """A chunk, uncompressed, or messages that stand in no chunk."""
 
     data: bytes
     indexes: list[bytes]  # contents of the index records after it, which may be missing, damaged or of another chunk
+
+
+class Walk(NamedTuple):
+    """What a walk through the records of a chunk met."""
+
+    offsets: Column  # of the messages
+    others: list[tuple[int, bytes]]  # opcode and content of the records that are no messages
+    broken: int  # stretches of bytes that are no whole record
 
 
 class Messages(NamedTuple):
@@ -42,6 +50,8 @@ class Messages(NamedTuple):
     heads: npt.NDArray[Any]  # [messages], with the fields length, channel, sequence, log_ns and publish_ns
     channel: Column  # of each, [messages]
     start: Column  # of the payload in `data`, [messages]
+    others: Sequence[tuple[int, bytes]] = ()  # records between them, definitions for the most part: opcode and content
+    broken: int = 0  # stretches of bytes between them that are no whole record
 
     def channels(self) -> list[int]:
         """The channels that have messages."""
@@ -64,7 +74,7 @@ class Messages(NamedTuple):
 
     def stacked(self, size: int) -> Bytes:
         """The payloads, all of this size, one below the other, [messages, size]."""
-        return _cut(self.data, self.start, size).view(np.uint8).reshape(-1, size)
+        return cut(self.data, self.start, size).view(np.uint8).reshape(-1, size)
 
 
 def messages_of(chunks: Sequence[Chunked]) -> Messages:
@@ -73,10 +83,15 @@ def messages_of(chunks: Sequence[Chunked]) -> Messages:
     begins = np.array([0, *accumulate(len(chunk.data) for chunk in chunks)])
     offsets = _indexed(chunks, begins)
     heads = _heads(data, offsets)
+    others: list[tuple[int, bytes]] = []
+    broken = 0
     if heads is None or not _tile(begins, offsets, heads):
-        offsets = np.concatenate([_walked(chunk.data) + begin for chunk, begin in zip(chunks, begins, strict=False)])
-        heads = _cut(data, offsets, _HEAD.itemsize).view(_HEAD)
-    return Messages(data, heads, heads["channel"].astype(np.int64), offsets + _HEAD.itemsize)
+        walks = [_walked(chunk.data) for chunk in chunks]
+        offsets = np.concatenate([walk.offsets + begin for walk, begin in zip(walks, begins, strict=False)])
+        heads = cut(data, offsets, _HEAD.itemsize).view(_HEAD)
+        others = [other for walk in walks for other in walk.others]
+        broken = sum(walk.broken for walk in walks)
+    return Messages(data, heads, heads["channel"].astype(np.int64), offsets + _HEAD.itemsize, others, broken)
 
 
 def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
@@ -95,7 +110,7 @@ def _heads(data: Bytes, offsets: Column) -> npt.NDArray[Any] | None:
     """The bytes at the offsets, read as heads of messages, [messages]; None where one lies outside of the data."""
     if not len(offsets) or offsets[0] < 0 or offsets[-1] > len(data) - _HEAD.itemsize:
         return None
-    return _cut(data, offsets, _HEAD.itemsize).view(_HEAD)
+    return cut(data, offsets, _HEAD.itemsize).view(_HEAD)
 
 
 def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
@@ -109,18 +124,26 @@ def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
     )
 
 
-def _walked(data: bytes) -> Column:
-    """Offsets of the messages of a chunk, found from record to record."""
+def _walked(data: bytes) -> Walk:
+    """The records of a chunk, found from one to the next."""
     found: list[int] = []
+    others: list[tuple[int, bytes]] = []
+    broken = 0
     at, end = 0, len(data)
-    while at + _RECORD.size <= end:
-        opcode, length = _RECORD.unpack_from(data, at)
-        if length > end - at - _RECORD.size:
+    while at < end:
+        opcode, length = _RECORD.unpack_from(data, at) if at + _RECORD.size <= end else (0, end)
+        begin = at + _RECORD.size
+        if length > end - begin:
+            broken += 1
             break
-        if opcode == Opcode.MESSAGE and length >= _FIELDS_BYTES:
+        if opcode != Opcode.MESSAGE:
+            others.append((opcode, data[begin : begin + length]))
+        elif length >= _FIELDS_BYTES:
             found.append(at)
-        at += _RECORD.size + length
-    return np.array(found, np.int64)
+        else:
+            broken += 1
+        at = begin + length
+    return Walk(np.array(found, np.int64), others, broken)
 
 
 def _as_bytes(heads: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -128,8 +151,8 @@ def _as_bytes(heads: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return heads.view(f"V{_HEAD.itemsize}")
 
 
-def _cut(data: Bytes, starts: Column, size: int) -> npt.NDArray[Any]:
-    """`size` bytes of the data from each start on, [starts]."""
+def cut(data: Bytes, starts: Column, size: int) -> npt.NDArray[Any]:
+    """`size` bytes of the data from each start on, [starts] of raw elements."""
     if not len(starts):
         return np.empty(0, f"V{size}")
     # every place of the data as the start of an element: numpy then copies whole elements, without an index for each byte

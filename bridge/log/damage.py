@@ -6,6 +6,8 @@ from typing import NamedTuple
 from bridge.log.finding import Finding
 from bridge.units import counted
 
+_MOST_TOPICS = 4  # of other programs that are named
+
 
 class Damage(NamedTuple):
     """The parts of a log that could not be read."""
@@ -14,11 +16,18 @@ class Damage(NamedTuple):
     bad_chunks: int  # number of whole chunks with a wrong checksum
     closed: bool  # the file has its footer
     bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
+    nameless: int = 0  # messages of a channel whose definition is lost: their topic cannot be known
+    missing: int = 0  # messages that the file's own count has and that were not found
 
     @property
     def whole(self) -> bool:
         """Whether the log was closed and everything in it could be read."""
-        return self.closed and not (self.cut_bytes or self.bad_chunks or self.bad_records)
+        lost = (self.cut_bytes, self.bad_chunks, self.bad_records, self.nameless, self.missing)
+        return self.closed and not any(lost)
+
+    def and_also(self, **more: int) -> "Damage":
+        """With more of it: the names of fields and what to add to each."""
+        return self._replace(**{name: getattr(self, name) + count for name, count in more.items()})
 
 
 def damage_findings(damage: Damage, path: Path) -> list[Finding]:
@@ -40,4 +49,22 @@ def damage_findings(damage: Damage, path: Path) -> list[Finding]:
     if damage.bad_records:
         text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense; {remedy}"
         found.append(Finding("damaged", path.name, text, damage.bad_records))
+    if damage.nameless:
+        whose = counted(damage.nameless, "message belongs", "messages belong")
+        text = f"{whose} to a channel whose definition is lost: the topic cannot be known"
+        found.append(Finding("damaged", path.name, text, damage.nameless))
+    if damage.missing:
+        text = f"the file's own count has {counted(damage.missing, 'message')} more than are in it"
+        found.append(Finding("damaged", path.name, text, damage.missing))
     return found
+
+
+def foreign_in_words(foreign: dict[str, int]) -> list[str]:
+    """One line for messages of other programs' topics, which were passed over; none where there are none."""
+    if not foreign:
+        return []
+    names = [topic or "a topic without a name" for topic in foreign]
+    named = ", ".join(names[:_MOST_TOPICS]) + (
+        f" and {len(names) - _MOST_TOPICS} more" if len(names) > _MOST_TOPICS else ""
+    )
+    return [f"{counted(sum(foreign.values()), 'message')} of other programs passed over: {named}"]

@@ -2,9 +2,19 @@
 
 import struct
 
+from bridge.faults import Fault
 from bridge.wire.payloads import READABLE_VERSIONS, SCHEMA_VERSION
 
 MAGIC = b"\x89MCAP0\r\n"  # of every MCAP file, at its beginning and at its end
 HEAD = struct.Struct("<BQ")  # of every record: opcode, length of what follows
-LIBRARY = f"stickslip schema {SCHEMA_VERSION}"  # in the header of the file
-READABLE = tuple(f"stickslip schema {version}" for version in READABLE_VERSIONS)
+_OURS = "stickslip schema "
+LIBRARY = f"{_OURS}{SCHEMA_VERSION}"  # in the header of the file
+READABLE = tuple(f"{_OURS}{version}" for version in READABLE_VERSIONS)
+
+
+def refuse_other_version(path: object, library: str) -> None:
+    """Raise Fault BAD_LOG for a log that another version of this project wrote; another program's name says nothing."""
+    if library.startswith(_OURS) and library not in READABLE:
+        known = " or ".join(map(repr, READABLE))
+        line = f"{path}: written by {library!r}: must be {known}; take the version of stickslip that wrote it"
+        raise Fault("BAD_LOG", line)

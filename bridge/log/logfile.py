@@ -17,6 +17,7 @@ from bridge.log.chunk_messages import Bytes, Messages
 from bridge.log.damage import Damage
 from bridge.log.log_reader import LogReader
 from bridge.log.metadata import configuration_of
+from bridge.log.reading.definitions import DERIVED
 from bridge.log.storage.chain import Chain
 from bridge.log.storage.parts import chain_of_log, later_names
 from bridge.wire import stickslip_pb2 as wire
@@ -42,16 +43,21 @@ class Piece(NamedTuple):
 
 
 def iter_pieces(reader: LogReader) -> Iterator[Piece]:
-    """Every message of a log, chunk by chunk, in memory that does not grow with the log.
+    """Every message of a log, chunk by chunk, in memory that does not grow with the log; none of what is there for viewers.
 
-    Bytes that are not a message of their topic are left out and counted in the reader's damage. Raises Fault BAD_LOG when the
-    file is not a run log of this project.
+    Bytes that are not a message of their topic are left out and counted in the reader's damage, messages of other programs in
+    its `foreign`. Raises Fault BAD_LOG when the file is not a run log of this project.
     """
     layouts: dict[str, Layout] = dict(_LAYOUTS)
     for messages in reader.messages():
         for channel_id in messages.channels():
             topic = reader.topic(channel_id)
+            if topic in DERIVED:
+                continue
             mine = messages.of(channel_id)
+            if topic is None:
+                reader.pass_over(channel_id, len(mine.start))
+                continue
             log_ns = mine.heads["log_ns"].astype(np.int64)
             if topic in STREAMING:
                 if topic not in layouts:
@@ -142,6 +148,7 @@ class RunData(NamedTuple):
     headers: dict[str, dict[str, str]]  # by role: schema_version, configuration, versions
     damage: Damage
     chain: Chain  # whether the bytes are those that were written
+    foreign: dict[str, int]  # messages of topics of other programs, which were passed over
 
     def configuration(self, role: str) -> dict[str, Any]:
         """The configuration of `role`, every default included. Raises Fault BAD_LOG when the log has none."""
@@ -215,4 +222,5 @@ def _read(reader: LogReader, path: Path, chain: "Future[Chain]") -> RunData:
         headers=reader.metadata,
         damage=reader.damage,
         chain=chain.result(),
+        foreign=reader.foreign,
     )

@@ -11,7 +11,7 @@ import hashlib
 import struct
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import IO, NamedTuple
@@ -50,7 +50,7 @@ _COPIED_BYTES = 1 << 18  # of that file at once
 class _Open(NamedTuple):
     """The chunk that is being filled."""
 
-    parts: list[bytes]
+    parts: list[bytes | memoryview]
     entries: dict[int, list[bytes]]  # message index by channel
 
 
@@ -69,6 +69,8 @@ class ChunkWriter:
         library: what the file says of who wrote it.
         folder: for the temporary file of the index, on the disk of the log; that of the system if not given.
 
+    `more` is asked with the bytes of each chunk that ends, and the entries of its index by channel, for messages to go with it.
+
     """
 
     def __init__(self, stream: IO[bytes], library: str, folder: Path | None = None) -> None:
@@ -82,6 +84,7 @@ class ChunkWriter:
         self._chunks = 0
         self._unsure = 0
         self._compress = zstandard.ZstdCompressor(level=1).compress
+        self.more: Callable[[bytes, dict[int, list[bytes]]], Rows | None] | None = None
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._metadata_indexes: list[MetadataIndex] = []
@@ -187,6 +190,10 @@ class ChunkWriter:
         """Close the open chunk, write it with its index, and hand everything to the operating system."""
         if self._offset:
             data = b"".join(self._chunk.parts)
+            more = self.more and self.more(data, self._chunk.entries)
+            if more is not None:
+                self.add_rows(more)
+                data += more.data
             chunk = Chunk(
                 compression="zstd",
                 data=self._compress(data),

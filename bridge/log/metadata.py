@@ -15,10 +15,14 @@ def table_of(metadata: Metadata, name: str, key: str, path: Path) -> dict[str, A
     """The JSON object under `key` of the table `name`. Raises Fault BAD_LOG when there is none."""
     text = metadata.get(name, {}).get(key)
     if text is None:
-        line = f"{path}: holds no {key} of the {name}; it was not there when it was recorded"
+        line = (
+            f"{path}: holds no {key} of the {name}; it was not there when it was recorded, or a tool left it out since"
+        )
         if "import" in metadata:
             line = f"{path}: is measured data of another program, imported, without a {name}: there is no run to judge"
-        remedy = "`stickslip log check` and `log export` read it, and `diagnose` as a run of an evidence folder"
+        remedy = (
+            "`stickslip log info`, `log check`, `log export` and `plot` read it, and `diagnose` in an evidence folder"
+        )
         raise Fault("BAD_LOG", f"{line}; {remedy}")
     table = _parsed(text, f"{path}: the {key} of the {name}")
     if not isinstance(table, dict):
@@ -34,6 +38,14 @@ def texts_of(metadata: Metadata, name: str, key: str, path: Path) -> list[str]:
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
         raise Fault("BAD_LOG", f"{where}: must be a list of texts; take another copy of the log")
     return values
+
+
+def source_of_import(metadata: Metadata, path: Path) -> str:
+    """The file of another program that a log was made from; empty for the log of a run. Raises Fault BAD_LOG."""
+    if "import" not in metadata:
+        return ""
+    source = _parsed(metadata["import"].get("source", '"another program"'), f"{path}: the source of the import")
+    return source if isinstance(source, str) and source else "another program"
 
 
 def _parsed(text: str, where: str) -> Any:

@@ -16,12 +16,11 @@ from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import Complaints
 from bridge.wire.pauses import PauseWatch
-from bridge.wire.payloads import parsed, refuse_other_schema
+from bridge.wire.payloads import SCHEMA_VERSION, parsed, refuse_other_schema
 from bridge.wire.topics import CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, TOPICS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 
 _INBOX_LIMIT = 1 << 16  # messages, 15 s of a run at 4100 messages/s; smaller loses messages while the disk is busy
-_HEADERS_WAIT_S = 30.0  # time for the roles to answer; a first start compiles kernels
 _QUIET_S = 0.3  # silence after the last END from which no message is under way
 _PLANT_LOST_S = 1.0  # silence from which a plant that left the bus counts as lost
 _GIVEN_UP_S = 30.0  # without a rig the recording ends then
@@ -68,10 +67,11 @@ def run(
         for topic in TOPICS:
             if topic.logged and topic.sender != "recorder":
                 bus.listen(topic, inbox.push)
-        headers = bus.headers(roles, _HEADERS_WAIT_S, stop)
+        headers = bus.headers(roles, bus_config.wait_s, stop)
         for header in headers.values():
             refuse_other_schema(header)
         ready()
+        bus.serve_header(wire.Header(role="recorder", schema_version=SCHEMA_VERSION))
         send = bus.publisher(RECORDER_EVENT)
 
         def tell(event: wire.Event) -> None:

@@ -13,8 +13,6 @@ from bridge.log.live import refuse_a_live_log
 from bridge.log.log_reader import LogReader
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.storage.parts import PART, RECOVERED, part_of, parts_of
-from bridge.wire.payloads import file_descriptor_set
-from bridge.wire.topics import BY_NAME
 
 
 class Recovered(NamedTuple):
@@ -22,6 +20,7 @@ class Recovered(NamedTuple):
 
     messages: int
     damage: Damage
+    attachments: int = 0  # that were left out
 
 
 class _Copy:
@@ -30,52 +29,70 @@ class _Copy:
     def __init__(self, writer: ChunkWriter, reader: LogReader, merged: bool) -> None:
         self.writer = writer
         self.reader = reader
-        self.schema_ids: dict[str, int] = {}
+        self.messages = 0
+        self.nameless = 0
         said = None if merged else part_of(reader.path)
         begins = said.begins if said else ""
         writer.add_metadata(RECOVERED, {"from": reader.path.name, "begins": begins})
         if said and said.number:
             place = {"number": said.number, "begins": begins, "follows": said.follows}
             writer.add_metadata(PART, {key: json.dumps(value) for key, value in place.items()})
-        self.channel_ids: dict[int, int] = {}
-        self.kept: set[str] = set()
+        self._schema_ids: dict[tuple[str, str, bytes], int] = {}
+        self._channel_ids: dict[tuple[str, str, int, tuple[tuple[str, str], ...]], int] = {}
+        self._kept: set[str] = set()
 
     def take_metadata(self) -> None:
+        """Tables that are new."""
         for name, fields in self.reader.metadata.items():
-            if name not in self.kept:
+            if name not in self._kept:
                 self.writer.add_metadata(name, fields)
-                self.kept.add(name)
+                self._kept.add(name)
 
-    def take_channel(self, channel_id: int) -> int:
-        """Define the channel in the new log, and return its id there.
+    def _take_schema(self, schema_id: int) -> int:
+        """Define a schema in the new log, and return its number there; 0, as in the old one, for no schema."""
+        schema = self.reader.schemas.get(schema_id)
+        if schema is None:
+            return 0
+        key = schema.name, schema.encoding, schema.data
+        if key not in self._schema_ids:
+            self._schema_ids[key] = self.writer.add_schema(*key)
+        return self._schema_ids[key]
 
-        A damaged definition is replaced by the one that every log of this version has.
-        """
-        if channel_id not in self.channel_ids:
-            reader = self.reader
-            channel = reader.channels.get(channel_id)
-            topic = BY_NAME.get(reader.topic(channel_id))
-            schema = reader.schemas.get(channel.schema_id) if channel else None
-            name = schema.name if schema else topic.message.DESCRIPTOR.full_name if topic else "unknown"
-            if name not in self.schema_ids:
-                data = schema.data if schema else file_descriptor_set()
-                self.schema_ids[name] = self.writer.add_schema(name, schema.encoding if schema else "protobuf", data)
-            self.channel_ids[channel_id] = self.writer.add_channel(
-                channel.topic if channel else "/" + reader.topic(channel_id),
-                channel.message_encoding if channel else "protobuf",
-                self.schema_ids[name],
-                channel.metadata if channel else {"rate_Hz": f"{topic.rate_Hz if topic else 0.0:g}"},
-            )
-        return self.channel_ids[channel_id]
+    def take_channel(self, channel_id: int) -> int | None:
+        """Define a channel in the new log as it is in the old one, and return its number there; None where that is lost."""
+        self.reader.topic(channel_id)  # looks for a definition that is missing
+        channel = self.reader.channels.get(channel_id)
+        if channel is None:
+            return None
+        schema_id = self._take_schema(channel.schema_id)
+        key = channel.topic, channel.message_encoding, schema_id, tuple(sorted(channel.metadata.items()))
+        if key not in self._channel_ids:
+            self._channel_ids[key] = self.writer.add_channel(*key[:3], channel.metadata)
+        return self._channel_ids[key]
 
-    def take_messages(self, messages: Messages) -> None:
+    def take(self, messages: Messages) -> None:
+        """Messages and what defines them. Those of a channel without a definition have no topic, and are counted as lost."""
+        self.take_metadata()
+        ids = {
+            channel_id: self.take_channel(channel_id) for channel_id in {*self.reader.channels, *messages.channels()}
+        }
         columns = (messages.heads[name].tolist() for name in ("channel", "sequence", "log_ns", "publish_ns"))
         for channel, sequence, log_ns, publish_ns, payload in zip(*columns, messages.payloads(), strict=True):
-            self.writer.add_message(self.take_channel(channel), log_ns, payload, publish_ns, sequence)
+            channel_id = ids[channel]
+            if channel_id is None:
+                self.nameless += 1
+            else:
+                self.writer.add_message(channel_id, log_ns, payload, publish_ns, sequence)
+                self.messages += 1
+        self.writer.flush()
+
+    def damage(self) -> Damage:
+        """What is not in the new log."""
+        return self.reader.damage.and_also(nameless=self.nameless)
 
 
 def recover(path: Path, out: Path) -> Recovered:
-    """Write every readable message of a cut or damaged log to `out`, with an index.
+    """Write every readable message of a log to `out`, with an index, under the topics that its definitions give them.
 
     `out` may be `path`: then each file of a log of several that is cut or damaged is made whole in its place. Else all of them
     become one.
@@ -95,34 +112,30 @@ def recover(path: Path, out: Path) -> Recovered:
         sum(one.damage.bad_chunks for one in saved),
         all(one.damage.closed for one in saved),
         sum(one.damage.bad_records for one in saved),
+        sum(one.damage.nameless for one in saved),
+        sum(one.damage.missing for one in saved),
     )
-    return Recovered(sum(one.messages for one in saved), damage)
+    return Recovered(sum(one.messages for one in saved), damage, sum(one.attachments for one in saved))
 
 
 def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool = False) -> Recovered:
     """Write every readable message to `out`; with `only_damaged` nothing where all can be read."""
     refuse_a_live_log(out, "--out")
-    messages = 0
     try:
         new = Replacement(out)
         try:
             copy = _Copy(ChunkWriter(new.file, LIBRARY, out.absolute().parent), reader, merged)
             for chunk in reader.messages():
-                copy.take_metadata()
-                for channel_id in reader.channels:
-                    copy.take_channel(channel_id)
-                copy.take_messages(chunk)
-                messages += len(chunk.start)
-                copy.writer.flush()
+                copy.take(chunk)
             copy.take_metadata()
             copy.writer.finish()
-            if not messages and not only_damaged:
+            if not copy.messages and not only_damaged:
                 line = f"{reader.path}: holds no message that can be read, so nothing can be saved; the file stays as it is"
                 raise Fault("BAD_LOG", line)
-            if not only_damaged or (messages and not reader.damage.whole):
+            if not only_damaged or (copy.messages and not reader.damage.whole):
                 new.finish()
         finally:
             new.discard()
     except OSError as error:
         raise Fault("LOG_WRITE", f"{out}: cannot be written: {error.strerror}; choose another --out") from None
-    return Recovered(messages, reader.damage)
+    return Recovered(copy.messages, copy.damage(), len(reader.attachments))

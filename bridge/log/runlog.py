@@ -12,10 +12,12 @@ from bridge.log.block_rows import rows
 from bridge.log.mcap_chunks import ChunkWriter
 from bridge.log.storage.log_files import LogFiles, Rotation
 from bridge.log.storage.parts import PART, parts_of
+from bridge.log.viewers import foxglove_log
+from bridge.log.viewers.scope import ScopeMaker
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import Records
-from bridge.wire.payloads import file_descriptor_set, sequence_and_time
-from bridge.wire.topics import RECORDER_EVENT, TOPICS, Topic
+from bridge.wire.payloads import file_descriptor_set, parsed, sequence_and_time
+from bridge.wire.topics import RECORDER_EVENT, SCOPE, TOPICS, Topic
 
 # Duration of a chunk. Longer: a kill loses more (it loses the open chunk, at most 0.25 s). Shorter: larger files.
 FLUSH_PERIOD_S = 0.1
@@ -53,6 +55,7 @@ class RunLog:
         self._next: dict[str, int] = {}
         self._events = 0
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
+        self._scope = ScopeMaker()
         self._tables: dict[str, dict[str, str]] = {}  # of metadata, which every file has
         self._channels: dict[str, int] = {}
         old = parts_of(path)[1:] if path.is_file() else []
@@ -64,16 +67,19 @@ class RunLog:
 
     def begin(self, writer: ChunkWriter, number: int, begins: str, follows: str) -> None:
         """Write what a file of the log begins with."""
-        schema_data = file_descriptor_set()
         schemas: dict[str, int] = {}
-        for topic in TOPICS:
+        for topic in (*TOPICS, SCOPE):
             if topic.logged:
                 name = topic.message.DESCRIPTOR.full_name
                 if name not in schemas:
-                    schemas[name] = writer.add_schema(name, "protobuf", schema_data)
+                    schemas[name] = writer.add_schema(name, "protobuf", file_descriptor_set(topic.message))
                 self._channels[topic.name] = writer.add_channel(
                     "/" + topic.name, "protobuf", schemas[name], {"rate_Hz": f"{topic.rate_Hz:g}"}
                 )
+        said = writer.add_schema(foxglove_log.SCHEMA, "protobuf", foxglove_log.FILES.SerializeToString())
+        name = foxglove_log.TOPIC
+        self._channels[name] = writer.add_channel("/" + name, "protobuf", said, {"rate_Hz": "0"})
+        writer.more = lambda data, entries: self._scope.of_chunk(data, entries, self._channels)
         if number:
             place = {"number": number, "begins": begins, "follows": follows}
             writer.add_metadata(PART, {key: json.dumps(value) for key, value in place.items()})
@@ -109,9 +115,13 @@ class RunLog:
         if sequence + _LATEST_MESSAGES < expected:
             self.add_event("RESTART", f"/{topic.name}: {sequence} after {expected - 1}: its sender began anew", t_ns)
             expected = 0
-        self._next[topic.name] = max(expected, sequence + 1)
+        if sequence >= expected:
+            expected = sequence + 1
+        self._next[topic.name] = expected
         self.t_ns = max(self.t_ns, t_ns)
         self._add(topic, payload, sequence, t_ns)
+        if topic.message is wire.Event:
+            self._say(parsed(wire.Event, payload, topic.name))
         self.flush_when_due()
 
     def write_blocks(self, each: Mapping[Topic, Records], after: Mapping[Topic, Records]) -> None:
@@ -123,7 +133,7 @@ class RunLog:
 
         """
         by_channel = [{self._channels[topic.name]: table for topic, table in part.items()} for part in (each, after)]
-        made = rows(*by_channel)
+        made = rows(by_channel[0], by_channel[1])
         self.t_ns = max(self.t_ns, made.last_ns)
         if (writer := self._files.writer) is not None:
             writer.add_rows(made)
@@ -135,8 +145,9 @@ class RunLog:
 
     def flush_when_due(self) -> None:
         """End the open chunk when it is old enough. Raises Fault LOG_WRITE."""
-        writer = self._files.writer
-        if time.monotonic() > self._due_s or (writer and writer.open_bytes > LARGEST_CHUNK_BYTES):
+        if time.monotonic() > self._due_s or (
+            (writer := self._files.writer) is not None and writer.open_bytes > LARGEST_CHUNK_BYTES
+        ):
             self._due_s = time.monotonic() + FLUSH_PERIOD_S
             self.flush()
 
@@ -145,6 +156,7 @@ class RunLog:
         at_ns = self.t_ns if t_ns is None else t_ns
         event = wire.Event(sequence=self._events, t_ns=at_ns, source="recorder", code=code, text=text)
         self._add(RECORDER_EVENT, event.SerializeToString(), self._events, at_ns)
+        self._say(event)
         self._events += 1
         if self._on_event is not None:
             self._on_event(event)
@@ -158,6 +170,18 @@ class RunLog:
         log_time_ns = t_ns if self._lockstep else time.time_ns()
         writer.add_message(self._channels[topic.name], log_time_ns, payload, t_ns, sequence & 0xFFFFFFFF)
 
+    def _say(self, event: wire.Event) -> None:
+        """Write an event for viewers."""
+        writer = self._files.writer
+        if writer is not None:
+            log_time_ns = event.t_ns if self._lockstep else time.time_ns()
+            said = foxglove_log.of_event(event, log_time_ns)
+            writer.add_message(self._channels[foxglove_log.TOPIC], log_time_ns, said, event.t_ns, 0)
+
     def close(self) -> None:
         """Write the index and close the file. Raises Fault LOG_WRITE, LOG_LOST: what happened to the log until now."""
+        self._scope.ends = True
+        writer = self._files.writer
+        if writer is not None and not writer.open_bytes and (rest := self._scope.rest(self._channels)) is not None:
+            writer.add_rows(rest)
         self._files.close()

@@ -23,6 +23,13 @@ class BusConfig(Strict):
         description="true: a tcp/ endpoint asks nobody for a password, and others may reach it. Never on a shared network.",
     )
 
+    wait_s: float = Field(
+        default=30.0,
+        gt=0.0,
+        le=1e6,
+        description="Longest wait of plant, controller and record for the others at the start; `stickslip run` has --wait.",
+    )
+
     @property
     def port(self) -> int:
         """The port of the endpoint."""

@@ -3,9 +3,10 @@
 A client that sends rubbish 60 000 times a second must neither end a process nor fill its log, and must not go unsaid.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
+
+from bridge.wire.clock import time
 
 _EVERY_S = 1.0  # between two events of one kind; shorter: a flood fills logs and screens
 
@@ -31,13 +32,13 @@ class Complaints:
 
     Args:
         tell: publishes an event with a code and a text.
-        clock: the time [s].
+        clock: the time [s]; that of the process if not given.
 
     """
 
-    def __init__(self, tell: Callable[[str, str], object], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, tell: Callable[[str, str], object], clock: Callable[[], float] | None = None) -> None:
         self._tell = tell
-        self._clock = clock
+        self._clock = clock or time.monotonic
         self._kinds: dict[tuple[str, str], _Kind] = {}
         self._untold = False
 

@@ -11,8 +11,15 @@ LETTERS = {
     MAINTENANCE: "needs a look before long",
     NEWS: "news",
 }
+# of letter C, and yet told with a run: it is no run of a healthy rig
+TESTS = ("INJECTED",)
 # reasons, in a controller's commands, that say the vibration does not do its work
 WEAK_REASONS = ("PIEZO_WEAK", "CANNOT_HELP", "HARMFUL")
+# reasons that say a sensor or the exciter is doubted; `controller.trips` finds them
+TRIPS = (
+    *("OPEN_LOOP", "CLIPPED", "SWAPPED", "FROZEN", "RESONANCE"),
+    *("FORCE_DOUBTED", "DRIVE_DOUBTED", "TRAVEL_END", "NOISE"),
+)
 
 
 class EventCode(NamedTuple):
@@ -66,6 +73,12 @@ EVENTS = {
             "a person's stop could not be kept over a restart; make the folder writable that the text names",
         ),
         EventCode(
+            "WIDE_LIMITS",
+            "plant",
+            MAINTENANCE,
+            "limits of the guard protect less than the defaults; narrow them in [guard] of the rig file, or know why not",
+        ),
+        EventCode(
             "RIG_LOST",
             "controller",
             FAILURE,
@@ -94,6 +107,105 @@ EVENTS = {
             OUTSIDE,
             "a slip, while the drive position stands: its transducer is at its end, or loose, and no v_d means no vibration",
         ),
+        EventCode(
+            "OPEN_LOOP",
+            "controller",
+            FAILURE,
+            "far less v_a than commanded, by the known gain: the base accelerometer is loose or has another gain, or the exciter "
+            "delivers less. It vibrates open loop at the known gain until `stickslip reset`",
+        ),
+        EventCode(
+            "CLIPPED",
+            "controller",
+            FAILURE,
+            "the base accelerometer is at the end of what it shows. It vibrates open loop, at the known gain, until "
+            "`stickslip reset`",
+        ),
+        EventCode(
+            "SWAPPED",
+            "controller",
+            FAILURE,
+            "the accelerometer of the slide shows what that of the base should: swap them back, then `stickslip reset`",
+        ),
+        EventCode(
+            "FROZEN",
+            "controller",
+            FAILURE,
+            "a channel with noise repeats one number: look at its plug and its converter, then `stickslip reset`",
+        ),
+        EventCode(
+            "RESONANCE",
+            "controller",
+            OUTSIDE,
+            "far more v_a than commanded, by the known gain: the exciter's mount is loose, or the accelerometer has another gain."
+            " Less is commanded; slips that come back say that it is the accelerometer",
+        ),
+        EventCode(
+            "FORCE_DOUBTED",
+            "controller",
+            FAILURE,
+            "the force does not follow the spring between drive and slide: dead, clipped, of another gain or sign. It vibrates "
+            "whenever the drive moves until `stickslip reset`",
+        ),
+        EventCode(
+            "DRIVE_DOUBTED",
+            "controller",
+            FAILURE,
+            "the place of the drive does not follow slide and force: it jumped, or has another unit. Nothing vibrates until "
+            "`stickslip reset`",
+        ),
+        EventCode(
+            "TRAVEL_END", "controller", OUTSIDE, "the drive is outside of limits.travel_m, where nothing is vibrated"
+        ),
+        EventCode(
+            "NOISE",
+            "controller",
+            OUTSIDE,
+            "the noise of the drive's place became many times larger, and is learnt anew; or more slips came than the spring "
+            "could wind up for, and are not believed; or noise drowns the base accelerometer, and it vibrates open loop until "
+            "`stickslip reset`. Look at cables and earth",
+        ),
+        EventCode(
+            "LATE",
+            "controller",
+            OUTSIDE,
+            "for 0.2 s and more blocks have come more than 15 ms later than they did before: a busy machine, a slow link, or a "
+            "clock that runs away",
+        ),
+        EventCode("CLEARED", "controller", NEWS, "a doubt about a sensor or the exciter is over; the text has which"),
+        EventCode(
+            "GAIN_LIMIT",
+            "controller",
+            OUTSIDE,
+            "the amplitude loop wants more stroke than amplitude.gain_band times the known gain allows, and does not get it",
+        ),
+        EventCode(
+            "STROKE_MAX",
+            "controller",
+            OUTSIDE,
+            "the stroke is at limits.amplitude_max_m, or v_a at limits.velocity_max_mps, and more is wanted",
+        ),
+        EventCode(
+            "PIEZO_WEAK",
+            "controller",
+            OUTSIDE,
+            "v_a stays below 1.05 v_d with the stroke at its limit, or nearly none is measured: a larger exciter, or a "
+            "stiffer mount",
+        ),
+        EventCode(
+            "CANNOT_HELP",
+            "controller",
+            OUTSIDE,
+            "slips go on under the strongest vibration, or whenever v_d changes",
+        ),
+        EventCode("HARMFUL", "controller", OUTSIDE, "the motion was worse with the vibration, twice: there is none"),
+        EventCode(
+            "INJECTED",
+            "plant",
+            CHECK,
+            "a fault that a scenario or a person asked for begins; the text has which, and for how long",
+        ),
+        EventCode("INJECTION_ENDED", "plant", CHECK, "a fault that was asked for is over"),
         EventCode("OPERATOR", "plant, controller", CHECK, "a person's word was taken: `ACTION by WHO`"),
         EventCode("WATCH", "recorder", NEWS, "whether pauses of the machine are watched, on which cores, or why not"),
         EventCode(
@@ -155,5 +267,5 @@ def harms(code: str) -> bool:
 
 
 def is_told(code: str) -> bool:
-    """Whether a verdict tells it: all that is more than news, and what this version does not know."""
-    return code not in EVENTS or EVENTS[code].letter not in {NEWS, CHECK}
+    """Whether a verdict tells it: all that is more than news, tests, and what this version does not know."""
+    return code not in EVENTS or EVENTS[code].letter not in {NEWS, CHECK} or code in TESTS

@@ -29,6 +29,7 @@ _SCALARS = {
     FieldDescriptor.TYPE_SFIXED64: ("<i8", 1),
     FieldDescriptor.TYPE_FIXED32: ("<u4", 5),
     FieldDescriptor.TYPE_FLOAT: ("<f4", 5),
+    FieldDescriptor.TYPE_ENUM: ("u1", 0),  # a varint, which is one byte up to 127; a zero is written, too
 }
 _PACKED_WIRE_TYPE = 2
 
@@ -139,6 +140,7 @@ APPLIED = Layout(wire.Applied)
 TRACE = Layout(wire.Trace)
 STATE = Layout(wire.State)
 ANNOUNCE = Layout(wire.Announce)
+SCOPE = Layout(wire.Scope)
 
 _sensor_layouts: dict[int, Layout] = {}
 

@@ -1,5 +1,8 @@
 """Messages of `stickslip.proto` from and to bytes, with the protobuf library alone: what only talks needs no arrays."""
 
+import functools
+import struct
+from pathlib import Path
 from typing import Any, TypeVar
 
 from google.protobuf import descriptor_pb2
@@ -15,6 +18,10 @@ READABLE_VERSIONS = (1, 2)  # fields are only appended, so an older log lacks wh
 # configuration may be longer. Larger: who sends rubbish costs more of a process's time.
 _LARGEST_BYTES = 1 << 16
 _LONG: dict[type[Message], int] = {wire.Snapshot: 1 << 18, wire.Header: 1 << 18}
+
+_DESCRIBED = Path(__file__).with_name("stickslip.desc")  # with comments, which the generated module leaves out
+_SEQUENCE_AND_TIME = struct.Struct("<QBq")  # of a canonical message, with the tag between them
+_MESSAGES, _ENUMS = 4, 5  # numbers of these fields of a FileDescriptorProto
 
 M = TypeVar("M", bound=Message)
 
@@ -55,13 +62,35 @@ def refuse_other_schema(header: wire.Header) -> None:
 def sequence_and_time(payload: bytes, message: type[Message]) -> tuple[int, int]:
     """Sequence and t_ns of a message that has both; read directly where the bytes are canonical. Raises Fault BAD_MESSAGE."""
     if len(payload) >= 18 and payload[0] == 0x09 and payload[9] == 0x11:
-        return int.from_bytes(payload[1:9], "little"), int.from_bytes(payload[10:18], "little", signed=True)
+        sequence, _, t_ns = _SEQUENCE_AND_TIME.unpack_from(payload, 1)
+        return sequence, t_ns
     whole: Any = parsed(message, payload, message.DESCRIPTOR.name)
     return whole.sequence, whole.t_ns
 
 
-def file_descriptor_set() -> bytes:
-    """The schema for MCAP: a serialised FileDescriptorSet."""
+@functools.cache
+def file_descriptor_set(message: type[Message]) -> bytes:
+    """The schema of a message for MCAP: a serialised FileDescriptorSet, with the comments on this message and its enums.
+
+    But for the comments the file is the same for all messages; with all of them a log would begin with 250 kB, twice.
+    """
     files = descriptor_pb2.FileDescriptorSet()
-    wire.DESCRIPTOR.CopyToProto(files.file.add())
+    files.ParseFromString(_DESCRIBED.read_bytes())
+    file = files.file[0]
+    own = [(_MESSAGES, [one.name for one in file.message_type].index(message.DESCRIPTOR.name))]
+    enums = [one.name for one in file.enum_type]
+    own += [(_ENUMS, enums.index(name)) for name in _enums_of(message) if name in enums]
+    told = [
+        place
+        for place in file.source_code_info.location
+        if tuple(place.path[:2]) in own and (place.leading_comments or place.trailing_comments)
+    ]
+    for field in (field for one in file.message_type for field in one.field):
+        field.ClearField("json_name")  # follows from the name
+    del file.source_code_info.location[:]
+    file.source_code_info.location.extend(told)
     return files.SerializeToString()
+
+
+def _enums_of(message: type[Message]) -> list[str]:
+    return [field.enum_type.name for field in message.DESCRIPTOR.fields if field.enum_type is not None]

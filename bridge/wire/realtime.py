@@ -7,8 +7,9 @@ import os
 import resource
 import sys
 import threading
-import time
 from pathlib import Path
+
+from bridge.wire.clock import time
 
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = (
@@ -98,6 +99,14 @@ def _lock_memory() -> bool:
     if os.geteuid() != 0 and resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
         return False
     return ctypes.CDLL(None).mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) == 0
+
+
+def let_the_bus_send() -> None:
+    """Let the thread that sends run now: it has this thread's core and priority, and waits until the loop sleeps otherwise.
+
+    Not while a loop makes up for blocks, which others could not take as fast (docs/method/bridge.md).
+    """
+    os.sched_yield()
 
 
 def may_claim(priority: int = LOOP_PRIORITY) -> bool:

@@ -71,6 +71,9 @@ class Limit(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     STALE_INPUT: _ClassVar[Limit]
     OPERATOR_STOP: _ClassVar[Limit]
     NOT_FINITE: _ClassVar[Limit]
+    GAIN_LIMIT: _ClassVar[Limit]
+    HELD_OPEN_LOOP: _ClassVar[Limit]
+    NO_DRIVE: _ClassVar[Limit]
 
 class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -93,6 +96,15 @@ class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     SETTLING: _ClassVar[Reason]
     NEEDED_BEFORE: _ClassVar[Reason]
     NOT_ARMED: _ClassVar[Reason]
+    OPEN_LOOP: _ClassVar[Reason]
+    CLIPPED: _ClassVar[Reason]
+    SWAPPED: _ClassVar[Reason]
+    FROZEN: _ClassVar[Reason]
+    RESONANCE: _ClassVar[Reason]
+    FORCE_DOUBTED: _ClassVar[Reason]
+    DRIVE_DOUBTED: _ClassVar[Reason]
+    TRAVEL_END: _ClassVar[Reason]
+    NOISE: _ClassVar[Reason]
 DISABLED: Mode
 WATCH: Mode
 EXCITE: Mode
@@ -143,6 +155,9 @@ FREQUENCY_BAND: Limit
 STALE_INPUT: Limit
 OPERATOR_STOP: Limit
 NOT_FINITE: Limit
+GAIN_LIMIT: Limit
+HELD_OPEN_LOOP: Limit
+NO_DRIVE: Limit
 NO_REASON: Reason
 NOT_ENABLED: Reason
 NOTHING_TO_DO: Reason
@@ -162,6 +177,15 @@ START_OF_MOVE: Reason
 SETTLING: Reason
 NEEDED_BEFORE: Reason
 NOT_ARMED: Reason
+OPEN_LOOP: Reason
+CLIPPED: Reason
+SWAPPED: Reason
+FROZEN: Reason
+RESONANCE: Reason
+FORCE_DOUBTED: Reason
+DRIVE_DOUBTED: Reason
+TRAVEL_END: Reason
+NOISE: Reason
 
 class SensorBlock(_message.Message):
     __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state")
@@ -347,6 +371,68 @@ class State(_message.Message):
     slips: int
     def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., velocity_ratio: _Optional[float] = ..., force_rate: _Optional[float] = ..., score: _Optional[float] = ..., mode: _Optional[int] = ..., state: _Optional[int] = ..., slips: _Optional[int] = ...) -> None: ...
 
+class Scope(_message.Message):
+    __slots__ = ("sequence", "t_ns", "drive_force_min_N", "drive_force_mean_N", "drive_force_max_N", "mass_accel_min_mps2", "mass_accel_mean_mps2", "mass_accel_max_mps2", "base_accel_min_mps2", "base_accel_mean_mps2", "base_accel_max_mps2", "mass_position_min_m", "mass_position_mean_m", "mass_position_max_m", "drive_position_min_m", "drive_position_mean_m", "drive_position_max_m", "frequency_Hz", "amplitude_m", "vibration_velocity_mps", "drive_velocity_mps", "wanted_velocity_mps", "time_to_slip_s", "mode", "state", "reason", "limit", "guard_state", "cause")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    T_NS_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_FORCE_MIN_N_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_FORCE_MEAN_N_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_FORCE_MAX_N_FIELD_NUMBER: _ClassVar[int]
+    MASS_ACCEL_MIN_MPS2_FIELD_NUMBER: _ClassVar[int]
+    MASS_ACCEL_MEAN_MPS2_FIELD_NUMBER: _ClassVar[int]
+    MASS_ACCEL_MAX_MPS2_FIELD_NUMBER: _ClassVar[int]
+    BASE_ACCEL_MIN_MPS2_FIELD_NUMBER: _ClassVar[int]
+    BASE_ACCEL_MEAN_MPS2_FIELD_NUMBER: _ClassVar[int]
+    BASE_ACCEL_MAX_MPS2_FIELD_NUMBER: _ClassVar[int]
+    MASS_POSITION_MIN_M_FIELD_NUMBER: _ClassVar[int]
+    MASS_POSITION_MEAN_M_FIELD_NUMBER: _ClassVar[int]
+    MASS_POSITION_MAX_M_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_POSITION_MIN_M_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_POSITION_MEAN_M_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_POSITION_MAX_M_FIELD_NUMBER: _ClassVar[int]
+    FREQUENCY_HZ_FIELD_NUMBER: _ClassVar[int]
+    AMPLITUDE_M_FIELD_NUMBER: _ClassVar[int]
+    VIBRATION_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    DRIVE_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    WANTED_VELOCITY_MPS_FIELD_NUMBER: _ClassVar[int]
+    TIME_TO_SLIP_S_FIELD_NUMBER: _ClassVar[int]
+    MODE_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    LIMIT_FIELD_NUMBER: _ClassVar[int]
+    GUARD_STATE_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    t_ns: int
+    drive_force_min_N: float
+    drive_force_mean_N: float
+    drive_force_max_N: float
+    mass_accel_min_mps2: float
+    mass_accel_mean_mps2: float
+    mass_accel_max_mps2: float
+    base_accel_min_mps2: float
+    base_accel_mean_mps2: float
+    base_accel_max_mps2: float
+    mass_position_min_m: float
+    mass_position_mean_m: float
+    mass_position_max_m: float
+    drive_position_min_m: float
+    drive_position_mean_m: float
+    drive_position_max_m: float
+    frequency_Hz: float
+    amplitude_m: float
+    vibration_velocity_mps: float
+    drive_velocity_mps: float
+    wanted_velocity_mps: float
+    time_to_slip_s: float
+    mode: Mode
+    state: ContactState
+    reason: Reason
+    limit: Limit
+    guard_state: GuardState
+    cause: Cause
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_min_N: _Optional[float] = ..., drive_force_mean_N: _Optional[float] = ..., drive_force_max_N: _Optional[float] = ..., mass_accel_min_mps2: _Optional[float] = ..., mass_accel_mean_mps2: _Optional[float] = ..., mass_accel_max_mps2: _Optional[float] = ..., base_accel_min_mps2: _Optional[float] = ..., base_accel_mean_mps2: _Optional[float] = ..., base_accel_max_mps2: _Optional[float] = ..., mass_position_min_m: _Optional[float] = ..., mass_position_mean_m: _Optional[float] = ..., mass_position_max_m: _Optional[float] = ..., drive_position_min_m: _Optional[float] = ..., drive_position_mean_m: _Optional[float] = ..., drive_position_max_m: _Optional[float] = ..., frequency_Hz: _Optional[float] = ..., amplitude_m: _Optional[float] = ..., vibration_velocity_mps: _Optional[float] = ..., drive_velocity_mps: _Optional[float] = ..., wanted_velocity_mps: _Optional[float] = ..., time_to_slip_s: _Optional[float] = ..., mode: _Optional[_Union[Mode, str]] = ..., state: _Optional[_Union[ContactState, str]] = ..., reason: _Optional[_Union[Reason, str]] = ..., limit: _Optional[_Union[Limit, str]] = ..., guard_state: _Optional[_Union[GuardState, str]] = ..., cause: _Optional[_Union[Cause, str]] = ...) -> None: ...
+
 class Snapshot(_message.Message):
     __slots__ = ("sequence", "t_ns", "step", "layout", "memory")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -396,13 +482,27 @@ class Operator(_message.Message):
     def __init__(self, action: _Optional[_Union[Operator.Action, str]] = ..., who: _Optional[str] = ...) -> None: ...
 
 class Header(_message.Message):
-    __slots__ = ("role", "schema_version", "configuration", "versions")
+    __slots__ = ("role", "schema_version", "configuration", "versions", "process")
     ROLE_FIELD_NUMBER: _ClassVar[int]
     SCHEMA_VERSION_FIELD_NUMBER: _ClassVar[int]
     CONFIGURATION_FIELD_NUMBER: _ClassVar[int]
     VERSIONS_FIELD_NUMBER: _ClassVar[int]
+    PROCESS_FIELD_NUMBER: _ClassVar[int]
     role: str
     schema_version: int
     configuration: str
     versions: str
-    def __init__(self, role: _Optional[str] = ..., schema_version: _Optional[int] = ..., configuration: _Optional[str] = ..., versions: _Optional[str] = ...) -> None: ...
+    process: str
+    def __init__(self, role: _Optional[str] = ..., schema_version: _Optional[int] = ..., configuration: _Optional[str] = ..., versions: _Optional[str] = ..., process: _Optional[str] = ...) -> None: ...
+
+class Inject(_message.Message):
+    __slots__ = ("fault", "clear", "who", "id")
+    FAULT_FIELD_NUMBER: _ClassVar[int]
+    CLEAR_FIELD_NUMBER: _ClassVar[int]
+    WHO_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
+    fault: str
+    clear: bool
+    who: str
+    id: str
+    def __init__(self, fault: _Optional[str] = ..., clear: _Optional[bool] = ..., who: _Optional[str] = ..., id: _Optional[str] = ...) -> None: ...

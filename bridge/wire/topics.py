@@ -29,6 +29,7 @@ CONTROLLER_EVENT = Topic("event/controller", wire.Event, "controller", 0.0, 0.0,
 RECORDER_EVENT = Topic("event/recorder", wire.Event, "recorder", 0.0, 0.0, logged=True)
 OPERATOR = Topic("operator", wire.Operator, "cockpit", 0.0, 0.0, logged=False)
 ANNOUNCE = Topic("announce", wire.Announce, "plant", 0.0, 0.0, logged=True)
+FAULT = Topic("fault", wire.Inject, "cockpit", 0.0, 0.0, logged=False)
 
 TOPICS = (
     SENSORS,
@@ -41,9 +42,11 @@ TOPICS = (
     CONTROLLER_EVENT,
     RECORDER_EVENT,
     OPERATOR,
-    ANNOUNCE,  # last: a log's channels are numbered in this order
+    ANNOUNCE,  # a log's channels are numbered in this order
+    FAULT,
 )
 BY_NAME = {topic.name: topic for topic in TOPICS}
+SCOPE = Topic("scope", wire.Scope, "recorder", 200.0, 0.0, logged=True)  # for viewers: in the log, and not on the bus
 
 
 class Outgoing(NamedTuple):

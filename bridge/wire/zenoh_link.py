@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from bridge.faults import Fault
+from bridge.processes import this_process
 from bridge.wire import loopback_users
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.bus_config import BusConfig
@@ -24,7 +25,6 @@ from bridge.wire.topics import Topic
 
 __all__ = ["Bus", "BusConfig", "Inbox", "Received"]
 
-_CONNECT_S = 30.0  # time to wait for the plant; a first start compiles before it listens, which can take more than 10 s
 # One attempt to dial without a password: a rig that begins makes one, and only the next attempt has it.
 _WITHOUT_PASSWORD_S = 0.2
 _ROLES = frozenset({"plant", "controller", "recorder"})  # which have a token each
@@ -64,7 +64,8 @@ def _dialled(config: BusConfig, role: str, lockstep: bool, stop: threading.Event
         except zenoh.ZError:
             if time.monotonic() > until_s:
                 line = f"{config.endpoint}: no plant answers there after {patience_s:g} s"
-                raise Fault("NO_PEER", f"{line}; {_remedy(config, bool(security))}") from None
+                more = "; a first start compiles before it answers: --wait S waits longer"
+                raise Fault("NO_PEER", f"{line}; {_remedy(config, bool(security))}{more}") from None
     raise Fault("NO_PEER", f"{config.endpoint}: no plant answered there before the stop")
 
 
@@ -86,9 +87,9 @@ class Bus:
         role: str,
         lockstep: bool,
         stop: threading.Event | None = None,
-        patience_s: float = _CONNECT_S,
+        patience_s: float | None = None,
     ) -> None:
-        """Listen as the plant; any other role dials the plant for `patience_s` or until `stop` is set.
+        """Listen as the plant; any other role dials the plant for `patience_s`, else `config.wait_s`, or until `stop` is set.
 
         What is neither controller, recorder nor operator is a viewer, who may only listen.
 
@@ -112,7 +113,7 @@ class Bus:
                 role if role in loopback_users.ROLES else "viewer",
                 lockstep,
                 stop or threading.Event(),
-                patience_s,
+                config.wait_s if patience_s is None else patience_s,
             )
         )
         self._keep.append(
@@ -186,9 +187,12 @@ class Bus:
         self._keep.append(self._session.declare_subscriber(self._key(topic.name), handler))
 
     def serve_header(self, header: wire.Header) -> None:
-        """Answer queries for the configuration of the header's role with `header`."""
+        """Answer queries for the configuration of the header's role with `header`, and with which process this is."""
         key = self._key(f"header/{header.role}")
-        payload = header.SerializeToString()
+        told = wire.Header()
+        told.CopyFrom(header)
+        told.process = this_process()
+        payload = told.SerializeToString()
 
         def reply(query: Any) -> None:
             with query:

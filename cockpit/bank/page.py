@@ -6,6 +6,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from bridge.files import write_whole
+from bridge.provenance import provenance
 from cockpit.bank.figures import LIMIT
 from cockpit.bank.plots import picture
 from cockpit.bank.record import CLAIMED, STUCK
@@ -33,6 +34,7 @@ def write_page(result: BankResult, path: Path) -> None:
     subjects = list(dict.fromkeys(one.figures.subject for one in result.done))
     text = environment.from_string(template).render(
         result=result,
+        footer=provenance().footer(),
         missed=sum(bar.holds is False for bar in result.bars),
         subjects=subjects,
         own=OWN,

@@ -1,10 +1,11 @@
-"""`stickslip bench control`: the controller on the scenarios of the bank, beside rules that need no controller."""
+"""`stickslip bench`: the controller on the scenarios of the bank; rig and controller under the faults of the catalogue."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bridge.files import write_whole
 from cockpit.commands.json_option import Json, JsonGroup, carry_out, tell
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import PAGE, check_output, writing
@@ -12,11 +13,6 @@ from cockpit.run.writable import PAGE, check_output, writing
 bench_app = typer.Typer(
     cls=JsonGroup, help="How good is the controller? Judged by what truly happens on made rigs.", no_args_is_help=True
 )
-
-
-@bench_app.callback()
-def _about() -> None:
-    """Keep `control` a word of its own."""
 
 
 @bench_app.command("control")
@@ -52,5 +48,39 @@ def bench_control(
                 write_page(result, report)
         tell(as_json, result.as_json(), [*in_words(result), *([f"report     {report}"] if report else [])], indent=1)
         return 0 if result.passed else 3
+
+    carry_out(work, as_json)
+
+
+@bench_app.command("faults")
+def bench_faults(
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
+    only: Annotated[
+        list[str], typer.Option(help="A group of the catalogue, or how the names of faults begin. Repeatable.")
+    ] = [],  # noqa: B006
+    report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the table, one .md file.")] = None,
+    as_json: Json = None,
+) -> None:
+    """Inject the faults of deploy/faults, and judge by the truth of the rig; exit status 1: one is worse than is known."""
+
+    def work() -> int:
+        from joblib import cpu_count
+
+        from cockpit.commands.diagnose_output import watched
+        from cockpit.faults.bench import bench
+        from cockpit.faults.catalogue import chosen, load_catalogue
+        from cockpit.faults.page import page
+
+        end_like_ctrl_c()
+        if report is not None:
+            check_output("--report", report, (".md",))
+        wanted = chosen(load_catalogue(), only)
+        with watched() as progress:
+            result = bench(wanted, jobs or cpu_count(), lambda share, line: progress(line, share))
+        if report is not None:
+            with writing(report):
+                write_whole(report, page(result))
+        tell(as_json, result.as_json(), [*result.in_words(), *([f"report   {report}"] if report else [])], indent=1)
+        return 1 if result.worse else 0
 
     carry_out(work, as_json)

@@ -102,7 +102,7 @@ def blind_score(
             found = open_set(folder, key, partial)
             if baselines:
                 found = with_baselines(found, folder, jobs or cpu_count(), progress)
-        _told(found, folder.name, as_json, report)
+        _told(found, folder.name, as_json, report, [])
 
     carry_out(work, as_json)
 
@@ -124,12 +124,12 @@ def blind_pool(
             check_output("--report", report, PAGE)
         for option, path in (("--json", as_json), ("--report", report)):
             refuse_to_lose(files, "one of the files to read", option, path)
-        _told(pooled(files), ", ".join(path.stem for path in files), as_json, report)
+        _told(pooled(files), ", ".join(path.stem for path in files), as_json, report, files)
 
     carry_out(work, as_json)
 
 
-def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | None) -> None:
+def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | None, files: list[Path]) -> None:
     from diagnosis.blind.opening import scored
     from diagnosis.blind.pooling import kept_scores
     from diagnosis.blind.report import write_report
@@ -138,6 +138,6 @@ def _told(found: "OpenedSet", name: str, as_json: Path | None, report: Path | No
     methods = scored(found)
     with writing():  # before anything is printed, which ends where nobody reads on
         if report is not None:
-            write_report(methods, found.sealed, name, report)
+            write_report(methods, found.sealed, name, report, files)
     words = [table(methods, found.sealed), *(["", f"report     {report}"] if report is not None else [])]
     tell(as_json, kept_scores(found, methods), words)

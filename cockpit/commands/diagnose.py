@@ -50,7 +50,10 @@ class _Wishes(NamedTuple):
 
 def diagnose(
     evidence: Annotated[
-        list[Path], typer.Argument(help="Evidence folders with a manifest.toml, or a folder that holds such folders.")
+        list[Path],
+        typer.Argument(
+            help="Evidence folders with a manifest.toml, a folder that holds such folders, or one measured file."
+        ),
     ],
     report: Annotated[
         Path | None, typer.Option(help="Write a report, one .html file; for many folders a folder of them.")
@@ -66,6 +69,11 @@ def diagnose(
         ),
     ] = "",
     certs: Certs = None,
+    speed: Annotated[str, typer.Option(help="Of a file: speed of its drive, e.g. 0.5mm/s.")] = "",
+    mass: Annotated[
+        str, typer.Option(help="Of a file: mass of the slide, e.g. 1.5kg; seen in the slips if not given.")
+    ] = "",
+    channel_map: Annotated[Path | None, typer.Option("--map", help="Of a file: channel map, .toml.")] = None,
     as_json: Json = None,
 ) -> None:
     """Say what makes a rig differ from its description: the effect, how sure, how much of the gap it closes."""
@@ -78,6 +86,8 @@ def diagnose(
 
         end_like_ctrl_c()
         wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""))
+        if len(evidence) == 1 and evidence[0].is_file():
+            return _diagnose_file(evidence[0], wishes, speed, mass, channel_map)
         sources = find_sources(evidence)
         one = all(path.resolve() == sources[0].folder for path in evidence)
         _check_destinations(wishes, one, sources)
@@ -118,10 +128,43 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolde
             )
 
 
+def _diagnose_file(path: Path, wishes: _Wishes, speed: str, mass: str, channel_map: Path | None) -> int:
+    """A measured file: its rig's numbers are those that it shows, and are told beside the refitted ones."""
+    from tempfile import TemporaryDirectory
+
+    from cockpit.look.evidence import write_evidence
+    from cockpit.look.quantity import quantity
+    from cockpit.look.source import Asked, read_record
+    from diagnosis.diagnose_many import EvidenceFolder
+    from diagnosis.look.look import look
+    from diagnosis.look.words import headline
+
+    if wishes.cluster:
+        raise Fault("CONFIG", f"--cluster: takes evidence folders, which its workers read themselves; {path} is a file")
+    _check_destinations(wishes, one=True, sources=[])
+    asked = Asked(quantity("--speed", speed, "velocity"), None, quantity("--mass", mass, "mass"), map=channel_map)
+    record = read_record(path, asked)
+    seen = look(record.t_s, record.force_N, record.position_m, record.known)
+    if seen is None:
+        raise Fault("BAD_TABLE", f"{path.name}: fewer than 16 samples of a force with a time; give a longer record")
+    with TemporaryDirectory(prefix="stickslip-") as folder:
+        rig, assumed = write_evidence(record, seen, Path(folder))
+        _tell(wishes, headline(seen))
+        for name, value in rig.values().items():
+            share = rig.tolerance.get(name, 0.0)
+            how = "assumed" if name in assumed else "from the file" if name != "mass_kg" or not mass else "given"
+            _tell(
+                wishes,
+                f"rig        {name} = {value:.6g}" + (f" +- {100.0 * share:.2g} %" if share else "") + f", {how}",
+            )
+        for finding in record.findings:
+            _tell(wishes, finding.in_words())
+        return _diagnose_one(EvidenceFolder(path.stem, Path(folder)), wishes)
+
+
 def _diagnose_one(source: "EvidenceFolder", wishes: _Wishes) -> int:
     from cockpit.commands.diagnose_output import in_words, watched
     from diagnosis.evidence.folder import load_evidence
-    from diagnosis.report.page import write_report
     from diagnosis.report.rig_file import refuse_force_drive, write_rig
     from diagnosis.result import to_json
 
@@ -133,7 +176,7 @@ def _diagnose_one(source: "EvidenceFolder", wishes: _Wishes) -> int:
     tell(wishes.only_json, to_json(diagnosis), in_words(diagnosis), indent=1)
     wanted: list[tuple[str, Path | None, Callable[[Path], None]]] = [
         ("", wishes.json_file, lambda path: write_json(path, to_json(diagnosis))),
-        ("report     ", wishes.report, lambda path: write_report(diagnosis, source.name, path)),
+        ("report     ", wishes.report, partial(_write_report, source, diagnosis)),
     ]
     if wishes.apply is not None and diagnosis.verdict in ("unexplained", "partly"):
         why = (
@@ -186,10 +229,18 @@ def _result(
     return outcome.diagnosis
 
 
+def _write_report(source: "EvidenceFolder", diagnosis: "Diagnosis", path: Path) -> None:
+    """Write the report, with the files of the evidence at its foot. Raises Fault BAD_EVIDENCE, OSError."""
+    from diagnosis.evidence.manifest import MANIFEST, read_manifest
+    from diagnosis.report.page import write_report
+
+    files = [source.folder / MANIFEST, *(source.folder / run.file for run in read_manifest(source.folder).run)]
+    write_report(diagnosis, source.name, path, files)
+
+
 def _diagnose_many(sources: list["EvidenceFolder"], wishes: _Wishes) -> int:
     from cockpit.commands.diagnose_output import in_a_line, many_as_json, watched
     from diagnosis import diagnose_many as many
-    from diagnosis.report.page import write_report
 
     found: dict[str, FolderResult] = {}
     refused: list[Fault] = []
@@ -201,7 +252,7 @@ def _diagnose_many(sources: list["EvidenceFolder"], wishes: _Wishes) -> int:
         for outcome in outcomes:
             name = outcome.source.name
             if outcome.diagnosis is not None and wishes.report is not None:
-                page = partial(write_report, outcome.diagnosis, name)
+                page = partial(_write_report, outcome.source, outcome.diagnosis)
                 _written(wishes.report / reports[name], page, refused)
             found[name] = _without_pictures(outcome)
             progress(f"{len(found)} of {len(sources)}: {in_a_line(outcome)}", len(found) / len(sources))

@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from bridge.faults import Fault
 from bridge.files import JSON, refuse_to_replace, strict_json, write_json
 from bridge.plain import plain
+from bridge.provenance import COMMAND
 from cockpit.run.child_process import guarded, report
 from cockpit.run.writable import check_output, writing
 
@@ -41,6 +42,7 @@ class JsonGroup(TyperGroup):
         """Run a command line, that of the process if none is given."""
         given = list(sys.argv[1:] if args is None else args)
         words = with_places(given)
+        COMMAND.set(given)
         _AFTER.set(given[given.index(_OPTION) + 1 : given.index(_OPTION) + 2] if _OPTION in given else [])
         if f"{_OPTION}={STDOUT}" not in words:
             return super().main(words, *more, **options)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bridge.faults import Fault
 from bridge.units import counted
 from cockpit.commands.json_option import STDOUT, Json, JsonGroup, carry_out, tell
 from cockpit.commands.options import watched_share
@@ -13,6 +14,7 @@ from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
 
 if TYPE_CHECKING:
     from bridge.log.damage import Damage
+    from diagnosis.evidence.import_table import Imported
 
 log_app = typer.Typer(
     cls=JsonGroup, help="Look into a log, check it, make a cut one whole; tables out and in.", no_args_is_help=True
@@ -25,7 +27,8 @@ def log_info(path: LogArgument, as_json: Json = None) -> None:
     """Judge the run in a log: slips, swing, v_a / v_d, latency, what was lost; exit status 1 where it is not good."""
 
     def work() -> int:
-        from cockpit.judge.verdict import headline, in_words, judge
+        from cockpit.judge.verdict import judge
+        from cockpit.judge.verdict_words import headline, in_words
 
         verdict = judge(path)
         tell(as_json, verdict.as_dict(), [headline(verdict), *in_words(verdict)])
@@ -37,19 +40,39 @@ def log_info(path: LogArgument, as_json: Json = None) -> None:
 @log_app.command("recover")
 def log_recover(
     path: LogArgument,
-    out: Annotated[Path | None, typer.Option(help="Write here, FILE.mcap, instead of in place.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write here; LOG.recovered.mcap if not given.")] = None,
+    in_place: Annotated[bool, typer.Option("--in-place", help="Replace the log, each of its files.")] = False,
     as_json: Json = None,
 ) -> None:
-    """Save every message that can be read from a cut or damaged log, with a new index."""
+    """Save every message that can be read from a cut or damaged log in a new file with an index; topics stay what they are."""
 
     def work() -> None:
+        from bridge.files import check_file
         from bridge.log.recover import recover
 
+        if out is not None and in_place:
+            raise Fault("CONFIG", f"--out {out}: cannot go with --in-place; give one of the two")
+        new = path if in_place else out or path.with_name(f"{path.stem}.recovered.mcap")
         if out is not None:
             check_output("--out", out, LOG)
-        saved = recover(path, out or path)
-        words = f"{out or path}: {counted(saved.messages, 'message')}, whole again; {_lost(saved.damage) or 'nothing was lost'}"
-        tell(as_json, {"messages": saved.messages, "out": out or path} | saved.damage._asdict(), [words])
+        check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+        check_output("--in-place" if in_place else "--out", new, LOG)
+        saved = recover(path, new)
+        left_out = (
+            [counted(saved.attachments, "attachment left out", "attachments left out")] if saved.attachments else []
+        )
+        words = "; ".join(
+            (
+                f"{new}: {counted(saved.messages, 'message')}, {'in place' if in_place else 'in a new file'} with an index",
+                *(left_out or ()),
+                _lost(saved.damage) or "every message of the log is in it",
+            )
+        )
+        tell(
+            as_json,
+            {"messages": saved.messages, "attachments": saved.attachments, "out": new} | saved.damage._asdict(),
+            [words],
+        )
 
     carry_out(work, as_json)
 
@@ -61,6 +84,10 @@ def _lost(damage: "Damage") -> str:
     if damage.bad_records:
         names = "damaged definition, message or stretch", "damaged definitions, messages or stretches"
         parts.append(counted(damage.bad_records, *names))
+    if damage.nameless:
+        parts.append(f"{counted(damage.nameless, 'message')} whose topic is lost with its definition")
+    if damage.missing:
+        parts.append(f"{counted(damage.missing, 'message')} by the log's own count")
     parts += ["its end"] if not (parts or damage.whole) else []
     return "lost: " + ", ".join(parts) if parts else ""
 
@@ -105,31 +132,76 @@ def log_export(
 
 @log_app.command("import")
 def log_import(
-    path: Annotated[Path, typer.Argument(help="Measured data: .csv, .parquet, .mat (v5 to v7) or .tdms.")],
-    channel_map: Annotated[Path, typer.Option("--map", help="Channel map, .toml: columns, scales, rig.")],
+    path: Annotated[
+        Path,
+        typer.Argument(help="Measured data: text of any delimiter, .xlsx, .parquet, .mat, .h5, .tdms, ROS 2 .mcap."),
+    ],
     out: Annotated[
         Path,
         typer.Option(
             "--out", help="Evidence folder (a run is added), or FILE.mcap for log check, export and diagnose."
         ),
     ],
+    channel_map: Annotated[
+        Path | None,
+        typer.Option("--map", help="Channel map, .toml: columns, scales, rig; without it one is made, and written."),
+    ] = None,
+    speed: Annotated[str, typer.Option(help="Without a map: speed of the drive, e.g. 0.5mm/s.")] = "",
+    mass: Annotated[str, typer.Option(help="Without a map: mass of the slide, e.g. 1.5kg.")] = "",
     as_json: Json = None,
 ) -> None:
     """Turn measured data of another program into evidence for `stickslip diagnose`, or into a run log."""
 
     def work() -> None:
+        from bridge.files import write_whole
         from diagnosis.evidence.import_table import import_file
 
         if out.suffix == ".mcap":
             check_output("--out", out, LOG)
         else:
             check_output_folder("--out", out)
-        done = import_file(path, channel_map, out)
+        if channel_map is not None:
+            done, made = import_file(path, channel_map, out), None
+        else:
+            done, made = _import_as_seen(path, out, speed, mass)
         place = done.out if done.out.suffix == ".mcap" else done.out / done.file
-        words = f"{place}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"
-        tell(as_json, done, [words, *(finding.in_words() for finding in done.findings)])
+        words = [f"{place}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"]
+        words += [finding.in_words() for finding in done.findings]
+        if made is not None:
+            beside = out.with_suffix("") if out.suffix == ".mcap" else out / path.stem
+            kept = beside.with_name(beside.name + ".map.toml")
+            write_whole(kept, made)
+            words.append(f"map        {kept}: what was assumed; correct it, and import again with --map")
+        tell(as_json, done, words)
 
     carry_out(work, as_json)
+
+
+def _import_as_seen(path: Path, out: Path, speed: str, mass: str) -> "tuple[Imported, str]":
+    """Import without a map: columns by their names, numbers of the rig from the record; and the map that says so."""
+    from tempfile import TemporaryDirectory
+
+    from bridge.faults import Fault
+    from cockpit.look.evidence import full_map
+    from cockpit.look.quantity import quantity
+    from cockpit.look.source import Asked, read_record
+    from diagnosis.evidence.import_table import import_file
+    from diagnosis.look.look import look
+
+    record = read_record(path, Asked(quantity("--speed", speed, "velocity"), None, quantity("--mass", mass, "mass")))
+    if not record.map_text:
+        raise Fault("CONFIG", f"{path.name}: is a run log of this project, which needs no import")
+    made = record.map_text
+    if out.suffix != ".mcap":
+        seen = look(record.t_s, record.force_N, record.position_m, record.known)
+        if seen is None:
+            raise Fault("BAD_TABLE", f"{path.name}: fewer than 16 samples of a force with a time; give a longer record")
+        made = full_map(record, seen)
+    with TemporaryDirectory(prefix="stickslip-") as folder:
+        channel_map = Path(folder) / f"{path.stem}.map.toml"
+        channel_map.write_text(made, encoding="utf-8")
+        done = import_file(path, channel_map, out)
+        return done._replace(findings=list(dict.fromkeys([*record.findings, *done.findings]))), made
 
 
 @log_app.command("check")
@@ -138,6 +210,7 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
 
     def work() -> int:
         from bridge.log.check.log_check import check_log
+        from bridge.log.damage import foreign_in_words
         from bridge.log.storage.chain import chain_in_words
         from bridge.wire.topics import BY_NAME
 
@@ -148,7 +221,9 @@ def log_check(path: LogArgument, as_json: Json = None) -> None:
         )
         late = ", ".join(f"{name} {100 * share:.2f} %" for name, share in check.late_share.items())
         words = f"{path}: {counted(len(check.findings), 'finding')}; {check.seconds:.2f} s; {counts}; later than 1 ms: {late}"
-        tell(as_json, check, [*(finding.in_words() for finding in check.findings), chain_in_words(check.chain), words])
+        found = [finding.in_words() for finding in check.findings]
+        others = [f"others   {line}" for line in foreign_in_words(check.foreign)]
+        tell(as_json, check, [*found, chain_in_words(check.chain), *others, words])
         return 1 if check.findings else 0
 
     carry_out(work, as_json)

@@ -27,6 +27,10 @@ Certs = Annotated[
 Insecure = Annotated[
     bool, typer.Option("--insecure", help="Listen at a tcp/ endpoint that others reach, and ask nobody for a password.")
 ]
+Wait = Annotated[
+    float | None,
+    typer.Option("--wait", min=0.1, max=1e6, metavar="S", help="Longest wait for the others at the start, in seconds."),
+]
 Prefix = Annotated[str | None, typer.Option(help="First part of every key on the bus.")]
 Lockstep = Annotated[
     bool,
@@ -44,6 +48,7 @@ def as_settings(
     prefix: str | None,
     certs: Path | None = None,
     insecure: bool = False,
+    wait_s: float | None = None,
 ) -> list[str]:
     """What the options say, as settings of a scenario."""
     result = list(settings)
@@ -57,6 +62,8 @@ def as_settings(
         result.append(f"bus.certificates={json.dumps(str(certs.absolute()), ensure_ascii=False)}")
     if insecure:
         result.append("bus.insecure=true")
+    if wait_s is not None:
+        result.append(f"bus.wait_s={wait_s}")
     return result
 
 

@@ -68,7 +68,10 @@ def reset(
     certs: Certs = None,
     as_json: Json = None,
 ) -> None:
-    """Take back a stop, or a fault whose cause is gone; the rig is then DISARMED, until `stickslip arm`."""
+    """Take back a stop, or a fault whose cause is gone: a rig in FAULT is then DISARMED, until `stickslip arm`.
+
+    Trips of the controller end as well; a rig that they left armed stays so, and vibrates again.
+    """
     _say("RESET", scenario, endpoint, prefix, certs, as_json)
 
 

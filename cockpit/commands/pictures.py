@@ -1,16 +1,18 @@
-"""`stickslip plot`, `map` and `reproduce`: a run, a rig and the paper as pictures."""
+"""`stickslip plot`, `review`, `map` and `reproduce`: a run, a rig and the paper as pictures and pages."""
 
 import contextlib
+import math
 from collections.abc import Generator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose
 from cockpit.commands.json_option import Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO
-from cockpit.run.writable import PAGE, PICTURE, check_output, writing
+from cockpit.run.writable import CSV, PAGE, PICTURE, check_output, writing
 
 
 @contextlib.contextmanager
@@ -23,26 +25,86 @@ def _written(out: Path, suffixes: tuple[str, ...]) -> Generator[None]:
 
 
 def plot(
-    log: Annotated[Path, typer.Argument(help="A run log, .mcap.")],
+    log: Annotated[Path, typer.Argument(help="A run log, .mcap, or one that `log import` made.")],
     out: Annotated[
         Path | None,
         typer.Option(
             help="The picture: .png, .svg or .pdf; if not given, a PNG beside LOG under its name.", show_default=False
         ),
     ] = None,
+    start: Annotated[str, typer.Option("--from", help="From this time of the run on, e.g. 12.5s.")] = "",
+    end: Annotated[str, typer.Option("--to", help="Up to this time of the run, e.g. 20s.")] = "",
+    signals: Annotated[
+        str,
+        typer.Option(
+            help="Comma-separated columns, e.g. drive_force_N,amplitude_m; neighbours of one unit share an axis."
+        ),
+    ] = "",
+    style: Annotated[
+        str,
+        typer.Option(metavar="screen|paper", help="screen: the answer above; paper: without, small text, one column."),
+    ] = "screen",
+    width: Annotated[
+        float | None, typer.Option(help="Width in mm; 280 for a screen and 85 for a paper if not given.")
+    ] = None,
+    dpi: Annotated[
+        float | None, typer.Option(help="Dots an inch of a .png; 110 for a screen and 600 for a paper if not given.")
+    ] = None,
+    versus: Annotated[Path | None, typer.Option("--vs", help="A second log, drawn over the first.")] = None,
+    data: Annotated[Path | None, typer.Option(help="Write the numbers of the curves there, FILE.csv.")] = None,
     as_json: Json = None,
 ) -> None:
-    """Draw the run in a log: drive force, v_a against v_d, and what the controller did."""
+    """Draw the run in a log: drive force, v_a against v_d, and what the controller did; or any of its signals."""
 
     def work() -> None:
-        from cockpit.judge.run_plot import plot_run
+        from cockpit.figures.request import request_of
+        from cockpit.figures.run_figure import draw_logs
+        from cockpit.run.replay import time_s
 
-        check_file(log, "BAD_LOG", "give the path of a run log, .mcap")
+        from_s = time_s(f"--from {start}", start, "12.5s") if start else -math.inf
+        to_s = time_s(f"--to {end}", end, "20s") if end else math.inf
+        request = request_of(from_s, to_s, signals, style, width, dpi)
+        logs = [log] if versus is None else [log, versus]
+        for path in logs:
+            check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
         picture = out or log.parent / f"{log.stem}.png"
-        refuse_to_lose([log], "the log", "--out", picture)
+        refuse_to_lose(logs, "the log", "--out", picture)
+        refuse_to_lose(logs, "the log", "--data", data)
+        if data is not None:
+            check_output("--data", data, CSV)
         with _written(picture, PICTURE):
-            verdict = plot_run(log, picture)
-        tell(as_json, {"picture": picture} | verdict.as_dict(), [f"picture  {picture}"])
+            verdict = draw_logs(logs, picture, request, data)[0]
+        words = [f"picture  {picture}", *([f"data     {data}"] if data is not None else [])]
+        tell(as_json, {"picture": picture, "data": data} | verdict.as_dict(), words)
+
+    carry_out(work, as_json)
+
+
+def review(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="A log, .mcap, or two, the second laid over the first.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="The page, .html; if not given, beside the first LOG.", show_default=False)
+    ] = None,
+    as_json: Json = None,
+) -> None:
+    """Make one page of a log: the verdict, curves to zoom into, what was decided and why, events; two logs are compared."""
+
+    def work() -> None:
+        from cockpit.judge.verdict_words import headline
+        from cockpit.review.page import write_review
+
+        if len(logs) > 2:
+            raise Fault("CONFIG", f"{logs[2]}: is a third log: a page has one or two; leave it out")
+        for path in logs:
+            check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+        page = out or logs[0].parent / f"{logs[0].stem}.html"
+        refuse_to_lose(logs, "the log", "--out", page)
+        with _written(page, PAGE):
+            verdicts = write_review(logs, page)
+        result = {"page": page, "logs": [verdict.as_dict() for verdict in verdicts]}
+        tell(as_json, result, [*(f"{verdict.log}: {headline(verdict)}" for verdict in verdicts), f"page     {page}"])
 
     carry_out(work, as_json)
 
@@ -66,7 +128,7 @@ def stability(
 
         made = load_rig(rig, settings)
         with _written(out, PICTURE):
-            result = stability_map(made, out)
+            result = stability_map(made, out, [path for path in [Path(rig)] if path.is_file()])
         tell(as_json, result, [result.answer, f"picture  {out}"])
 
     carry_out(work, as_json)

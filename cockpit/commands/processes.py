@@ -18,6 +18,7 @@ from cockpit.commands.options import (
     ScenarioName,
     Seed,
     Settings,
+    Wait,
     as_settings,
 )
 from cockpit.run.child_process import stop_event, warn_without_priority
@@ -53,6 +54,7 @@ def plant(
     insecure: Insecure = False,
     lockstep: Lockstep = False,
     wait_for: Annotated[str, typer.Option(help="Roles that must be on the bus before the first block.")] = "controller",
+    wait: Wait = None,
     child: ChildOf = 0,
     as_json: Json = None,
 ) -> None:
@@ -60,17 +62,26 @@ def plant(
 
     def work() -> None:
         from bridge.guard.latch import StopLatch
-        from cockpit.run.scenario import header, load_scenario, refuse_what_takes_no_clock
+        from cockpit.run.scenario import (
+            header,
+            load_scenario,
+            refuse_faults_of_processes,
+            refuse_faults_that_take_time,
+            refuse_what_takes_no_clock,
+        )
         from plant.app import run as serve
 
-        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs, insecure))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs, insecure, wait))
         roles = [role for role in wait_for.split(",") if role]
         if unknown := set(roles) - {"controller", "recorder"}:
             raise Fault(
                 "CONFIG", f"--wait-for {wait_for}: {min(unknown)}: must be controller, recorder or both, by comma"
             )
-        if not lockstep:
+        if lockstep:
+            refuse_faults_that_take_time(made)
+        else:
             refuse_what_takes_no_clock(made)
+            refuse_faults_of_processes(made)
         if not (lockstep or child):
             warn_without_priority()
         described = header(made, "plant", lockstep)
@@ -87,6 +98,7 @@ def plant(
             stop_event(child),
             made.arm,
             latch,
+            made.fault,
         )
         served = Served("plant", made.bus.endpoint, lockstep, blocks)
         tell(as_json, served, [served.in_words()])
@@ -102,6 +114,7 @@ def controller(
     prefix: Prefix = None,
     certs: Certs = None,
     lockstep: Lockstep = False,
+    wait: Wait = None,
     child: ChildOf = 0,
     as_json: Json = None,
 ) -> None:
@@ -111,7 +124,7 @@ def controller(
         from cockpit.run.scenario import header, load_scenario, refuse_what_takes_no_clock
         from controller.app import run as control
 
-        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs, wait_s=wait))
         if not lockstep:
             refuse_what_takes_no_clock(made)
         if not (lockstep or child):
@@ -132,6 +145,7 @@ def record(
     certs: Certs = None,
     lockstep: Lockstep = False,
     log: LogFile = None,
+    wait: Wait = None,
     child: ChildOf = 0,
     as_json: Json = None,
 ) -> None:
@@ -142,7 +156,7 @@ def record(
         from cockpit.run.run import about_run, keep_aside, log_path
         from cockpit.run.scenario import load_scenario
 
-        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs))
+        made = load_scenario(scenario, as_settings(settings, seed, endpoint, prefix, certs, wait_s=wait))
         path = log_path(log, made.name)
         check_output("--log", path, LOG)
 

@@ -16,6 +16,7 @@ from cockpit.commands.options import (
     ScenarioName,
     Seed,
     Settings,
+    Wait,
     as_settings,
 )
 from cockpit.run.child_process import stopped_once
@@ -38,6 +39,7 @@ def run(
         bool, typer.Option("--in-process", help="Lockstep in one process, without a bus: fastest.")
     ] = False,
     log: LogFile = None,
+    wait: Wait = None,
     as_json: Json = None,
 ) -> None:
     """Run plant, controller and recorder to the end of a scenario and say what came of it."""
@@ -49,7 +51,7 @@ def run(
         other = [rig_setting(rig)] if rig is not None else []
         changed = [*other, *as_settings(settings, seed, endpoint, prefix, certs, insecure)]
         with stopped_once():
-            came = run_scenario(scenario, changed, lockstep, in_process, log)
+            came = run_scenario(scenario, changed, lockstep, in_process, log, wait)
             tell(as_json, came.as_dict(), came.in_words())
         return 0 if came.verdict.good else 1
 

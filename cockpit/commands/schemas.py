@@ -127,14 +127,27 @@ def _import_map() -> dict[str, Any]:
 
 
 def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
-    from diagnosis.evidence.manifest import STANDARD, RigTable
+    from diagnosis.evidence.manifest import RigTable
+    from diagnosis.evidence.manifest_keys import STANDARD
 
     column = {"type": "string", "minLength": 1, "description": "The column alone."}
-    channel = {"anyOf": [column, {"$ref": "#/$defs/ChannelMap"}]}
-    channels = schema["properties"]["channels"]
-    channels |= {"properties": dict.fromkeys(STANDARD, channel), "additionalProperties": False}
-    numbers = [name for name in RigTable.model_fields if name not in {"drive", "tolerance"}]
-    tolerance = schema["$defs"]["RigTable"]["properties"]["tolerance"]
+    number = {"type": "integer", "minimum": 1, "description": "The number of the column."}
+    channel = {"anyOf": [column, number, {"$ref": "#/$defs/ChannelMap"}]}
+    of_channel = schema["$defs"]["ChannelMap"]["properties"]
+    of_channel["column"] = {"anyOf": [of_channel["column"], number]}
+    tables = [schema, schema["$defs"]["RunTable"]] if "RunTable" in schema["$defs"] else [schema]
+    for table in tables:
+        channels = table["properties"]["channels"]
+        channels |= {"properties": dict.fromkeys(STANDARD, channel), "additionalProperties": False}
+    rig = schema["$defs"]["RigTable"]
+    # what an owner can hardly know is assumed
+    rig |= (
+        {"required": [name for name in rig["required"] if not name.startswith(("contact", "viscous"))]}
+        if "required" in rig
+        else {}
+    )
+    numbers = [name for name in RigTable.model_fields if name not in {"drive", "tolerance", "radius_m"}]
+    tolerance = rig["properties"]["tolerance"]
     share = {"type": "number", "minimum": 0.0, "maximum": 1.0}
     tolerance |= {"properties": dict.fromkeys(numbers, share), "additionalProperties": False}
     return schema
@@ -212,14 +225,43 @@ def _plot() -> dict[str, Any]:
     from cockpit.commands.json_types import schema_of, table
     from cockpit.judge.verdict import RunVerdict
 
-    return schema_of(table(RunVerdict, {"good": bool, "picture": str}))
+    return schema_of(table(RunVerdict, {"good": bool, "picture": str, "data": str | None}))
+
+
+def _review() -> dict[str, Any]:
+    from cockpit.commands.json_types import objects, schema_of, table
+    from cockpit.judge.verdict import RunVerdict
+
+    return schema_of(objects("Review", {"page": str, "logs": list[table(RunVerdict, {"good": bool})]}))
+
+
+def _look() -> dict[str, Any]:
+    from bridge.log.finding import Finding
+    from cockpit.commands.json_types import objects, schema_of
+
+    number = objects("Number", {"value": float, "interval_90": list[float | None], "unit": str})
+    of_speed = {"speed_mps": float, "times": int, "mean_N": number, "breakaway_N": number | None}
+    fields = {
+        "headline": str,
+        "seconds": float,
+        "rate_Hz": float,
+        "noise_N": float,
+        "slips": int,
+        "swings_without_stick": int,
+        "mean_force_N": float,
+        "numbers": dict[str, number],
+        "at_speeds": list[objects("AtSpeed", of_speed)],
+        "findings": list[Finding],
+        "written": list[str],
+    }
+    return schema_of(objects("Look", fields))
 
 
 def _log_recover() -> dict[str, Any]:
     from bridge.log.damage import Damage
     from cockpit.commands.json_types import schema_of, table
 
-    return schema_of(table(Damage, {"messages": int, "out": str}))
+    return schema_of(table(Damage, {"messages": int, "attachments": int, "out": str}))
 
 
 def _explain() -> dict[str, Any]:
@@ -236,6 +278,26 @@ def _reproduce() -> dict[str, Any]:
     from cockpit.paper.page import ReproduceResult
 
     return schema_of(table(ReproduceResult, {"passed": bool, "verdict": str}))
+
+
+def _faults() -> dict[str, Any]:
+    from cockpit.faults.catalogue import Group
+
+    return Group.model_json_schema()
+
+
+def _soak() -> dict[str, Any]:
+    from cockpit.commands.json_types import schema_of, table
+    from cockpit.run.soak import Soaked
+
+    return schema_of(table(Soaked, {"good": bool}))
+
+
+def _bench_faults() -> dict[str, Any]:
+    from cockpit.commands.json_types import schema_of, table
+    from cockpit.faults.bench import FaultBench
+
+    return schema_of(table(FaultBench, {"counts": dict[str, int], "worse_than_known": list[str]}))
 
 
 def _result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[str, Any]]:
@@ -256,6 +318,7 @@ TOML = (
     Format("rig", "A rig file, as in deploy/rigs: `--rig FILE.toml`.", _rig),
     Format("scenario", "A scenario file, as in deploy/scenarios: `--scenario FILE.toml`.", _scenario),
     Format("bank", "A family of the bank of `stickslip bench control`, as in deploy/scenarios/bank.", _bank),
+    Format("faults", "A group of the catalogue of `stickslip bench faults`, as in deploy/faults.", _faults),
     Format("controller", "The table [controller] of a scenario, and the configuration in a log.", _controller),
     Format("evidence-1", "manifest.toml of an evidence folder, evidence/1.", _evidence),
     Format("import-map", "A channel map: `stickslip log import --map FILE.toml`.", _import_map),
@@ -275,12 +338,17 @@ JSON = (
         "`stickslip arm --json`, and the same of disarm, stop and reset.",
         _result_of("cockpit.run.operator", "Obeyed"),
     ),
+    Format("fault-result", "`stickslip fault --json`.", _result_of("cockpit.faults.injection", "Injected")),
+    Format("fault-list", "`stickslip fault --list --json`.", _result_of("cockpit.faults.catalogue", "Known")),
+    Format("soak-result", "`stickslip soak --json`.", _soak),
     Format("certs-result", "`stickslip certs --json`.", _result_of("cockpit.run.authority", "Made")),
     Format("replay-result", "`stickslip replay --json`.", _result_of("cockpit.run.replay", "Replayed", many=True)),
     Format(
         "closed-loop-result", "`stickslip replay --closed-loop --json`.", _result_of("cockpit.run.replay", "Compared")
     ),
     Format("plot-result", "`stickslip plot --json`.", _plot),
+    Format("review-result", "`stickslip review --json`.", _review),
+    Format("look-result", "`stickslip look --json`.", _look),
     Format("map-result", "`stickslip map --json`.", _result_of("cockpit.judge.stability_map", "MapResult")),
     Format("reproduce-result", "`stickslip reproduce --json`.", _reproduce),
     Format("example-result", "`stickslip example --json`.", _result_of("cockpit.commands.example", "Example")),
@@ -292,6 +360,7 @@ JSON = (
         "log-import-result", "`stickslip log import --json`.", _result_of("diagnosis.evidence.import_table", "Imported")
     ),
     Format("bench-control-result", "`stickslip bench control --json`.", _bench_control),
+    Format("bench-faults-result", "`stickslip bench faults --json`.", _bench_faults),
     Format("blind-run-result", "`stickslip blind run --json`.", _result_of("cockpit.commands.blind", "SetDone")),
     Format("scenarios-result", "`stickslip scenarios --json`.", _result_of("cockpit.commands.scenarios", "Known")),
     Format("explain-result", "`stickslip explain --json`.", _explain),

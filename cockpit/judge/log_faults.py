@@ -4,16 +4,16 @@ from collections import Counter
 
 import numpy as np
 
-from bridge.log.damage import damage_findings
+from bridge.log.damage import damage_findings, foreign_in_words
 from bridge.log.finding import Finding
 from bridge.log.logfile import RunData
 from bridge.log.storage.chain import chain_findings
 from bridge.units import counted
-from bridge.wire.event_codes import harms, is_told
+from bridge.wire.event_codes import WEAK_REASONS, harms, is_told
 
 _MOST_EVENTS = 20  # of one code that are told one by one
 _CLOCK_TOLERANCE_NS = 1000  # rounding to whole nanoseconds is far below
-_COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN"}  # from the blocks and steps themselves
+_COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}  # from the blocks and steps themselves
 
 
 def of_bytes(run: RunData) -> list[Finding]:
@@ -35,7 +35,7 @@ def of_events(run: RunData) -> tuple[list[str], list[str]]:
     for code, count in counts.items():
         if count > _MOST_EVENTS:
             (faults if harms(code) else told).append(f"{code}: and {count - _MOST_EVENTS} more")
-    return faults, told
+    return faults, [*told, *foreign_in_words(run.foreign)]
 
 
 def of_clock(run: RunData, block_s: float) -> str | None:

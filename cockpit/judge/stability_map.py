@@ -1,10 +1,12 @@
 """The envelope of a rig as a picture: where it sticks and slips, and how much vibration removes that."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bridge.faults import Fault
 from bridge.files import replacing
+from bridge.provenance import Provenance, provenance
 from plant.config import RigConfig
 
 if TYPE_CHECKING:
@@ -36,8 +38,8 @@ class MapResult(NamedTuple):
     answer: str
 
 
-def stability_map(rig: RigConfig, out: Path) -> MapResult:
-    """Draw the map of `rig` to `out`, a .png, .svg or .pdf file, and return its numbers.
+def stability_map(rig: RigConfig, out: Path, files: Iterable[Path] = ()) -> MapResult:
+    """Draw the map of `rig`, which comes from `files`, to `out`, a .png, .svg or .pdf file, and return its numbers.
 
     The operating point is the velocity of the drive's profile that needs the most vibration: the highest one, but for a
     damped drive, where the lower ones are the unstable ones. Raises Fault CONFIG if the drive never moves, and OSError
@@ -83,7 +85,7 @@ def stability_map(rig: RigConfig, out: Path) -> MapResult:
         answer="",
     )
     result = numbers._replace(answer=_answer(rig.name, numbers))
-    _draw(rig, result, out)
+    _draw(rig, result, out, provenance(files))
     return result
 
 
@@ -116,7 +118,8 @@ def _mm(velocity_mps: float) -> str:
     return f"{velocity_mps * 1e3:.3g}"
 
 
-def _draw(rig: RigConfig, result: MapResult, out: Path) -> None:
+def _draw(rig: RigConfig, result: MapResult, out: Path, made: Provenance) -> None:
+    import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -126,8 +129,10 @@ def _draw(rig: RigConfig, result: MapResult, out: Path) -> None:
     _draw_without_vibration(left, rig, result)
     _draw_with_vibration(right, rig, result)
     figure.suptitle(result.answer, fontsize=13, color=_INK)
-    with replacing(out) as file:
-        figure.savefig(file, dpi=120, format=out.suffix.lower().removeprefix("."))
+    figure.supxlabel(made.in_words(), fontsize=6, color="#808b96", x=0.01, ha="left", parse_math=False)
+    suffix = out.suffix.lower()
+    with mpl.rc_context({"svg.hashsalt": "stickslip"}), replacing(out) as file:
+        figure.savefig(file, dpi=120, format=suffix.removeprefix("."), metadata=made.metadata(suffix, "stability map"))
 
 
 def _draw_without_vibration(axes: Any, rig: RigConfig, result: MapResult) -> None:

@@ -1,4 +1,4 @@
-"""What came of a run, read from its log alone: in numbers for scripts and in words for a mechanic."""
+"""What came of a run, read from its log alone, in numbers."""
 
 import math
 import re
@@ -7,22 +7,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.log.in_charge import GONE_S, WEAK_S, InCharge, in_charge
-from bridge.log.logfile import RunData, read_run
-from bridge.log.metadata import number_of
-from bridge.log.storage.chain import Chain, chain_in_words
+from bridge.log.in_charge import GONE_S, InCharge, in_charge
+from bridge.log.logfile import RunData, block_period_ns, read_run, sample_times_s
+from bridge.log.metadata import number_of, source_of_import, texts_of
+from bridge.log.storage.chain import Chain
 from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.log_faults import of_bytes, of_clock, of_events
-from cockpit.judge.pauses import Pauses, pauses_in, pauses_in_words
+from cockpit.judge.pauses import Pauses, pauses_in
 from diagnosis.features.cycles import Cycles, find_cycles
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
-_ALARM_RATIO = 1.05
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
 _STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a drive that changed by less in this time moves evenly
-_FADE_S = 0.2  # of the vibration at the end of a run
 _CONTROLLED = ("drive_force_N", "mass_position_m", "base_accel_mps2", "drive_position_m")
 _STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
 _BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; a foreign rig need not say it
@@ -62,7 +60,9 @@ class RunVerdict(NamedTuple):
     charge: InCharge  # when the rig was on its own, which is no part of `after` either, and blocks without an answer
     alone: Phase | None  # the rig on its own, for longer than a late command explains
     before: Phase | None
+    taking_over: Phase | None  # the second that the controller has to settle, between `before` and `after`
     after: Phase | None
+    stopped_slips: int  # in `stopped_s` and the second after it, which are no part of `after` either
     drive_velocity_max_mps: float  # as measured
     velocity_ratio_min: float
     velocity_ratio_max: float
@@ -74,6 +74,8 @@ class RunVerdict(NamedTuple):
     chain: Chain
     normal_scheduling: list[str]  # processes without a real-time priority; in lockstep none needs it
     untested: str  # why nothing was tested; empty where the drive moved with the controller in charge
+    imported: str  # the file of another program that the log was made from; empty for a run
+    gain_verified: bool  # of the exciter: by a loop check of the rig, or told by the configuration
 
     @property
     def good(self) -> bool:
@@ -81,13 +83,15 @@ class RunVerdict(NamedTuple):
 
         A machine that pauses for some 20 ms loses nothing: the controller ramps down and up again, which is told and no more.
         """
+        if self.imported:  # there was nothing to test: the log tells what is there, whole
+            return self.lost_blocks == 0 and not self.faults
         gone = not self.untested and self.after is not None and self.after.slips == 0
         return gone and self.lost_blocks == 0 and not self.faults
 
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
         table: dict[str, Any] = self._asdict() | {"good": self.good, "chain": self.chain.as_dict()}
-        for name in ("before", "after", "alone", "charge", "latency", "pauses"):
+        for name in ("before", "taking_over", "after", "alone", "charge", "latency", "pauses"):
             table[name] = table[name] and table[name]._asdict()
         return table
 
@@ -97,8 +101,33 @@ def judge(path: Path) -> RunVerdict:
     return judge_run(read_run(path))
 
 
+def cycles_of(run: RunData) -> Cycles | None:
+    """The slips in the drive force of a log that was read; None where it holds no force. Raises Fault BAD_LOG."""
+    if not len(run.sensors) or "drive_force_N" in absent_channels(run):
+        return None
+    force_N = run.sensors["drive_force_N"].astype(np.float64)
+    finite = np.isfinite(force_N).all(axis=1)
+    if not finite.any():
+        return None
+    imported = source_of_import(run.headers, run.path)
+    period_ns = (
+        block_period_ns(run.sensors)
+        if imported
+        else 1e9 * number_of(run.configuration("controller"), "block_s", run.path)
+    )
+    sample_s = sample_times_s(run.sensors[finite], period_ns)
+    return find_cycles(sample_s.ravel(), force_N[finite].ravel(), slowest_fall_s=_slowest_fall_s(run))
+
+
+def absent_channels(run: RunData) -> list[str]:
+    """Channels that the file of another program did not hold; they are zeros in its log. Raises Fault BAD_LOG."""
+    return texts_of(run.headers, "import", "missing", run.path)
+
+
 def judge_run(run: RunData) -> RunVerdict:
-    """Judge a run that was read."""
+    """Judge a run that was read; of measured data of another program, say what is there. Raises Fault BAD_LOG."""
+    if source := source_of_import(run.headers, run.path):
+        return _judge_imported(run, source)
     controller = run.configuration("controller")
     block_s = number_of(controller, "block_s", run.path)
     enabled_from_s = number_of(controller, "policy.enabled_from_s", run.path)
@@ -108,12 +137,10 @@ def judge_run(run: RunData) -> RunVerdict:
     seconds = float(t_s[-1]) if blocks else 0.0
     began_s = max(float(t_s.min()) - block_s, 0.0) if blocks else 0.0  # a log may begin late
     in_charge_s = enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
-    samples = force_N.shape[1] if blocks else 1
     finite = np.isfinite(force_N).all(axis=1)
     unreadable = [name for name in _CONTROLLED if not np.isfinite(run.sensors[name]).all()]
     t_s, force_N = t_s[finite], force_N[finite]
-    sample_s = (t_s[:, None] + (np.arange(samples) + 1 - samples) * (block_s / samples)).ravel()
-    cycles = find_cycles(sample_s, force_N.ravel(), slowest_fall_s=_slowest_fall_s(run)) if len(t_s) else None
+    cycles = cycles_of(run)
     mean_N = force_N.mean(axis=1)
     trace = run.trace
     stops = _stops(trace, block_s)
@@ -161,7 +188,9 @@ def judge_run(run: RunData) -> RunVerdict:
         charge=charge,
         alone=_alone(cycles, t_s, mean_N, gone),
         before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds), []),
+        taking_over=_phase(cycles, t_s, mean_N, enabled_from_s, min(in_charge_s, seconds), without),
         after=after,
+        stopped_slips=_slips_in(cycles, stops),
         drive_velocity_max_mps=float(trace["drive_velocity_mps"].max(initial=0.0)),
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
@@ -175,7 +204,62 @@ def judge_run(run: RunData) -> RunVerdict:
             event.source for event in run.events if event.code == "START" and event.text.startswith(realtime.NORMAL)
         ],
         untested=_untested(run, after, seconds - enabled_from_s - stopped_s - gone_s),
+        imported="",
+        gain_verified=_gain_is_verified(run),
     )
+
+
+def _gain_is_verified(run: RunData) -> bool:
+    """Whether v_a is known from more than the accelerometer: one that was wrong from the start cannot be seen otherwise."""
+    told = bool(run.configuration("controller").get("amplitude", {}).get("known_gain"))
+    return told or bool((run.applied["cause"] == wire.CHECK_PASSED).any())
+
+
+def _judge_imported(run: RunData, source: str) -> RunVerdict:
+    """What is in measured data of another program: its slips and its swing; no controller was there to be judged."""
+    blocks = len(run.sensors)
+    t_s = run.sensors["t_ns"] * 1e-9
+    mean_N = run.sensors["drive_force_N"].astype(np.float64).mean(axis=1)
+    finite = np.isfinite(mean_N)
+    seconds = float(t_s[-1]) if blocks else 0.0
+    lost_blocks, all_losses_known = _lost_blocks(run)
+    return RunVerdict(
+        log=str(run.path),
+        seconds=seconds,
+        blocks=blocks,
+        lost_blocks=lost_blocks,
+        lost_messages=lost_blocks,
+        all_losses_known=all_losses_known,
+        enabled_from_s=seconds,
+        stopped_s=0.0,
+        charge=in_charge(run),
+        alone=None,
+        before=_phase(cycles_of(run), t_s[finite], mean_N[finite], 0.0, seconds, []),
+        taking_over=None,
+        after=None,
+        stopped_slips=0,
+        drive_velocity_max_mps=0.0,
+        velocity_ratio_min=0.0,
+        velocity_ratio_max=0.0,
+        latency=None,
+        pauses=None,
+        not_watched="",
+        faults=[f"{finding.kind}: {finding.text}" for finding in of_bytes(run)],
+        told=[],
+        chain=run.chain,
+        normal_scheduling=[],
+        untested="measured data of another program: no controller was there to be judged",
+        imported=source,
+        gain_verified=True,
+    )
+
+
+def _slips_in(cycles: Cycles | None, stretches: list[tuple[float, float]]) -> int:
+    """Slips in any of the stretches, each counted once."""
+    if cycles is None or not stretches:
+        return 0
+    at_s = cycles.breakaway_t_s
+    return int(np.count_nonzero(np.any([(at_s > one[0]) & (at_s <= one[1]) for one in stretches], axis=0)))
 
 
 def _is_steady(speed_mps: Any, block_s: float) -> Any:
@@ -303,71 +387,3 @@ def _latency(run: RunData) -> Latency | None:
     in_time = int(run.applied["commands"].sum()) - int(run.applied["commands_late"].sum())
     # a command that never came is a late one; the last block's comes after the end
     return Latency(p50, p99, p999, min(in_time / max(len(run.applied) - 1, 1), 1.0))
-
-
-def in_words(verdict: RunVerdict) -> list[str]:
-    """The verdict as lines for a person."""
-    v = verdict
-    lines: list[str] = []
-    if v.before is not None:
-        lines.append(
-            f"before   {counted(v.before.slips, 'slip')} in {v.before.seconds:.1f} s ({v.before.slips_per_min:.0f} per "
-            f"minute of this phase), drive force swings by {v.before.swing_N:.2f} N"
-        )
-    if v.after is not None:
-        lines.append(
-            f"after    {counted(v.after.slips, 'slip')} in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
-        )
-    if v.alone is not None:
-        lines.append(
-            f"alone    {counted(v.alone.slips, 'slip')} in {v.alone.seconds:.2f} s with nobody in charge, drive force swings by "
-            f"{v.alone.swing_N:.2f} N"
-        )
-    if v.stopped_s > _FADE_S:
-        lines.append(
-            f"stopped  by an operator, or not armed, for {v.stopped_s:.1f} s, which is no part of what came after"
-        )
-    if v.velocity_ratio_max > 0:
-        low = "ok" if v.velocity_ratio_min >= _ALARM_RATIO else f"below {_ALARM_RATIO}: stick-slip may return"
-        lines.append(f"v_a/v_d  {v.velocity_ratio_min:.2f} to {v.velocity_ratio_max:.2f} while vibrating ({low})")
-    if v.latency is not None:
-        latency = v.latency
-        lines.append(
-            f"latency  block to command p50 {latency.p50_us:.0f} us, p99 {latency.p99_us:.0f} us, p99.9 "
-            f"{latency.p999_us:.0f} us; {100 * latency.within_1_ms:.2f} % within 1 ms"
-        )
-    lines.extend(pauses_in_words(v.pauses, v.not_watched))
-    lost = "none lost" if v.lost_blocks == 0 else f"{v.lost_blocks} LOST"
-    if not v.all_losses_known:
-        lost = f"at least {lost}" if v.lost_blocks else "how many are lost is not known"
-    also = f"; at least {counted(v.lost_messages, 'log message')} lost" if v.lost_messages else ""
-    lines.append(f"blocks   {v.blocks}, {lost}{also}")
-    if v.normal_scheduling:
-        who = " and ".join(v.normal_scheduling)
-        lines.append(f"priority {who} under {realtime.NORMAL}: {realtime.NOT_GUARANTEED}")
-    lines.extend(f"warning  {fault}" for fault in [*v.faults, *v.told])
-    lines.append(chain_in_words(v.chain))
-    lines.append(f"log      {v.log}")
-    return lines
-
-
-def headline(verdict: RunVerdict) -> str:
-    """The answer in one line."""
-    v = verdict
-    if v.alone is not None:
-        why = ", then it was gone" if v.charge.controller_until_s is not None else ""
-        slips = f"; {counted(v.alone.slips, 'slip')} with nobody in charge" if v.alone.slips else ""
-        held_s = max(v.seconds - v.enabled_from_s - v.stopped_s - v.alone.seconds, 0.0)
-        return f"the controller was in charge for {held_s:.2f} of {v.seconds:.2f} s only{why}{slips}"
-    if v.untested or v.after is None:
-        return v.untested
-    tripped = next((fault for fault in v.faults if fault.startswith("FAULT: ")), None)
-    if tripped is not None:
-        return f"the rig's guard stopped the vibration: {tripped.removeprefix('FAULT: ')}"
-    weak = f"; {', '.join(name for name, seconds in v.charge.reasons_s.items() if seconds > WEAK_S)}"
-    weak = weak if len(weak) > 2 else ""
-    if v.after.slips:
-        return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge{weak}"
-    if v.before is not None and v.before.slips:
-        return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before, none with the controller in charge{weak}"
-    return f"no stick-slip with the controller in charge{weak}"

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, StrictUndefined  # here, so that it is missed before minutes of simulation
 
 from bridge.files import write_whole
+from bridge.provenance import provenance
 from cockpit.paper.claims import PAPER_CLAIMS, PaperRow, paper_claims, parameter_rows, reference_rows, slip_rows
 from cockpit.paper.runs import (
     CYCLES_FROM_S,
@@ -92,6 +93,7 @@ def _page(result: ReproduceResult, runs: dict[Key, PairRun]) -> str:
     drifting = runs["C45-C45 @ 0.063", 5000].course
     return environment.from_string(template).render(
         result=result,
+        footer=provenance().footer(),
         groups=groups,
         rigs={pair: paper_rig(pair) for pair in (*STEEL_PAIRS, *PTFE_PAIRS)},
         figures=figures(runs),

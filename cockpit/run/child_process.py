@@ -21,7 +21,12 @@ _LONG_S = 2.0  # of work that nobody waits for without a word; shorter: a busy c
 _STDOUT_REFUSED = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF})
 _LONGEST_NAME = 255  # of a file; what is longer holds a name
 # what `stickslip[all]` brings and a plain installation lacks
-EXTRA_MODULES = frozenset({"jinja2", "joblib", "nptdms", "pyarrow", "threadpoolctl"})
+EXTRA_MODULES = frozenset(
+    {
+        "clevercsv", "h5py", "jinja2", "joblib", "mcap_ros2", "nptdms", "pyarrow", "python_calamine", "threadpoolctl",
+        "xlsxwriter",
+    }
+)  # fmt: skip
 
 
 def stop_event(parent: int = 0) -> threading.Event:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
+from bridge.guard.config import wider
 from bridge.guard.tell import Teller, changes
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
@@ -27,6 +28,7 @@ from cockpit.run.scenario import Scenario, header
 from controller.node import obeyed
 from controller.replay import Change
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
+from controller.trips import tell as trips
 from plant.node import no_number
 
 # Blocks that are stepped in one call and make one chunk of the log, 1 MB: a stretch ends with the controller's snapshot. A kill
@@ -50,7 +52,7 @@ def run_onboard(
     words: Sequence[Word] = (),
     stopped: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Run a scenario and write its log, with a duration of 0 until it is stopped. Raises Fault LOG_WRITE.
+    """Run a scenario without faults and write its log, with a duration of 0 until it is stopped. Raises Fault LOG_WRITE.
 
     Args:
         progress: called now and then with the simulated time [s].
@@ -61,13 +63,12 @@ def run_onboard(
     """
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
     loop.warm_up()
-    log = RunLog(path, lockstep=True, rotation=scenario.log.rotation)
-    log.add_metadata("run", about)
-    for role in ("controller", "plant"):
-        log.add_header(header(scenario, role, lockstep=True))
+    log = log_of(scenario, path, about)
     blocks = round(scenario.duration_s / scenario.rig.solver.block_s) if scenario.duration_s > 0 else 2**62
     say = _Events(log)
-    say(0, "START", "lockstep")
+    say("plant", 0, "START", "lockstep")
+    if wide := wider(scenario.rig.guard):
+        say("plant", 0, "WIDE_LIMITS", wide)
     ahead, to_say = list(changes), list(words)
     try:
         # the log is compressed and written while the next stretch is computed
@@ -96,11 +97,19 @@ def run_onboard(
             if written is not None:
                 written.result()
         t_ns = loop.block * loop.block_ns
-        say(t_ns, "END", f"blocks={loop.block}")
-        text = f"steps={loop.block} duplicates=0 dropped=0"
-        log.write(CONTROLLER_EVENT, _event("controller", 0, t_ns, "END", text))
+        say("plant", t_ns, "END", f"blocks={loop.block}")
+        say("controller", t_ns, "END", f"steps={loop.block} duplicates=0 dropped=0")
     finally:
         log.close()
+
+
+def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:
+    """A new log of a run in one process, with what it begins with."""
+    log = RunLog(path, lockstep=True, rotation=scenario.log.rotation)
+    log.add_metadata("run", about)
+    for role in ("controller", "plant"):
+        log.add_header(header(scenario, role, lockstep=True))
+    return log
 
 
 def _first_step(loop: ClosedLoop, t_ns: int) -> int:
@@ -109,20 +118,28 @@ def _first_step(loop: ClosedLoop, t_ns: int) -> int:
 
 
 class _Events:
-    """The rig's events, as its process publishes them."""
+    """The events of rig and controller, as their processes publish them."""
 
     def __init__(self, log: RunLog) -> None:
         self._log = log
-        self._said = 0
-        self._teller = Teller()
+        self._said = {"plant": 0, "controller": 0}
+        self._guard, self._trips = Teller(), trips.TripTeller()
 
-    def __call__(self, t_ns: int, code: str, text: str) -> None:
-        self._log.write(PLANT_EVENT, _event("plant", self._said, t_ns, code, text))
-        self._said += 1
+    def __call__(self, source: str, t_ns: int, code: str, text: str) -> None:
+        topic = PLANT_EVENT if source == "plant" else CONTROLLER_EVENT
+        event = wire.Event(sequence=self._said[source], t_ns=t_ns, source=source, code=code, text=text)
+        self._log.write(topic, event.SerializeToString())
+        self._said[source] += 1
 
-    def of(self, applied: npt.NDArray[Any]) -> dict[int, list[tuple[str, str]]]:
-        """What the guard has to say of a stretch: codes and texts, by the number of the block after which they come."""
-        found = {int(applied["sequence"][row]): self._teller.news(applied[row]) for row in changes(applied)}
+    def of(self, made: Blocks) -> dict[int, list[tuple[str, str, str]]]:
+        """What guard and controller have to say of a stretch: source, code and text, by the number of the block before."""
+        found: dict[int, list[tuple[str, str, str]]] = {}
+        for row in changes(made.applied):
+            block = int(made.applied["sequence"][row])
+            found.setdefault(block, []).extend(("plant", *one) for one in self._guard.news(made.applied[row]))
+        for row in trips.changes(made.trace):
+            block = int(made.applied["sequence"][row])
+            found.setdefault(block, []).extend(("controller", *one) for one in self._trips.news(made.trace[row]))
         return {block: news for block, news in found.items() if news}
 
 
@@ -131,7 +148,7 @@ def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: Blocks, mem
     begin = end - len(made.trace)
     for row in range(len(made.announce)):
         log.write(ANNOUNCE, made.announce[row : row + 1].tobytes())
-    news = say.of(made.applied)
+    news = say.of(made)
     tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
     # a stretch that was cut short begins and ends with blocks that have no whole period of the state message
     whole = min(begin + -begin % STATE_EVERY, end), max(end - end % STATE_EVERY, begin)
@@ -146,12 +163,8 @@ def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: Blocks, mem
             {STATE: plotted(made.trace[steps[0] - begin - 1 :: STATE_EVERY][: len(steps)], steps[0])} if steps else {}
         )
         log.write_blocks(part, states)
-        for code, text in news.get(last - 1, ()):
-            say(last * block_ns, code, text)
+        for source, code, text in news.get(last - 1, ()):
+            say(source, last * block_ns, code, text)
     if end % SNAPSHOT_EVERY == 0 and end > begin:
         log.write(SNAPSHOT, snapshot(memory, end, end * block_ns))
     log.flush()
-
-
-def _event(source: str, sequence: int, t_ns: int, code: str, text: str) -> bytes:
-    return wire.Event(sequence=sequence, t_ns=t_ns, source=source, code=code, text=text).SerializeToString()

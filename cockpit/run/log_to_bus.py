@@ -69,7 +69,7 @@ def publish_log(
         send = {topic.name: bus.publisher(topic) for topic, _ in tables}
         send_event = bus.publisher(PLANT_EVENT)
         bus.announce()
-        wait_for_peers(bus, bus_config.endpoint, wait_for, stop)
+        wait_for_peers(bus, bus_config, wait_for, stop)
         send_event(_event("START", f"replay of {path.name} at {speed:g} times real time"))
         blocks = _play(schedule, tables, send, speed, pause, stop)
         send_event(_event("END", f"blocks={blocks}"))

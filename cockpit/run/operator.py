@@ -10,7 +10,7 @@ from bridge.faults import Fault
 from bridge.units import quantity
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
-from bridge.wire.topics import APPLIED, OPERATOR
+from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT
 from bridge.wire.words import words
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 
@@ -18,6 +18,7 @@ _DIAL_S = 2.0  # a rig is there at once or not at all
 _ANSWER_S = 5.0  # the loop check takes 1.5 s, a ramp 0.1 s
 _AGAIN_S = 0.5  # with twice as many busy processes as cores one word in 300 did not arrive
 _NOTHING_M = 1e-12  # what is left of a ramp by rounding
+_KEPT_S = 0.1  # in which a rig says that it cannot keep a stop over its restart
 _REFUSED_S = 1.0  # for which a rig stays in FAULT after the word ARM
 _BY_HAND = "stop the exciter's amplifier by hand"
 
@@ -33,6 +34,7 @@ class Obeyed(NamedTuple):
     help: str  # of the cause
     amplitude_m: float  # of the exciter
     seconds: float  # from the first word to this
+    not_kept: str  # why a stop does not outlast a restart of the rig; empty: it does, or is none
 
     def in_words(self) -> list[str]:
         """Lines for a person."""
@@ -45,6 +47,8 @@ class Obeyed(NamedTuple):
             f"rig      {self.state}, {vibration}",
             f"cause    {self.cause}: {self.help}",
         ]
+        if self.not_kept:
+            lines.append(f"warning  {self.not_kept}")
         if not self.done and self.state == "FAULT":
             lines.append("next     `stickslip reset` when the cause is gone, then `stickslip arm`")
         return lines
@@ -67,10 +71,12 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         line = f"{where}: no rig answers there within {_DIAL_S:g} s: --endpoint must be that of the run"
         raise Fault("NO_PEER", f"{line}; if something vibrates, {_BY_HAND}") from None
     with bus:
-        applied = Inbox(64)
+        applied, events = Inbox(64), Inbox(64)
         bus.listen(APPLIED, applied.push)
+        bus.listen(PLANT_EVENT, events.push)
         send = bus.publisher(OPERATOR)
         seen = _until_done(send, word, applied, action)
+        not_kept = _not_kept(events) if action == wire.Operator.STOP else ""
     if seen is None:
         line = f"{where}: no rig says what it applies: --prefix must be that of the run"
         raise Fault("NO_PEER", f"{line}; take it that it goes on as before, and {_BY_HAND}")
@@ -86,11 +92,24 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         help=cause.help,
         amplitude_m=last.amplitude_m,
         seconds=seconds,
+        not_kept=not_kept,
     )
     if action == wire.Operator.STOP and not obeyed.done:
         line = f"{where}: the rig is {obeyed.state} and vibrates with {quantity(last.amplitude_m, 'm')} after a stop"
         raise Fault("NO_PEER", f"{line}: must be at rest; {_BY_HAND}")
     return obeyed
+
+
+def _not_kept(events: Inbox) -> str:
+    """What a rig says that cannot keep a stop over its restart; empty where it says nothing."""
+    until_s = time.monotonic() + _KEPT_S
+    while (left_s := until_s - time.monotonic()) > 0.0:
+        received = events.get(left_s)
+        with contextlib.suppress(Fault):  # rubbish of another client
+            event = None if received is None else parsed(wire.Event, received.payload, PLANT_EVENT.name)
+            if event is not None and event.code == "STATE_FOLDER":
+                return event.text
+    return ""
 
 
 def _until_done(

@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import FAULTS, Fault
-from bridge.plain import say
+from bridge.plain import ANOTHER_COMPILES, COMPILED, COMPILING, say
 from cockpit.run.child_process import handle_endings
 
 _GRACE_S = 6.0  # to fade out, say goodbye on the bus and close the log
 _LOOK_S = 0.05
+_TOLD_S = 30.0  # between two words about a run that has not begun
+_FOREVER_S = 1e6  # for a child: who has started it sees how the others are, and ends it
 _WARNING = "stickslip: warning: "  # how a line of a child begins that a person must see at once
 # in this order they are asked to stop: the plant fades the vibration out and tells the others
 _ROLES = ("plant", "controller", "recorder")
@@ -39,6 +41,7 @@ class Child:
             start_new_session=True,
         )
         self._lines: list[str] = []
+        self.compiles = False
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -47,7 +50,10 @@ class Child:
             with self.process.stderr as lines:
                 for line in lines:
                     self._lines.append(line.rstrip())
-                    if line.startswith(_WARNING):
+                    words = line.removeprefix("stickslip: ")
+                    begins = words.startswith((COMPILING, ANOTHER_COMPILES))
+                    self.compiles = begins or (self.compiles and not words.startswith(COMPILED))
+                    if begins or line.startswith(_WARNING):
                         say(line.rstrip())
 
     def last_words(self) -> str:
@@ -77,6 +83,7 @@ def run_processes(
     log: Path,
     lockstep: bool,
     watch: Callable[[threading.Event], None],
+    wait_s: float | None = None,
 ) -> None:
     """Run a scenario to its end and close its log.
 
@@ -84,13 +91,14 @@ def run_processes(
         arguments: the command line that makes the same scenario in a child.
         endpoint: where they meet; nobody may listen there yet.
         watch: follows the run on the bus until its event is set; runs in a thread of its own.
+        wait_s: longest time until the log begins; None: as long as the processes need, which are told every half minute.
 
-    Raises Fault ENDPOINT_BUSY, the Fault of the child that failed first, PEER_DIED when one was killed, KeyboardInterrupt
-    after Ctrl-C.
+    Raises Fault ENDPOINT_BUSY, NO_PEER after `wait_s`, the Fault of the child that failed first, PEER_DIED when one was killed,
+    KeyboardInterrupt after Ctrl-C.
 
     """
     _check_free(endpoint)
-    more = ["--lockstep"] if lockstep else []
+    more = ["--set", f"bus.wait_s={_FOREVER_S:g}", *(["--lockstep"] if lockstep else [])]
     children: list[Child] = []
     over = threading.Event()
     watcher = threading.Thread(target=watch, args=(over,), daemon=True)
@@ -101,7 +109,7 @@ def run_processes(
                 wait_for = ["--wait-for", "controller,recorder"] if role == "plant" else []
                 children.append(Child(role, [*arguments, *more, *extra, *wait_for]))
         watcher.start()
-        _until_the_end(children)
+        _until_the_end(children, Beginning(children, log, wait_s))
     except KeyboardInterrupt:
         _stop(children)
         raise
@@ -130,9 +138,52 @@ def _ctrl_c_afterwards() -> Generator[None]:
         signal.raise_signal(signal.SIGINT)
 
 
-def _until_the_end(children: list[Child]) -> None:
+class Beginning:
+    """Until the log begins: who compiles or is not there yet is told now and then.
+
+    A first start compiles for up to a minute, and on a busy or small computer for several: no time is too long for it.
+    """
+
+    def __init__(self, children: list[Child], log: Path, wait_s: float | None) -> None:
+        self._children = children
+        self._log = log
+        self._before = self._stamp()
+        self._since_s = time.monotonic()
+        self._due_s = self._since_s + _TOLD_S
+        self._wait_s = wait_s
+        self._begun = False
+
+    def _stamp(self) -> tuple[int, int] | None:
+        if not self._log.is_file():
+            return None
+        now = self._log.stat()
+        return now.st_mtime_ns, now.st_size
+
+    def look(self) -> None:
+        """Tell what is waited for where it is due. Raises Fault NO_PEER after the longest time."""
+        now_s = time.monotonic()
+        late = self._wait_s is not None and now_s > self._since_s + self._wait_s
+        if self._begun or not (late or now_s > self._due_s):
+            return
+        self._begun = self._stamp() != self._before
+        if self._begun:
+            return
+        waited_s = now_s - self._since_s
+        compiling = [child.role for child in self._children if child.compiles]
+        who = f"the {' and the '.join(compiling)} still compile{'s' if len(compiling) == 1 else ''}"
+        what = who if compiling else "plant, controller and recorder have not found each other"
+        if late:
+            raise Fault(
+                "NO_PEER", f"{what} after {waited_s:.0f} s; give the start longer: --wait S, or no --wait at all"
+            )
+        say(f"waiting  {what}, since {waited_s:.0f} s; Ctrl-C ends it")
+        self._due_s = now_s + _TOLD_S
+
+
+def _until_the_end(children: list[Child], beginning: Beginning) -> None:
     """Wait for all to end well; raise for the first that does not."""
     while True:
+        beginning.look()
         ended = [child for child in children if child.process.poll() is not None]
         failed = [child for child in ended if child.process.returncode != 0]
         if failed:

@@ -15,7 +15,7 @@ from bridge.faults import Fault
 from bridge.log.pause_events import pauses_of
 from bridge.plain import plain
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.event_codes import WEAK_REASONS, harms, is_told
+from bridge.wire.event_codes import TRIPS, WEAK_REASONS, harms, is_told
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, STATE
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
@@ -83,7 +83,7 @@ class Watch:
             found.append("FALLBACK: nobody in charge")
         if self._command is not None:
             reason = parsed(wire.Command, self._command, COMMAND.name).reason
-            found += [name for name in WEAK_REASONS if wire.Reason.Value(name) == reason]
+            found += [name for name in (*WEAK_REASONS, *TRIPS) if wire.Reason.Value(name) == reason]
         return [*found, *(code for code, until_s in self._told.items() if time.monotonic() < until_s)]
 
 

@@ -12,7 +12,13 @@ from bridge.log.storage.parts import parts_of
 from bridge.plain import say
 from bridge.wire.session import rig_security
 from cockpit.run.child_process import left_on_ctrl_c, stop_event, warn_without_priority
-from cockpit.run.scenario import Scenario, load_scenario, refuse_what_takes_no_clock
+from cockpit.run.scenario import (
+    Scenario,
+    load_scenario,
+    refuse_faults_of_processes,
+    refuse_faults_that_take_time,
+    refuse_what_takes_no_clock,
+)
 from cockpit.run.writable import LOG, check_output
 
 if TYPE_CHECKING:
@@ -78,17 +84,28 @@ class RunOutcome(NamedTuple):
     def in_words(self) -> list[str]:
         """The verdict in one line, then in lines for a person."""
         from cockpit.judge.margins import margins_in_words
-        from cockpit.judge.verdict import headline, in_words
+        from cockpit.judge.verdict_words import headline, in_words
 
         rig = f"rig      {self.rig}" + (f", with {', '.join(self.effects)}" if self.effects else "")
         margins = margins_in_words(self.loop) if self.loop is not None else []
         return [headline(self.verdict), rig, *margins, *in_words(self.verdict)]
 
 
-def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: bool, log: Path | None) -> RunOutcome:
+def run_scenario(
+    name: str,
+    settings: list[str],
+    lockstep: bool,
+    in_process: bool,
+    log: Path | None,
+    wait_s: float | None = None,
+) -> RunOutcome:
     """Run a scenario and judge it. A run without an end is over with Ctrl-C, SIGTERM or SIGHUP, and judged like any other.
 
+    Args:
+        wait_s: longest time until the log of a run of several processes begins; None: as long as they need.
+
     Raises Fault INTERRUPTED where one with an end was stopped before, with its verdict on stderr first.
+
     """
     scenario = load_scenario(name, settings)
     path = log_path(log, scenario.name)
@@ -97,7 +114,10 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
     endless = scenario.duration_s == 0.0
     if not (lockstep or in_process):
         refuse_what_takes_no_clock(scenario)
+        refuse_faults_of_processes(scenario)
         warn_without_priority()
+    if lockstep:
+        refuse_faults_that_take_time(scenario)
     if not in_process:
         rig_security(scenario.bus)  # here, where its warning is seen and its fault comes before anything starts
     if endless:
@@ -111,7 +131,8 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
             from cockpit.run.progress import follower
 
             arguments = ["--scenario", name, *(part for setting in settings for part in ("--set", setting))]
-            run_processes(arguments, scenario.bus.endpoint, path, lockstep, follower(scenario.bus, scenario.duration_s))
+            follow = follower(scenario.bus, scenario.duration_s)
+            run_processes(arguments, scenario.bus.endpoint, path, lockstep, follow, wait_s)
     except KeyboardInterrupt:
         interrupted = True
     if interrupted and _stamp(path) == before:
@@ -126,7 +147,9 @@ def run_scenario(name: str, settings: list[str], lockstep: bool, in_process: boo
 def _judged(scenario: Scenario, path: Path, interrupted: str) -> RunOutcome:
     """What came of a run. Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end."""
     from bridge.log.logfile import read_run
-    from cockpit.judge.verdict import in_words, judge, judge_run
+    from bridge.log.storage.afterwards import note_afterwards
+    from cockpit.judge.verdict import judge, judge_run
+    from cockpit.judge.verdict_words import VERDICT, in_words, noted
 
     if interrupted and scenario.duration_s:
         with contextlib.suppress(Fault):  # a log of a moment may hold nothing to judge
@@ -140,7 +163,9 @@ def _judged(scenario: Scenario, path: Path, interrupted: str) -> RunOutcome:
         from cockpit.judge.margins import loop_margins
 
         margins = loop_margins(run)
-    return RunOutcome(judge_run(run), scenario.rig.name, list(scenario.rig.effects), margins)
+    verdict = judge_run(run)
+    verdict = verdict._replace(chain=note_afterwards(path, VERDICT, noted(verdict), verdict.chain))
+    return RunOutcome(verdict, scenario.rig.name, list(scenario.rig.effects), margins)
 
 
 def _in_process(scenario: Scenario, path: Path) -> None:
@@ -149,6 +174,7 @@ def _in_process(scenario: Scenario, path: Path) -> None:
     from rich.progress import Progress, TextColumn
 
     from cockpit.run.in_process import run_onboard
+    from cockpit.run.simulated.log import run_with_faults
 
     columns = (
         Progress.get_default_columns() if scenario.duration_s else (TextColumn("{task.completed:.1f} s simulated"),)
@@ -158,6 +184,7 @@ def _in_process(scenario: Scenario, path: Path) -> None:
         task = bar.add_task("simulating", total=scenario.duration_s or None)
         stop = stop_event()
         about = about_run(scenario, lockstep=True)
-        run_onboard(scenario, path, about, lambda t_s: bar.update(task, completed=t_s), stopped=stop.is_set)
+        simulate = run_with_faults if scenario.fault else run_onboard
+        simulate(scenario, path, about, lambda t_s: bar.update(task, completed=t_s), stopped=stop.is_set)
     if stop.is_set():
         raise KeyboardInterrupt

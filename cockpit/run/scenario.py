@@ -20,6 +20,8 @@ from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 from plant.config_limits import refuse_what_no_rig_does
 from plant.drive_motion import lowest_mps, reach_m
+from plant.faults.kinds import PROCESS
+from plant.faults.table import FaultTable
 
 # Shorter: the answer to a block comes after the next block is due.
 _SHORTEST_IN_REAL_TIME_S = 1e-3
@@ -59,6 +61,7 @@ class Scenario(Strict):
     controller: ControllerConfig = ControllerConfig()
     bus: BusConfig = BusConfig()
     log: LogTable = LogTable()
+    fault: list[FaultTable] = Field(default=[], description="What goes wrong on purpose, a table `[[fault]]` each.")
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Scenario":
@@ -81,6 +84,13 @@ class Scenario(Strict):
                     f"controller.limits.{name} = {ours_Hz:g}: the controller would command {commanded_Hz:g} Hz, beyond "
                     f"rig.piezo.{name} = {theirs_Hz:g}; set it to {theirs_Hz:g} as well"
                 )
+        for low_Hz, high_Hz in self.rig.guard.forbidden_Hz:
+            for candidate_Hz in candidates_Hz:
+                if low_Hz <= candidate_Hz <= high_Hz:
+                    raise ValueError(
+                        f"controller.limits.forbidden_Hz: the controller would command {candidate_Hz:g} Hz, which "
+                        f"rig.guard.forbidden_Hz = [{low_Hz:g}, {high_Hz:g}] ends in FAULT; forbid it to the controller as well"
+                    )
         _stays_in_range(self.rig, self.duration_s)
         return self
 
@@ -128,6 +138,22 @@ def refuse_what_takes_no_clock(scenario: Scenario) -> None:
             "every block is a message there and back between processes; lengthen it, or use --lockstep or --in-process"
         )
         raise Fault("CONFIG", line)
+
+
+def refuse_faults_that_take_time(scenario: Scenario) -> None:
+    """Raise Fault CONFIG for faults of bus and processes in lockstep."""
+    for number, table in enumerate(scenario.fault):
+        if table.needs_time:
+            line = f"{scenario.name}: fault.{number}.target = {table.target}: needs a clock, and lockstep has none"
+            raise Fault("CONFIG", f"{line}; use --in-process, or real time")
+
+
+def refuse_faults_of_processes(scenario: Scenario) -> None:
+    """Raise Fault CONFIG for faults of processes in real time, where only a person may end a process."""
+    for number, table in enumerate(scenario.fault):
+        if table.group == PROCESS:
+            line = f"{scenario.name}: fault.{number}.target = {table.target}: a scenario ends no process of the machine"
+            raise Fault("CONFIG", f"{line}; use --in-process, or `stickslip fault` beside the run")
 
 
 def load_rig(name: str, settings: list[str]) -> RigConfig:
@@ -178,6 +204,8 @@ def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
             "duration_s": scenario.duration_s,
             "lockstep": lockstep,
         }
+        if scenario.fault:
+            configuration["fault"] = [table.model_dump(mode="json") for table in scenario.fault]
     else:
         configuration = scenario.controller.model_dump(mode="json")
     versions = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}

@@ -16,6 +16,7 @@ PAGE = (".html", ".htm")
 RIG = (".toml",)
 JSON = (".json",)
 TABLE = (".parquet", ".csv", ".mat")
+CSV = (".csv",)
 _NEVER_LOST: dict[tuple[str, ...], str] = {
     LOG: files.LOG,
     JSON: files.JSON,

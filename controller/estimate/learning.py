@@ -33,7 +33,8 @@ def stiffness(p: Record, s: Record) -> None:
             break
         variance = s.noise[SLIDE, level] * s.noise[SLIDE, level] + s.noise[DRIVE, level] * s.noise[DRIVE, level]
         rate_mps = s.slope[DRIVE, level] - s.slope[SLIDE, level]
-        if rate_mps * rate_mps > best * variance and variance > 0.0:
+        # a slide whose position never changes by a step is not measured: it would make every spring soft
+        if rate_mps * rate_mps > best * variance and s.noise[SLIDE, level] > 0.0:
             best, best_level = rate_mps * rate_mps / variance, level
     if best_level >= 0:
         rate_mps = s.slope[DRIVE, best_level] - s.slope[SLIDE, best_level]

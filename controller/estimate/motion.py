@@ -3,7 +3,7 @@
 import math
 
 from bridge.kernel import Record, kernel
-from controller.estimate.windows import BINS, DRIVE, FORCE, WELL_KNOWN
+from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
 
 _SIGMAS = 6.0  # 1e-9 a window that a standing drive is called moving
 _UNSURE_SIGMAS = 9.0  # the same while the noise of the window is known from fewer differences
@@ -19,6 +19,10 @@ _SURELY_SIGMAS = 3.3
 _ROUGHLY = 0.1  # noise of a window, over its velocity, up to which it may say that the drive speeds up
 _MOST_AHEAD = 1.3  # of a window's velocity, as a speed that has come to its end looks as if it went on to grow
 _OF_TWO = 1.8  # sigma of twice a slope less that over twice the window, over that of the slope
+_RISE_SIGMAS = 5.0  # by which it counts for less; at 3 v_a leaps once a second, and the slide runs ahead
+_HUM_S = 0.1  # five periods of mains hum, in which its noise becomes known
+_EXCITER_PERIODS = 2.0  # in a window of the force, at least
+_LONGEST_RISE = 3  # levels above the one that v_d is taken from in which it is looked for
 # Of a move, in which a force that climbs may say so before the position does: at 50 N/um breakaway comes after 6 ms.
 _BY_FORCE_S = 0.02
 _FORCE_SETTLES_S = 0.05  # after a vibration: the friction that it took off comes back, and the force climbs with it
@@ -54,12 +58,17 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
             sure = _SIGMAS if s.differences[level] >= WELL_KNOWN else _UNSURE_SIGMAS
             first = level if math.fabs(slope) > max(sure * sigma, p.least_feed_mps) else -1
     moving = first >= 0 and not _stopped(s, first)
+    unsure = moving and s.moving == 0 and s.pushed[0] * p.bin_s < _HUM_S and p.use_slide_position == 1
+    unsure = unsure and not _winds_up(s, first)
+    moving = moving and not unsure
     quiet = s.allowed_m == 0.0 and s.silent_steps * p.block_s > _FORCE_SETTLES_S
     if p.use_force == 1 and s.moved_s < _BY_FORCE_S and not moving and quiet:
         by_force_mps = _climbing(p, s)
         if by_force_mps != 0.0:
             velocity_mps, moving = by_force_mps, True
-    s.measured = 1 if sigma_mps > 0.0 else 0
+    if not moving and s.moving == 1 and not _stands(p, s):
+        velocity_mps, moving = s.drive_velocity_mps, True
+    s.measured = 1 if sigma_mps > 0.0 and not unsure else 0
     s.moving = 1 if moving else 0
     s.drive_velocity_mps, s.drive_velocity_sigma_mps = velocity_mps if moving else 0.0, sigma_mps
     speed_mps = math.fabs(velocity_mps) if moving else 0.0
@@ -78,32 +87,52 @@ def drive_velocity(p: Record, s: Record, tick_s: float) -> None:
         s.stood_s = 0.0
     else:
         s.moved_s = 0.0
-        s.stood_s += tick_s
+        s.stood_s = s.stood_s + tick_s if not unsure else 0.0
     # so much that v_a at the least ratio is above v_d for all but 5e-4 of its noise
     surely_mps = (speed_mps + _SURELY_SIGMAS * sigma_mps) / p.least_ratio
-    s.rising_mps = max(_rising(s, speed_mps, taken), surely_mps) if moving else 0.0
+    s.rising_mps = max(_rising(p, s, speed_mps, taken), surely_mps) if moving else 0.0
     s.held_mps *= 1.0 - min(tick_s / _HOLD_S, 1.0)
     if moving and sigma_mps < _SURE * speed_mps:
         s.held_mps = max(s.held_mps, speed_mps)
 
 
 @kernel
-def _rising(s: Record, speed_mps: float, taken: int) -> float:
-    """|v_d| at the end of the windows where it grows [m/s]; else `speed_mps`, which is that of the middle of level `taken`.
+def _rising(p: Record, s: Record, speed_mps: float, taken: int) -> float:
+    """|v_d| that the drive surely has at the end of the windows [m/s]; `speed_mps` is that of the middle of level `taken`.
 
-    The shortest window that says so counts. Of two windows the longer one is as much slower than the shorter one as that is
-    slower than the drive is now.
+    Of two windows the longer one is as much slower than the shorter one as that is slower than the drive is now. Short windows
+    say so with noise, long ones late: what one of them is sure of counts, as far as the shorter ones do not exclude it.
     """
-    for level in range(taken):
+    rising_mps, most_mps = speed_mps, math.inf
+    for level in range(min(taken + _LONGEST_RISE, p.levels - 1)):
+        if s.pushed[level + 1] < BINS:
+            break
         sigma, slope = s.noise[DRIVE, level], s.direction * s.slope[DRIVE, level]
         if sigma == 0.0 or s.differences[level] < WELL_KNOWN or sigma > _ROUGHLY * slope:
             continue
         now_mps = min(2.0 * slope - s.direction * s.slope[DRIVE, level + 1], _MOST_AHEAD * slope)
-        if now_mps > slope and now_mps - speed_mps > _OF_TWO * _AGREE_SIGMAS * sigma:
-            return now_mps
-        if slope - speed_mps > _AGREE_SIGMAS * sigma:
-            return slope
-    return speed_mps
+        least_mps = max(now_mps - _RISE_SIGMAS * _OF_TWO * sigma, slope - _RISE_SIGMAS * sigma)
+        rising_mps = max(rising_mps, min(least_mps, most_mps))
+        most_mps = min(most_mps, max(now_mps, slope) + _RISE_SIGMAS * _OF_TWO * sigma)
+    return max(rising_mps, min(_pulling(p, s), most_mps))
+
+
+@kernel
+def _pulling(p: Record, s: Record) -> float:
+    """|v_d| at least, by the spring [m/s]: v_s of a longer window and F' / k_d of a shorter one, while the spring pulls.
+
+    A slide that the vibration holds goes on at its v_s when the drive speeds up, and the spring winds up by the difference.
+    """
+    least_mps = 0.0
+    if p.use_force == 0 or s.stiffness_learnt == 0 or s.slipping == 1 or s.direction * s.bins[FORCE, 0, 0] <= 0.0:
+        return least_mps
+    for level in range(p.levels):
+        if s.pushed[level] < BINS or p.window_s[level] > _BY_FORCE_S:
+            break
+        if p.window_s[level] * s.allowed_Hz >= _EXCITER_PERIODS or s.allowed_m == 0.0:
+            surely_N_per_s = s.direction * s.slope[FORCE, level] - _RISE_SIGMAS * s.noise[FORCE, level]
+            least_mps = max(least_mps, surely_N_per_s / s.stiffness_N_per_m)
+    return least_mps + min(s.fine_mps, math.fabs(s.drive_velocity_mps)) if least_mps > 0.0 else 0.0
 
 
 @kernel
@@ -119,6 +148,32 @@ def _stopped(s: Record, level: int) -> bool:
         ):
             return True
     return False
+
+
+@kernel
+def _winds_up(s: Record, level: int) -> bool:
+    """Whether the drive moves against the slide, as one that starts does and hum on both positions does not.
+
+    It is asked at the begin alone: before some periods of it are in the noise, hum is a motion.
+    """
+    slope = s.slope[DRIVE, level]
+    return (slope - s.slope[SLIDE, level]) * slope > 0.5 * slope * slope
+
+
+@kernel
+def _stands(p: Record, s: Record) -> bool:
+    """Whether some window since the start of the move would have seen half of the last velocity, and does not.
+
+    A drive that starts is seen and lost in turns, as each window that reaches back before the start disagrees with the next.
+    """
+    half_mps = 0.5 * s.drive_velocity_mps
+    for level in range(p.levels):
+        sigma = s.noise[DRIVE, level]
+        if s.pushed[level] < BINS or p.window_s[level] > s.moved_s:
+            return False
+        if sigma > 0.0 and _SIGMAS * sigma <= math.fabs(half_mps):
+            return s.slope[DRIVE, level] * half_mps < half_mps * half_mps
+    return True
 
 
 @kernel

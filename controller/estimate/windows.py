@@ -7,6 +7,9 @@ The noise of a level is measured, not assumed: the slopes of three windows side 
 the Hadamard deviation), so hum, drift and quantisation are in it as well as white noise, and a swing that is slow against the
 window is not. The scale is the lower quartile of how far they are off: slips and re-sticks disturb most of them before
 they move it by much.
+
+A slide that swings as fast as the windows are long bends their slopes as noise does, but in force and position alike, by
+the spring's law x_d' - x_s' = F' / k_d. So the noise is at most what the three disagree by, and what the drive itself is off by.
 """
 
 import math
@@ -27,6 +30,10 @@ _FEWEST = 10
 WELL_KNOWN = 40  # differences from which a level's noise is off by some per cent only
 _CARRIED = 1.3  # factor for a noise that is carried on: ten differences are 20 % off, and no noise is quite white
 _FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # of the logarithm of sigma that one difference moves; 6 % of scatter at 0.005
+_LEAST_SHARE_OF_LAW = 0.02  # of what the signals disagree by, which follows a stiffness that is still being learnt
+# The factors of sigma at the least shares, and the differences from which on they hold.
+_UP, _MANY = math.exp(0.25 * _LEAST_SHARE), round(_FIRST_SHARE / _LEAST_SHARE)
+_UP_OF_LAW, _MANY_OF_LAW = math.exp(0.25 * _LEAST_SHARE_OF_LAW), round(_FIRST_SHARE / _LEAST_SHARE_OF_LAW)
 # Largest error of a slope by a quantisation step q over a window is q / W; uniform in a step it is 0.29 of that.
 OF_STEP = 0.29
 
@@ -36,7 +43,9 @@ def push(p: Record, s: Record, force_N: float, slide_m: float, drive_m: float, l
     """Add the means of one bin; `learn` says whether they are measured, so that their noise counts."""
     bins, carried, slope, before, sigma = s.bins, s.carried, s.slope, s.slope_before, s.sigma
     a, b, c = force_N, slide_m, drive_m
-    width_s = p.bin_s
+    per_s = 0.1 / p.bin_s
+    per_N_per_m = 1.0 / s.stiffness_N_per_m
+    both = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
     for level in range(p.levels):
         pushed = s.pushed[level]
         at = pushed % BINS
@@ -47,16 +56,23 @@ def push(p: Record, s: Record, force_N: float, slide_m: float, drive_m: float, l
             first, second, third = pushed % BINS, (pushed + 1) % BINS, (pushed + 2) % BINS
             for row in range(ROWS):
                 across = 3.0 * (bins[row, level, at] - bins[row, level, first])
-                slope[row, level] = (across + bins[row, level, third] - bins[row, level, second]) / (10.0 * width_s)
+                slope[row, level] = (across + bins[row, level, third] - bins[row, level, second]) * per_s
             if at == BINS - 1:
                 if pushed >= 3 * BINS and learn:
                     s.differences[level] += 1
-                    share = max(_FIRST_SHARE / s.differences[level], _LEAST_SHARE)
+                    count = s.differences[level]
+                    up = _UP if count >= _MANY else math.exp(0.25 * max(_FIRST_SHARE / count, _LEAST_SHARE))
+                    law_mps = 0.0
                     for row in range(ROWS):
                         bend = slope[row, level] - 2.0 * before[row, level, 0] + before[row, level, 1]
-                        apart = math.fabs(bend) * _OF_BEND
-                        sigma[row, level] = _moved(sigma[row, level], apart, share, s.differences[level])
-                    _note_noise(p, s, level)
+                        law_mps += bend * (per_N_per_m if row == FORCE else 1.0 if row == SLIDE else -1.0)
+                        sigma[row, level] = _moved(sigma[row, level], math.fabs(bend) * _OF_BEND, up, count)
+                    if both:
+                        s.agreements[level] += 1
+                        count = s.agreements[level]
+                        up = _UP_OF_LAW if count >= _MANY_OF_LAW else math.exp(0.25 * _FIRST_SHARE / count)
+                        s.law_mps[level] = _moved(s.law_mps[level], math.fabs(law_mps) * _OF_BEND, up, count)
+                    _note_noise(p, s, level, both)
                 for row in range(ROWS):
                     before[row, level, 1] = before[row, level, 0]
                     before[row, level, 0] = slope[row, level]
@@ -68,17 +84,15 @@ def push(p: Record, s: Record, force_N: float, slide_m: float, drive_m: float, l
             0.5 * (carried[SLIDE, level] + b),
             0.5 * (carried[DRIVE, level] + c),
         )
-        width_s *= 2.0
+        per_s *= 0.5
 
 
 @kernel
-def _moved(sigma: float, apart: float, share: float, count: int) -> float:
-    """The scale of the differences after one more of them."""
+def _moved(sigma: float, apart: float, up: float, count: int) -> float:
+    """The scale of the differences after one more of them: `up` three times for each time down by its cube, in the end."""
     if count <= 4 or sigma == 0.0:  # the mean of the first
         return sigma + (1.25 * apart - sigma) / min(count, 4)
-    if apart < _QUARTILE * sigma:
-        return sigma * math.exp(-0.75 * share)
-    return sigma * math.exp(0.25 * share)
+    return sigma / (up * up * up) if apart < _QUARTILE * sigma else sigma * up
 
 
 @kernel
@@ -89,7 +103,7 @@ def begin_anew(s: Record) -> None:
 
 
 @kernel
-def _note_noise(p: Record, s: Record, level: int) -> None:
+def _note_noise(p: Record, s: Record, level: int, both: bool) -> None:
     """Set the noise of the slopes of a level, and of those longer windows whose own is not known yet."""
     for row in range(ROWS):
         for i in range(level, p.levels):
@@ -103,6 +117,11 @@ def _note_noise(p: Record, s: Record, level: int) -> None:
                 break
             step = OF_STEP * s.resolution[row] / p.window_s[i]
             s.noise[row, i] = math.sqrt(measured * measured + step * step)
+    # without vibration the slide slips, and what it swings by after a slip would count as more of them
+    if both and s.allowed_m > 0.0 and s.agreements[level] >= WELL_KNOWN:
+        off_mps = math.sqrt(s.law_mps[level] * s.law_mps[level] + s.noise[DRIVE, level] * s.noise[DRIVE, level])
+        s.noise[FORCE, level] = min(s.noise[FORCE, level], s.stiffness_N_per_m * off_mps)
+        s.noise[SLIDE, level] = min(s.noise[SLIDE, level], off_mps)
 
 
 @kernel

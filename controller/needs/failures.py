@@ -2,6 +2,8 @@
 
 Fewer slips may be all that can be had, as on a track whose friction falls by more than any v_a makes up for, or where v_d changes
 faster than it can be followed. Only where nothing is gained at all `policy` ends the vibration.
+
+A first slip or surge under vibration teaches how much is needed. One that comes again shows that what was learnt does not do.
 """
 
 from bridge.kernel import Record, kernel
@@ -18,6 +20,15 @@ def note_failure(s: Record) -> None:
     s.failed_left_s = _REMEMBERED_S
     if s.failed >= _FEWEST:
         s.reason = CANNOT_HELP
+
+
+@kernel
+def note_lesson(s: Record) -> None:
+    """Count a slip or surge after which more is asked for: the first of them is none that nothing could have prevented."""
+    if s.failed_left_s > 0.0:
+        note_failure(s)
+    else:
+        s.failed, s.failed_left_s = 0, _REMEMBERED_S
 
 
 @kernel

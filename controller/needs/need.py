@@ -32,8 +32,16 @@ def is_needed(s: Record, speed_mps: float) -> bool:
 @kernel
 def is_needless(s: Record, speed_mps: float) -> bool:
     """Whether vibration was found not to be needed at this speed."""
-    known_mps = s.needless_from_mps[way_of(s)]
+    known_mps = needless_from_mps(s)
     return 0.0 < known_mps <= speed_mps
+
+
+@kernel
+def needless_from_mps(s: Record) -> float:
+    """From which speed on vibration is not needed; a direction of which nothing is known yet is taken to be as the other one."""
+    way = way_of(s)
+    unknown = s.needless_from_mps[way] == 0.0 and s.needed_to_mps[way] == 0.0
+    return s.needless_from_mps[1 - way] if unknown else s.needless_from_mps[way]
 
 
 @kernel
@@ -122,7 +130,10 @@ def follow_swing(p: Record, s: Record, tick_s: float, settle_s: float) -> None:
     way = way_of(s)
     s.calm_s += tick_s
     before = s.ratio[way]
-    floor = max(p.least_ratio, s.edge_ratio[way] + _STEP) if s.edge_ratio[way] > 0.0 else p.least_ratio
+    floor = p.least_ratio
+    if s.edge_ratio[way] > 0.0:
+        # the distance from the edge doubles with every failure, as the time does until it is tried again
+        floor = max(floor, min(s.edge_ratio[way] + _STEP * s.edge_held_s[way] / _EDGE_HELD_S, p.most_ratio))
     pace = min(_PACE * tick_s / settle_s, tick_s / _FASTEST_S)
     if swing_held(before) < s.swing:
         s.ratio[way] = min(before * (1.0 + pace), p.most_ratio)

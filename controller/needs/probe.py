@@ -12,12 +12,14 @@ from bridge.kernel import Record, kernel
 from controller.codes import EXCITE, HELD, NOT_NEEDED, PROBE, SMOOTH, STICK, STILL_NEEDED, WATCH
 from controller.modes import enter, excite
 from controller.needs.need import is_needed, note_needed, note_needless, settling_s, swing_held
-from controller.needs.wobble import LEAST_ASKED, MOST_ASKED, begin_wobble, can_ask, friction_falls, wobble
+from controller.needs.wobble import EVEN, FALLS, LEAST_ASKED, MOST_ASKED, UNSURE, answer, begin_wobble, can_ask, wobble
 
 STEADY_S = 0.2  # of constant v_d before and during a probe
 _LAST = 1.02  # ratio of a fading vibration down to which the mean friction grows
 _CAUGHT_UP = 0.04  # share of v_d by which the slide may lag when the last part of a fade begins
 _BEHIND = 0.1  # the same when a question begins: before, the spring still takes up the friction
+# Share of v_d by which the slide may lag in the last part, while the spring takes up the rest. More: it surges from lower down.
+_LAST_LAG = 0.12
 _LAG, _SWING = 0.5, 0.2  # shares of v_d by which the slide may lag in the first part of a fade, and be off in the last
 # Settling time up to which a probe is made: it takes some ten of them, and at feeds far below the speed at which friction falls
 # the fall is too small to be told.
@@ -35,11 +37,14 @@ def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float
         if not follows:
             s.wobbles = 0
         elif wobble(p, s, speed_mps):
-            if friction_falls(s):
+            told = answer(s)
+            if told != UNSURE:
+                s.wobbles = 0
+            if told == FALLS:
                 _still_needed(p, s, way, speed_mps)
                 s.probe_s[way] = p.probe_every_max_s  # an answer, and no trial that may have failed by chance
                 s.reason = STILL_NEEDED
-            else:
+            elif told == EVEN:
                 _fade(p, s, force_N, _ASKED_FASTER)
         return
     every_s = max(s.probe_s[way], p.probe_every_s) if is_needed(s, speed_mps) else p.first_probe_s
@@ -75,8 +80,10 @@ def probe(p: Record, s: Record, way: int, speed_mps: float, block_s: float) -> N
     if s.steady_s < STEADY_S:
         enter(s, EXCITE, HELD)
         return
-    off = math.fabs(s.fine_mps - speed_mps) > _SWING * speed_mps + 3.0 * s.fine_sigma_mps
-    swings = s.level >= 0 and off and (s.fade < _LAST or s.fine_mps > speed_mps)
+    # below v_d the slide may be as slow as v_a, until the spring pulls with all of the friction
+    off_mps = _SWING * speed_mps + 3.0 * s.fine_sigma_mps
+    slow = s.fade < _LAST and s.fine_mps < min(s.vibration_velocity_mps, speed_mps) - off_mps
+    swings = s.level >= 0 and (slow or s.fine_mps > speed_mps + off_mps)
     if s.contact == STICK or s.slip_began == 1 or swings:
         _still_needed(p, s, way, speed_mps)
         excite(p, s, STILL_NEEDED, p.v_ratio)
@@ -99,7 +106,7 @@ def _faded(s: Record, speed_mps: float, block_s: float) -> float:
     """
     step = s.fade_per_s * block_s
     if s.fade < _LAST:
-        return max(s.fade - step, 0.0)
+        return max(s.fade - step, 0.0) if s.fine_mps > (1.0 - _LAST_LAG) * speed_mps else s.fade
     follows = s.sliding_mps / speed_mps - (1.0 - _LAG)
     if follows <= 0.0:
         return s.fade

@@ -2,12 +2,14 @@
 
 import base64
 import io
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bridge.files import write_whole
+from bridge.provenance import provenance
 from diagnosis.blind.scoring import Scores
 from diagnosis.blind.table import TOOL, headline, rows, table, with_interval
 
@@ -17,8 +19,8 @@ if TYPE_CHECKING:
 _DPI = 110.0
 
 
-def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path) -> None:
-    """Write the page. Raises OSError."""
+def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path, files: Iterable[Path] = ()) -> None:
+    """Write the page; at its foot are the hashes of `files`, which the scores come from. Raises OSError."""
     from jinja2 import Environment, StrictUndefined  # noqa: PLC0415
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -26,6 +28,7 @@ def write_report(methods: dict[str, Scores], sealed: bool, name: str, path: Path
     tool = methods[TOOL]
     page = environment.from_string(template).render(
         name=name,
+        footer=provenance(files).footer(),
         headline=headline(tool, sealed),
         methods=list(methods),
         rows=[row for row in rows(methods) if any(one is not None for one in row.scores)],

@@ -50,6 +50,7 @@ _LARGEST = {
     "vibration_frequency_Hz": 1e6,
     "vibration_amplitude_m": 1e-3,  # piezo stacks move by a tenth of a millimetre
 }
+_MOST_TURNS = 1e4  # factor of the way of a rig that turns: rad of a spindle add up
 # a force sensor that never shows 1/300 of the static friction, or shows 300 times the static friction, has another unit
 _FORCE_FACTOR = 300.0
 
@@ -109,7 +110,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         if wrong and name in _COMMANDED:
             raise Fault("BAD_EVIDENCE", f"{file}: {name}: {wrong}; set channels.{name}.scale")
         if wrong:
-            note("units", name, f"{wrong}; not used; set channels.{name}.scale")
+            note("units", name, f"{wrong}; not used; else set channels.{name}.unit or scale")
             del usable[name]
         elif seen.constant and not name.startswith("vibration"):
             used = "" if name == "drive_position_m" else "; not used"
@@ -251,8 +252,12 @@ def _wrong_unit(name: str, values: Floats, rig: RigTable) -> str:
         return ""
     if name.endswith("position_m"):
         size = float(np.ptp(values))
-    if name in _LARGEST and size > _LARGEST[name]:
-        return f"reaches {size:g}: must be below {_LARGEST[name]:g}, the unit cannot be right"
+    limit = _LARGEST.get(name, math.inf)
+    if rig.radius_m is not None and name.endswith("position_m"):
+        limit *= _MOST_TURNS
+    if size > limit:
+        what = '; an angle? A rig that turns has drive = "torsion"' if name.endswith("position_m") else ""
+        return f"reaches {size:g}: must be below {limit:g}, the unit cannot be right{what}"
     return ""
 
 

@@ -19,7 +19,10 @@ from bridge.units import counted
 from diagnosis.evidence.column_checks import Columns, checked
 from diagnosis.evidence.exciter_harmonics import DISTORTED, Distortion, distortion
 from diagnosis.evidence.force_pickup import PICK_UP, PickUp, pick_up
-from diagnosis.evidence.manifest import MANIFEST, STANDARD, ChannelMap, Manifest, RigTable, RunTable, read_manifest
+from diagnosis.evidence.manifest import MANIFEST, Manifest, RigTable, RunTable, described
+from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
+from diagnosis.evidence.mapped import has_time, mapped
+from diagnosis.evidence.rotary import as_sliding, run_as_sliding, told
 from diagnosis.evidence.run_log import columns_of_log
 
 Floats = npt.NDArray[np.float64]
@@ -71,9 +74,14 @@ def load_evidence(folder: Path) -> Evidence:
 
     Raises Fault BAD_EVIDENCE: file, key or column, row, expectation, remedy.
     """
-    manifest = read_manifest(folder)
+    manifest, assumed = described(folder)
     runs: list[Run] = []
-    findings = [
+    findings = told(manifest.rig)
+    findings += [
+        Finding("assumed", f"{MANIFEST}: rig.{name}", f"left out: taken as {getattr(manifest.rig, name):.6g}")
+        for name in assumed
+    ]
+    findings += [
         Finding(
             "tolerance", f"{MANIFEST}: rig.tolerance.{name}", "is relative, and 0 is described: counts as known exactly"
         )
@@ -86,7 +94,10 @@ def load_evidence(folder: Path) -> Evidence:
     for table in manifest.run:
         _refuse_a_way_out(folder, table.file)
         check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
-    read = [read_columns(folder / table.file, manifest.channels) for table in manifest.run]
+    read = [
+        read_columns(folder / table.file, manifest.channels | table.channels, manifest.rig.drive == "torsion")
+        for table in manifest.run
+    ]
     _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
     for table, (columns, damaged) in zip(manifest.run, read, strict=True):
         run, found = examine(columns, manifest.rig, table)
@@ -97,7 +108,7 @@ def load_evidence(folder: Path) -> Evidence:
         runs[-1] = runs[-1]._replace(holdout=True)
         text = "no run is marked holdout: this one is held out; mark one to choose for yourself"
         findings.append(Finding("holdout", runs[-1].file, text))
-    return Evidence(folder, manifest.rig, tuple(runs), tuple(findings))
+    return Evidence(folder, as_sliding(manifest.rig), tuple(runs), tuple(findings))
 
 
 def _refuse_a_way_out(folder: Path, file: str) -> None:
@@ -124,6 +135,8 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
 
     Raises Fault BAD_EVIDENCE when the run cannot be used, or lacks a column that this kind of drive needs.
     """
+    columns, table = run_as_sliding(rig, columns, table)
+    rig = as_sliding(rig)
     usable, clipped, findings = checked(columns, rig, table)
     reasons = "; ".join(f"{finding.where}: {finding.text}" for finding in findings if finding.kind != "clipped")
 
@@ -183,7 +196,7 @@ def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:
                 )
 
 
-def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, list[Finding]]:
+def read_columns(path: Path, channels: dict[str, ChannelMap], rotary: bool = False) -> tuple[Columns, list[Finding]]:
     """The standard columns of a data file, mapped and in SI units but not checked; and findings about missing columns and damage.
 
     A run log has the standard columns; a column that `channels` maps is scaled as in any other file. Raises Fault BAD_EVIDENCE.
@@ -193,22 +206,35 @@ def read_columns(path: Path, channels: dict[str, ChannelMap]) -> tuple[Columns, 
             logged, damaged = columns_of_log(path)
             return {name: _scaled(values, channels.get(name), name) for name, values in logged.items()}, damaged
         table = read_table(path)
-        found: Columns = {}
-        lacking: list[Finding] = []
-        for name in STANDARD:
-            if name in channels:
-                source = channels[name]
-                if source.column not in table.columns and name != "t_s":
-                    text = f"column {source.column}: not in the file; known here: {', '.join(sorted(table.columns)) or 'none'}"
-                    lacking.append(Finding(_NO_COLUMN, f"{path.name}: {name}", text))
-                    continue
-                found[name] = table.column(source.column) * source.scale + source.offset
-            elif name in table.columns:
-                found[name] = table.column(name)
+        wanted, lacking = _wanted(table, channels)
+        if not has_time(table, wanted):
+            has = ", ".join(wanted) or "no standard column"
+            line = f"{path.name}: t_s: missing; the file has {has}; add the column or map it in [channels]"
+            raise Fault("BAD_EVIDENCE", line)
+        found, noted = mapped(table, wanted, rotary=rotary)
     except Fault as fault:
         line = fault.line if path.name in fault.line else f"{path.name}: {fault.line}"
         raise Fault("BAD_EVIDENCE", line) from None
-    return found, [*lacking, *_misspelt(path.name, found, table)]
+    return found, [*lacking, *noted, *_misspelt(path.name, found, table)]
+
+
+def _wanted(table: Table, channels: dict[str, ChannelMap]) -> tuple[dict[str, ChannelMap], list[Finding]]:
+    """The channels that the map or a standard name gives to a column that is there; and a finding for each that is not."""
+    wanted: dict[str, ChannelMap] = {}
+    lacking: list[Finding] = []
+    for name in STANDARD:
+        if name in channels:
+            try:
+                table.find(channels[name].column)
+            except Fault as fault:
+                if name == "t_s":
+                    raise
+                lacking.append(Finding(_NO_COLUMN, f"{table.path.name}: {name}", fault.line.partition(": ")[2]))
+                continue
+            wanted[name] = channels[name]
+        elif name in table.columns:
+            wanted[name] = ChannelMap(column=name, scale=1.0)
+    return wanted, lacking
 
 
 def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
@@ -223,4 +249,6 @@ def _misspelt(file: str, found: Columns, table: Table) -> Iterator[Finding]:
 
 def _scaled(values: Floats, channel: ChannelMap | None, name: str) -> Floats:
     """A scaled column of a run log; a channel map that names another column is meant for the other files of the folder."""
-    return values if channel is None or channel.column != name else values * channel.scale + channel.offset
+    if channel is None or channel.column != name:
+        return values
+    return values * (1.0 if channel.scale is None else channel.scale) + channel.offset

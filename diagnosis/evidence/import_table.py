@@ -1,13 +1,13 @@
 """Import of measured data of other programs, with a channel map, into an evidence folder or a run log of this project."""
 
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
-from pydantic import Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from bridge.config import Strict, read_toml, validate
 from bridge.faults import Fault
@@ -15,33 +15,23 @@ from bridge.files import LOG, folder_beside, followed, refuse_to_replace, replac
 from bridge.log.finding import Finding
 from bridge.log.runlog import RunLog
 from bridge.tables.export import CHANNELS
-from bridge.tables.readers import Dialect, Table, read_table
+from bridge.tables.kinds import Kind
+from bridge.tables.readers import Dialect, read_table
 from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
+from diagnosis.evidence.assumed import with_assumed
 from diagnosis.evidence.folder import examine
-from diagnosis.evidence.manifest import (
-    MANIFEST,
-    STANDARD,
-    ChannelMap,
-    DriveVelocity,
-    Positive,
-    RigTable,
-    RunTable,
-    check_channel_names,
-    read_manifest,
-)
+from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, read_manifest
+from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap, check_channel_names
 from diagnosis.evidence.manifest_text import manifest_text
+from diagnosis.evidence.mapped import mapped
 
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
-_POSITIVE: TypeAdapter[float] = TypeAdapter(Positive)
 _BLOCK_SAMPLES = 20
+_GAP_STEPS = 10.0  # usual steps, beyond which nothing is interpolated
 _IRREGULAR_SHARE = 0.01  # of a step, up to which time counts as even: rounding of a printed column of a DAQ
-# Presliding length that is assumed when the map gives no contact stiffness: the paper's steel pair reaches its static force after
-# 0.22 um, and other metals after a fraction of a micrometre. Too small: a stiff contact, small steps; too large: soft sticks.
-_PRESLIDING_M = 0.22e-6
-_ASSUMED_TOLERANCE = 0.3  # relative, of the numbers that follow from it: 3.3 standard deviations reach 0.11 to 2.2 um
 
 
 class SourceMap(Strict):
@@ -50,10 +40,26 @@ class SourceMap(Strict):
     sample_rate_Hz: Annotated[float, Field(ge=1.0, le=1e7)] | None = Field(
         default=None, description="Where no column holds the time."
     )
-    delimiter: Annotated[str, Field(min_length=1, max_length=1)] = ","
-    decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
-    skip_rows: Annotated[int, Field(ge=0)] = 0
-    encoding: str = "utf-8"
+    format: Kind | None = Field(default=None, description="Of the file, where its first bytes do not say it.")
+    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = Field(
+        default=None, description="Of columns; a blank stands for any number of blanks and tabs."
+    )
+    decimal: Literal[".", ","] | None = Field(default=None, description="Mark of decimals.")
+    thousands: Annotated[str, Field(max_length=1)] | None = Field(default=None, description="Mark of thousands.")
+    skip_rows: Annotated[int, Field(ge=0)] | None = Field(default=None, description="Lines before that of the names.")
+    encoding: str | None = None
+    names: list[str] | None = Field(default=None, description="Of the columns, where the file has none.")
+    units_row: bool | None = Field(default=None, description="Whether a line of units follows the names.")
+    comment: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="What lines begin with that are passed over."
+    )
+    sheet: str | None = Field(default=None, description="Of a workbook.")
+
+    @property
+    def dialect(self) -> Dialect:
+        """What the map says of a text or a sheet."""
+        given = self.model_dump(exclude={"sample_rate_Hz", "format", "names"})
+        return Dialect(**given, names=None if self.names is None else tuple(self.names))
 
 
 class RunMap(Strict):
@@ -104,16 +110,21 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
     unfinished is left behind.
     """
     wanted = validate(ImportMap, read_toml(map_path), map_path.name)
-    source = wanted.source
-    table = read_table(path, Dialect(source.delimiter, source.decimal, source.skip_rows, source.encoding))
-    columns = _columns(table, wanted, map_path.name)
+    table = read_table(path, wanted.source.dialect, wanted.source.format)
     try:
+        columns, findings = mapped(table, wanted.channels, wanted.source.sample_rate_Hz, _turns(wanted.rig))
         if out.suffix == ".mcap":
             _check_free(out)
-            return _to_log(path, columns, out)
-        return _to_folder(path, columns, wanted, map_path.name, out)
+            done = _to_log(path, columns, out)
+        else:
+            done = _to_folder(path, columns, wanted, map_path.name, out)
+        return done._replace(findings=findings + done.findings)
     except OSError as error:
         raise Fault("LOG_WRITE", f"{out}: {error.strerror or error}; choose another --out") from None
+
+
+def _turns(rig: dict[str, Any]) -> bool | None:
+    return rig["drive"] == "torsion" if "drive" in rig else None
 
 
 def _check_free(out: Path) -> None:
@@ -122,60 +133,16 @@ def _check_free(out: Path) -> None:
         raise Fault("CONFIG", f"{out}: is there already; nothing was written; choose another --out")
 
 
-def _columns(table: Table, wanted: ImportMap, map_name: str) -> Columns:
-    """The standard columns, scaled; time from its column, the map's rate or the file's own."""
-    columns: Columns = {}
-    for name in STANDARD:
-        if name in wanted.channels:
-            channel = wanted.channels[name]
-            columns[name] = table.column(channel.column) * channel.scale + channel.offset
-    if "t_s" not in columns:
-        rate_Hz = wanted.source.sample_rate_Hz or table.sample_rate_Hz
-        if rate_Hz is None:
-            line = f"{map_name}: channels.t_s: missing; name the column of the time, or set source.sample_rate_Hz"
-            raise Fault("CONFIG", line)
-        rows = len(next(iter(columns.values())))
-        columns = {"t_s": np.arange(rows) / rate_Hz} | columns
-    for name, values in columns.items():
-        if len(values) != len(columns["t_s"]):
-            line = (
-                f"{table.path.name}: column {wanted.channels[name].column}: {counted(len(values), 'row')}: must have "
-                f"{len(columns['t_s'])}, as the time; every channel needs one value a sample"
-            )
-            raise Fault("BAD_TABLE", line)
-    return columns
-
-
 def _missing(columns: Columns) -> list[str]:
     return [name for name in STANDARD if name not in columns]
 
 
 def _rig(given: dict[str, Any], map_name: str) -> tuple[RigTable, list[str]]:
     """The rig of the map, with assumed values for numbers that an owner can hardly know; and the names of these numbers."""
-    table = dict(given)
-    if not table:
+    if not given:
         raise Fault("CONFIG", f"{map_name}: rig: missing; an evidence folder needs it, or import into a .mcap file")
-    assumed: dict[str, Any] = {"viscous_damping_Ns_per_m": 0.0}
-    if table.get("drive") == "spring":
-        assumed["drive_damping_Ns_per_m"] = 0.0
-    mass_kg, static_N = _positive(table.get("mass_kg")), _positive(table.get("static_force_N"))
-    stiffness = _positive(table.get("contact_stiffness_N_per_m", static_N / _PRESLIDING_M))
-    assumed["contact_stiffness_N_per_m"] = stiffness
-    # critical damping of the presliding motion, as for the paper's pairs
-    assumed["contact_damping_Ns_per_m"] = 2.0 * (stiffness * mass_kg) ** 0.5
-    filled = [name for name in assumed if name not in table]
-    if isinstance(table.get("tolerance", {}), dict):  # any other type is refused by `validate`
-        unsure = {name: _ASSUMED_TOLERANCE for name in filled if name.startswith("contact")}
-        table["tolerance"] = unsure | table.get("tolerance", {})
-    return validate(RigTable, assumed | table, f"{map_name}: rig"), filled
-
-
-def _positive(value: Any) -> float:
-    """The number, or 1 in place of what `validate` refuses: one wrong number must not make others seem to be missing."""
-    try:
-        return _POSITIVE.validate_python(value, strict=True)
-    except ValidationError:
-        return 1.0
+    table, filled = with_assumed(given)
+    return validate(RigTable, table, f"{map_name}: rig"), filled
 
 
 def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, out: Path) -> Imported:
@@ -221,9 +188,42 @@ def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, o
     return Imported(out, run.file, len(columns["t_s"]), list(columns), _missing(columns), findings)
 
 
+def _even_clock(t_s: Floats, file: str) -> tuple[Floats, float, npt.NDArray[np.bool_], list[Finding]]:
+    """An even clock over the times [rows]: its instants [samples], its step, which instants lie in a gap, and findings.
+
+    Over a gap nothing is interpolated: the log lacks these blocks, as it does where a recorder lost them.
+    """
+    steps_s = np.diff(t_s)
+    gaps = np.flatnonzero(steps_s > _GAP_STEPS * float(np.median(steps_s)))
+    where = f"{file}: t_s"
+    if not len(gaps):
+        step_s = float(t_s[-1] - t_s[0]) / (len(t_s) - 1)
+        even_s = t_s[0] + np.arange(len(t_s)) * step_s
+        uneven = float(np.abs(t_s - even_s).max()) / step_s
+        text = f"is uneven by up to {uneven:.2g} steps: the channels were interpolated to an even {1.0 / step_s:g} Hz"
+        return (
+            even_s,
+            step_s,
+            np.zeros(len(t_s), np.bool_),
+            [Finding("time", where, text)] if uneven > _IRREGULAR_SHARE else [],
+        )
+    step_s = float(np.delete(steps_s, gaps).mean())
+    even_s = t_s[0] + np.arange(int(float(t_s[-1] - t_s[0]) / step_s) + 1) * step_s
+    before = np.clip(np.searchsorted(t_s, even_s, side="right") - 1, 0, len(steps_s) - 1)
+    gone = np.isin(before, gaps) & (even_s > t_s[before] + 0.5 * step_s)
+    first = f"{counted(len(gaps), 'gap')} in time, first at {t_s[gaps[0]]:.6g} s, the longest {steps_s.max():.3g} s"
+    text = f"{first}: the log has no block there; the rest is on an even clock of {1.0 / step_s:g} Hz"
+    return even_s, step_s, gone, [Finding("time-gap", where, text, len(gaps))]
+
+
 def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
     """Write a log of sensor blocks of 20 samples at the source's own rate; float32, as in every sensor block."""
     findings: list[Finding] = []
+    known = np.isfinite(columns["t_s"])
+    if without := int((~known).sum()):
+        text = f"{counted(without, 'row')} without a time left out, first row {int(np.argmin(known)) + 1}"
+        findings.append(Finding("not-finite", f"{path.name}: t_s", text, without))
+    columns = columns if known.all() else {name: values[known] for name, values in columns.items()}
     t_s = columns["t_s"]
     if len(t_s) < _BLOCK_SAMPLES or not np.isfinite(t_s).all() or (np.diff(t_s) <= 0).any():
         row = (
@@ -236,19 +236,19 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
             "a log has an even clock; repair the file, or import it into a folder"
         )
         raise Fault("BAD_EVIDENCE", line)
-    step_s = float(t_s[-1] - t_s[0]) / (len(t_s) - 1)
-    even_s = t_s[0] + np.arange(len(t_s)) * step_s
-    uneven = float(np.abs(t_s - even_s).max()) / step_s
-    if uneven > _IRREGULAR_SHARE:
+    even_s, step_s, gone, told = _even_clock(t_s, path.name)
+    findings += told
+    if len(even_s) != len(t_s) or float(np.abs(t_s - even_s).max()) > _IRREGULAR_SHARE * step_s:
         columns = columns | {name: np.interp(even_s, t_s, columns[name]) for name in CHANNELS if name in columns}
-        text = f"is uneven by up to {uneven:.2g} steps: the channels were interpolated to an even {1.0 / step_s:g} Hz"
-        findings.append(Finding("time", f"{path.name}: t_s", text))
-    blocks = len(t_s) // _BLOCK_SAMPLES
-    if left := len(t_s) - blocks * _BLOCK_SAMPLES:
+    blocks = len(even_s) // _BLOCK_SAMPLES
+    if left := len(even_s) - blocks * _BLOCK_SAMPLES:
         text = f"the last {counted(left, 'sample')} left out: too few for a block of {_BLOCK_SAMPLES}"
         findings.append(Finding("cut", path.name, text, left))
+    lacking = gone[: blocks * _BLOCK_SAMPLES].reshape(-1, _BLOCK_SAMPLES).any(axis=1)
     missing = [name for name in CHANNELS if name not in columns]
-    findings += [Finding("missing", f"{path.name}: {name}", "not in the source: zeros in the log") for name in missing]
+    findings += [
+        Finding("missing", f"{path.name}: {name}", "not in the source: no numbers in the log") for name in missing
+    ]
     commanded = [name for name in columns if name.startswith("vibration")]
     text = "left out, as the log holds sensors alone: without it the run counts as one without vibration; import it into a folder"
     findings += [Finding("missing", f"{path.name}: {name}", text) for name in commanded]
@@ -258,7 +258,9 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
         about = {"source": path.name, "sample_rate_Hz": 1.0 / step_s, "samples_per_block": _BLOCK_SAMPLES}
         log.add_metadata("import", about | {"missing": missing, "starts_at_s": float(t_s[0]) - step_s})
         message = sensor_block(_BLOCK_SAMPLES).blank()
-        for block in range(blocks):
+        for name in missing:
+            message[name] = np.nan
+        for block in np.flatnonzero(~lacking).tolist():
             samples = slice(block * _BLOCK_SAMPLES, (block + 1) * _BLOCK_SAMPLES)
             message["sequence"] = block
             message["t_ns"] = round((block + 1) * _BLOCK_SAMPLES * step_s * 1e9)
@@ -269,5 +271,10 @@ def _to_log(path: Path, columns: Columns, out: Path) -> Imported:
         log.close()
         log.path.replace(followed(out))
     return Imported(
-        out, out.name, blocks * _BLOCK_SAMPLES, [name for name in CHANNELS if name in columns], missing, findings
+        out,
+        out.name,
+        int((~lacking).sum()) * _BLOCK_SAMPLES,
+        [name for name in CHANNELS if name in columns],
+        missing,
+        findings,
     )

@@ -3,32 +3,37 @@
 import math
 from collections import Counter
 from pathlib import Path, PurePath
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from bridge.config import Strict, in_short, read_toml, validate
 from bridge.faults import Fault
 from bridge.files import check_file, shown
+from diagnosis.evidence.assumed import with_assumed
+from diagnosis.evidence.manifest_keys import ChannelMap, NotNegative, Positive, check_channel_names
 
 FORMAT = "evidence/1"
 MANIFEST = "manifest.toml"
-RUN_SUFFIXES = (".parquet", ".csv", ".mat", ".mcap")
-STANDARD = (
-    "t_s",
-    "drive_force_N",
-    "mass_accel_mps2",
-    "base_accel_mps2",
-    "mass_position_m",
-    "drive_position_m",
-    "vibration_frequency_Hz",
-    "vibration_amplitude_m",
+# of runs, in any case; what a table is, its first bytes say
+RUN_SUFFIXES = (
+    ".parquet",
+    ".csv",
+    ".txt",
+    ".dat",
+    ".lvm",
+    ".tsv",
+    ".asc",
+    ".mat",
+    ".tdms",
+    ".xlsx",
+    ".xls",
+    ".ods",
+    ".h5",
+    ".mcap",
 )
 _SPRING_ONLY = ("drive_stiffness_N_per_m", "drive_damping_Ns_per_m")
 
-# The upper limit is far above any rig, and low enough that no product of such numbers overflows.
-Positive = Annotated[float, Field(gt=0, lt=1e12)]
-NotNegative = Annotated[float, Field(ge=0, lt=1e12)]
 # Highest natural frequency of the mass on a stiffness. Larger values let the plant's step become unstable: the plant refuses the
 # numbers beside, and fits vary mass and stiffness within their tolerances. Smaller values would refuse stiff rigs.
 _FASTEST_RAD_PER_S = {
@@ -43,7 +48,12 @@ DriveVelocity = Annotated[float, Field(ge=-_FASTEST_MPS, le=_FASTEST_MPS)]
 class RigTable(Strict):
     """The rig as its owner describes it, SI units."""
 
-    drive: Literal["spring", "force"]
+    drive: Literal["spring", "force", "torsion"] = Field(
+        description="torsion: a rig that turns; every number in N m, rad and kg m2 in place of N, m and kg."
+    )
+    radius_m: Positive | None = Field(
+        default=None, description='With drive = "torsion": where its numbers are told in N and m; 1 if not given.'
+    )
     mass_kg: Positive
     drive_stiffness_N_per_m: Positive | None = Field(default=None, description='With drive = "spring" only.')
     drive_damping_Ns_per_m: NotNegative | None = Field(default=None, description='With drive = "spring" only.')
@@ -61,10 +71,12 @@ class RigTable(Strict):
     def _fits_together(self) -> "RigTable":
         for key in _SPRING_ONLY:
             given = getattr(self, key) is not None
-            if self.drive == "spring" and not given:
-                raise ValueError(f'{key}: missing; a rig with drive = "spring" needs it')
+            if self.drive != "force" and not given:
+                raise ValueError(f'{key}: missing; a rig with drive = "{self.drive}" needs it')
             if self.drive == "force" and given:
                 raise ValueError(f'{key}: unknown with drive = "force"; remove it, or set drive = "spring"')
+        if self.radius_m is not None and self.drive != "torsion":
+            raise ValueError('radius_m: unknown without drive = "torsion"; remove it, or set drive = "torsion"')
         if self.static_force_N < self.coulomb_force_N:
             raise ValueError(
                 f"static_force_N = {self.static_force_N:g}: must not be below coulomb_force_N = "
@@ -94,26 +106,11 @@ class RigTable(Strict):
 
     def values(self) -> dict[str, float | None]:
         """The rig numbers by name, SI units; None where the drive has no such part."""
-        return {name: getattr(self, name) for name in RigTable.model_fields if name not in {"drive", "tolerance"}}
-
-
-class ChannelMap(Strict):
-    """Source of a standard column: value = column * scale + offset, in its SI unit. A text alone is the column."""
-
-    column: Annotated[str, Field(min_length=1)]
-    scale: float = 1.0
-    offset: float = 0.0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _text_is_the_column(cls, table: Any) -> Any:
-        return {"column": table} if isinstance(table, str) else table
-
-    @model_validator(mode="after")
-    def _scale_is_not_zero(self) -> "ChannelMap":
-        if self.scale == 0.0:
-            raise ValueError("scale = 0: must not be 0, it would erase the column; 1 keeps it as it is")
-        return self
+        return {
+            name: getattr(self, name)
+            for name in RigTable.model_fields
+            if name not in {"drive", "tolerance", "radius_m"}
+        }
 
 
 class RunTable(Strict):
@@ -122,13 +119,19 @@ class RunTable(Strict):
     file: Annotated[str, Field(min_length=1)]
     drive_velocity_mps: DriveVelocity | None = None
     holdout: bool = False
+    channels: dict[str, ChannelMap] = Field(default={}, description="Of this run, where they differ from [channels].")
+
+    @model_validator(mode="after")
+    def _names_are_right(self) -> "RunTable":
+        check_channel_names(self.channels)
+        return self
 
     @model_validator(mode="after")
     def _file_is_in_the_folder(self) -> "RunTable":
         path = PurePath(self.file)
         if path.is_absolute() or ".." in path.parts:
             raise ValueError(f"file = {self.file!r}: must lie in the evidence folder; copy it there")
-        if path.suffix not in RUN_SUFFIXES:
+        if path.suffix.lower() not in RUN_SUFFIXES:
             raise ValueError(f"file = {self.file!r}: must end in {', '.join(RUN_SUFFIXES)}; see `stickslip log import`")
         return self
 
@@ -157,13 +160,6 @@ class Manifest(Strict):
         return self
 
 
-def check_channel_names(channels: dict[str, Any]) -> None:
-    """Raise ValueError when a channel is not a standard column."""
-    for name in channels:
-        if name not in STANDARD:
-            raise ValueError(f"channels.{name}: unknown key; known here: {', '.join(STANDARD)}")
-
-
 def check_folder(folder: Path) -> None:
     """Raise Fault BAD_EVIDENCE where `folder` is no folder."""
     try:
@@ -177,6 +173,14 @@ def check_folder(folder: Path) -> None:
 
 def read_manifest(folder: Path) -> Manifest:
     """Read and check `manifest.toml` of an evidence folder. Raises Fault BAD_EVIDENCE, with one line for each problem."""
+    return described(folder)[0]
+
+
+def described(folder: Path) -> tuple[Manifest, list[str]]:
+    """`manifest.toml` of an evidence folder, and the rig numbers that it leaves out and that are assumed.
+
+    Raises Fault BAD_EVIDENCE, with one line for each problem.
+    """
     if shown(folder) != str(folder):
         raise Fault("BAD_EVIDENCE", f"{shown(folder)}: its name is not UTF-8; rename it")
     check_folder(folder)
@@ -190,6 +194,9 @@ def read_manifest(folder: Path) -> Manifest:
         if "format" in table and table["format"] != FORMAT:
             line = f'{MANIFEST}: format = {in_short(table["format"])}: must be "{FORMAT}"; this version reads no other'
             raise Fault("BAD_EVIDENCE", line)
-        return validate(Manifest, table, MANIFEST)
+        assumed: list[str] = []
+        if isinstance(table.get("rig"), dict):
+            table["rig"], assumed = with_assumed(table["rig"])
+        return validate(Manifest, table, MANIFEST), assumed
     except Fault as fault:
         raise Fault("BAD_EVIDENCE", fault.line) from None

@@ -9,6 +9,8 @@ from diagnosis.evidence.manifest import FORMAT, RigTable, RunTable
 def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> str:
     """Text of a `manifest.toml` with this rig and these runs; rig numbers in `assumed` get the remark that they are assumed."""
     lines = [f"format = {_value(FORMAT)}", "", "[rig]", f"drive = {_value(rig.drive)}"]
+    if rig.radius_m is not None:
+        lines.append(f"radius_m = {_value(rig.radius_m)}")
     for name, value in rig.values().items():
         if value is not None:
             lines.append(f"{name} = {_value(value)}" + ("  # assumed, not measured" if name in assumed else ""))
@@ -17,7 +19,11 @@ def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> st
         lines += [f"{name} = {_value(value)}" for name, value in rig.tolerance.items()]
     for run in runs:
         lines += ["", "[[run]]"]
-        lines += [f"{name} = {_value(value)}" for name, value in run.model_dump().items() if value is not None]
+        plain = run.model_dump(exclude={"channels"})
+        lines += [f"{name} = {_value(value)}" for name, value in plain.items() if value is not None]
+        for name, channel in run.channels.items():
+            keys = [f"{key} = {_value(value)}" for key, value in channel.model_dump(exclude_defaults=True).items()]
+            lines.append(f"channels.{name} = {{ {', '.join(keys)} }}")
     return "\n".join(lines) + "\n"
 
 

@@ -1,11 +1,13 @@
 """The report of a diagnosis: one HTML file that needs no other file, with the answer first."""
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from bridge import units
 from bridge.files import write_whole
+from bridge.provenance import provenance
 from diagnosis.report import relation_words, words
 from diagnosis.report.page_plots import STYLES, draw
 from diagnosis.result import Candidate, Cell, Diagnosis, Gap, RigNumber
@@ -54,13 +56,16 @@ class RigRow(NamedTuple):
     shift_sd: float | None
 
 
-def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path) -> None:
-    """Write the report to `path`, whole or not at all. Raises OSError when it cannot be written."""
-    write_whole(path, report_page(diagnosis, evidence_name))
+def write_report(diagnosis: Diagnosis, evidence_name: str, path: Path, files: Iterable[Path] = ()) -> None:
+    """Write the report to `path`, whole or not at all; at its foot are the hashes of `files`, which the evidence is.
+
+    Raises OSError when it cannot be written, or one of the files not be read.
+    """
+    write_whole(path, report_page(diagnosis, evidence_name, provenance(files).footer()))
 
 
-def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
-    """The report as the text of an HTML file."""
+def report_page(diagnosis: Diagnosis, evidence_name: str, footer: str = "") -> str:
+    """The report as the text of an HTML file; `footer` is HTML."""
     from jinja2 import Environment, StrictUndefined  # noqa: PLC0415
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -82,6 +87,7 @@ def report_page(diagnosis: Diagnosis, evidence_name: str) -> str:
     return environment.from_string(template).render(
         diagnosis=diagnosis,
         evidence_name=evidence_name,
+        footer=footer,
         banner=_BANNERS[diagnosis.verdict],
         answer=words.answer(diagnosis),
         shown=shown,

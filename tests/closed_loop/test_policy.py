@@ -80,8 +80,8 @@ def test_an_accelerometer_that_is_unplugged_is_said() -> None:
 
     loop = close_the_loop(3.0, deliver=unplugged)
     assert wire.PIEZO_WEAK not in set(loop.trace["reason"][loop.t_s < 1.5])
-    assert set(loop.trace["reason"][loop.t_s > 2.0]) == {wire.PIEZO_WEAK}
-    assert loop.trace["limit"][-1] == wire.NO_LIMIT  # it goes on open loop, with the gain that it had learnt
+    assert set(loop.trace["reason"][loop.t_s > 2.0]) == {wire.FROZEN}
+    assert loop.trace["limit"][-1] == wire.HELD_OPEN_LOOP  # it goes on with the gain that it had learnt
 
 
 def test_a_piezo_that_suffices_again_is_weak_no_longer() -> None:
@@ -120,9 +120,9 @@ def test_drive_that_stands_needs_no_vibration() -> None:
 
 
 def test_probe_keeps_the_vibration_that_is_needed() -> None:
-    # a spring that takes up what the vibration took off the friction faster than the slide could stick
+    # friction falls by little there; the question finds it, so nothing is faded out
     loop = close_the_loop(5.0, rig={"drive": {"profile": [(0.0, 2e-3)]}}, controller={"policy": {"probe_every_s": 2.0}})
-    assert loop.modes()[:4] == [wire.WATCH, wire.EXCITE, wire.PROBE, wire.EXCITE]
+    assert loop.modes() == [wire.WATCH, wire.EXCITE]
     assert wire.STILL_NEEDED in loop.trace["reason"]
     assert loop.slips(0.0) == 0
 

@@ -68,7 +68,8 @@ def test_twice_over_the_bus_and_in_one_process_are_the_same_bytes(tmp_path: Path
         )
     first, second, alone = (topics(log) for log in logs)
     assert set(first) == {
-        *("/sensors", "/applied", "/command", "/trace", "/state", "/snapshot", "/event/plant", "/event/controller")
+        *("/sensors", "/applied", "/command", "/trace", "/state", "/snapshot", "/event/plant", "/event/controller"),
+        *("/scope", "/log"),
     }
     assert len(first["/trace"]) == 6_000
     for topic in first:

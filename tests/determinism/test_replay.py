@@ -16,7 +16,8 @@ from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import SENSORS
 from cockpit.cli import app
-from cockpit.judge.verdict import in_words, judge_run
+from cockpit.judge.verdict import judge_run
+from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import Word, run_onboard
 from cockpit.run.replay import changes_of
 from cockpit.run.scenario import Scenario, header, load_scenario
@@ -218,7 +219,11 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     assert slips.after is not None
     assert slips.after.seconds == pytest.approx(6.4, abs=0.1)
     assert slips.stopped_s == pytest.approx(6.6, abs=0.1)
-    assert "stopped  by an operator, or not armed, for 6.6 s, which is no part of what came after" in in_words(slips)
+    assert slips.stopped_slips > 0
+    then = f"{slips.stopped_slips} slips"
+    told = f"stopped  by an operator, or not armed, for 6.6 s, which is no part of what came after; {then} then"
+    assert told in in_words(slips)
+    assert headline(slips) == f"no stick-slip with the controller in charge; {then} while it was stopped or not armed"
     assert int(read_run(stopped).trace["slips"][-1]) >= 3
     figures = CliRunner().invoke(app, ["replay", str(stopped), "--closed-loop", "--json", "--log", str(again)])
     compared = json.loads(figures.stdout)

@@ -12,8 +12,10 @@ import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 
 from bridge.faults import Fault
-from bridge.tables import readers
-from bridge.tables.readers import SUFFIXES, read_table
+from bridge.tables import mat
+from bridge.tables.readers import read_table
+
+SUFFIXES = (".csv", ".parquet", ".mat", ".tdms")
 
 MANY = 2500  # of each of the four formats, at night: 10 000 in all
 
@@ -71,9 +73,7 @@ def check(folder: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, many: int)
     path = folder / f"damaged{suffix}"
     if suffix == ".mat":
         # without the trial in a process of its own, which takes a second
-        monkeypatch.setattr(
-            readers, "_loaded", lambda at: scipy.io.loadmat(at, squeeze_me=True, struct_as_record=False)
-        )
+        monkeypatch.setattr(mat, "_loaded", lambda at: scipy.io.loadmat(at, squeeze_me=True, struct_as_record=False))
     for _ in range(many):
         path.write_bytes(damaged(sound(suffix), random))
         assert outcome(path) in {"read", "BAD_TABLE"}

@@ -71,3 +71,6 @@ def test_a_rig_whose_stop_could_not_be_kept_does_not_arm_itself(tmp_path: Path) 
     endpoint = free_endpoint()
     with rig(endpoint, os.environ | {"XDG_STATE_HOME": str(tmp_path)}, "--set", "arm=true"):
         assert say("status", endpoint)[1]["state"] == "DISARMED"
+        status, stopped = say("stop", endpoint)
+        assert (status, stopped["state"]) == (0, "FAULT")
+        assert "does not outlast a restart" in stopped["not_kept"]

@@ -44,7 +44,7 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     # how soon the answers come is for the bench to say; that they come at all is for this test
     assert np.array_equal(np.unique(data.command["block"]), data.sensors["sequence"])
     assert int(data.applied["commands"].sum()) > 5700  # a pause of a busy machine at the end leaves some under way
-    assert set(data.headers) == {"run", "plant", "controller"}
+    assert set(data.headers) == {"run", "plant", "controller", "verdict"}
     verdict = json.loads(result.stdout)
     told = [event.text for event in data.events if event.code == "WATCH"]
     assert len(told) == 1

@@ -26,7 +26,7 @@ CLIENTS = ("controller", "recorder", "operator", "viewer")
 SAYS = {
     "controller": {"command", "trace", "state", "snapshot", "event/controller"},
     "recorder": {"event/recorder"},
-    "operator": {"operator"},
+    "operator": {"operator", "fault"},
     "viewer": set(),
 }
 

@@ -84,6 +84,10 @@ def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
         ),
         (["duration_s=200.0"], ["duration_s", "50 mm", "shorten"]),
         (["duration_s=1e9"], ["duration_s = 1e+09", "500000000.0 mm", "shorten"]),
+        (
+            ["rig.guard.forbidden_Hz=[[2600.0, 4600.0]]"],
+            ["controller.limits.forbidden_Hz", "2600 Hz", "rig.guard.forbidden_Hz = [2600, 4600]", "as well"],
+        ),
         (["controller.limits.forbidden_Hz=[[0.0, 9000.0]]"], ["forbidden_Hz", "no frequency is left"]),
         (
             ["controller.limits.forbidden_Hz=[[2600.0, 4000.0], [3900.0, 5000.0]]"],

@@ -51,6 +51,7 @@ class LogCheck(NamedTuple):
     seconds: float  # of sensor blocks
     late_share: dict[str, float]  # share of messages later than 1 ms: /applied (block sent), /trace (answer ready)
     chain: Chain  # whether the bytes are those that were written
+    foreign: dict[str, int]  # messages of topics of other programs, which are no finding
 
     def as_dict(self) -> dict[str, Any]:
         """The result as an object for `--json`."""
@@ -128,7 +129,7 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
             findings.append(Finding("late", where, text, seen.late[where[1:]]))
     messages = {name: watch.messages for name, watch in seen.topics.items()}
     seconds = messages["sensors"] * seen.period_ns / 1e9
-    return LogCheck(str(path), findings, messages, seconds, shares, chain)
+    return LogCheck(str(path), findings, messages, seconds, shares, chain, reader.foreign)
 
 
 def _sample_s(seen: _Pass) -> float:

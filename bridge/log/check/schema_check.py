@@ -5,7 +5,7 @@ from google.protobuf.message import DecodeError
 
 from bridge.log.finding import Finding
 from bridge.log.log_reader import LogReader
-from bridge.wire.topics import BY_NAME, Topic
+from bridge.wire.topics import BY_NAME, SCOPE, Topic
 
 _ENCODING = "protobuf"
 
@@ -14,7 +14,7 @@ def schema_findings(reader: LogReader) -> list[Finding]:
     """A finding for each topic whose schema is missing, cannot be read or describes another message."""
     found: list[Finding] = []
     for channel in reader.channels.values():
-        topic = BY_NAME.get(channel.topic.removeprefix("/"))
+        topic = (BY_NAME | {SCOPE.name: SCOPE}).get(channel.topic.removeprefix("/"))
         if topic is None:
             continue
         schema = reader.schemas.get(channel.schema_id)

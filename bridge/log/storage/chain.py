@@ -4,8 +4,12 @@ A link is a metadata record of the name `chain`, which other programs pass over.
 in messages, definitions and configurations alike; behind it the checksum of the index counts. A log that was killed can be
 verified up to its last whole chunk. There is no secret in it: who can write the file can also compute the chain anew, unless its
 last hash was noted elsewhere.
+
+A program that writes a log anew, as `mcap compress` or `mcap filter` do, leaves the links out or copies them to places where
+not one of them fits. A changed byte is another thing: all links but one or two fit. What a log written anew held is not proved.
 """
 
+import contextlib
 import hashlib
 import struct
 import zlib
@@ -15,14 +19,17 @@ from typing import IO, Any, NamedTuple
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Metadata
+from mcap.records import Header, Metadata
 
 from bridge.faults import Fault
 from bridge.log.finding import Finding
-from bridge.log.library import HEAD, MAGIC
+from bridge.log.library import HEAD, MAGIC, READABLE
+from bridge.log.reading.chunk_bytes import UNREADABLE
 from bridge.units import counted
 
 CHAIN = "chain"  # the name of the metadata records
+_LONGEST_HEADER_BYTES = 4096  # of the content; a longer one is another program's
+_ANOTHER = "another program"
 _LONGEST_LINK_BYTES = 256  # of the content of a link; a longer record is none
 _PIECE_BYTES = 1 << 20
 _FOOTER_BYTES = 20
@@ -49,6 +56,7 @@ class Chain(NamedTuple):
     ended: bool  # the last link says that it is the last
     covered_bytes: int  # end of the last link
     closed: bool  # the file has its footer
+    rewritten_by: str = ""  # the library of a program that wrote the log anew, after which the chain says nothing
 
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
@@ -72,6 +80,9 @@ class _Walk:
         self.hash = hashlib.sha256()
         self.since = 0  # end of the last link
         self.links, self.first, self.last = 0, "", ""
+        self.fits = 0  # links that are right and have something to cover
+        self.library = ""
+        self.lost = False  # the way through the records
         self.changed: list[Stretch] = []
         self.changes = 0
         self.ended = self.closed = False
@@ -96,7 +107,8 @@ class _Walk:
         if not self.closed:
             self.file.seek(max(self.size - len(MAGIC), 0))
             self.closed = self.file.read() == MAGIC
-            if self.closed:  # the way through the records was lost before their end
+            if self.closed:
+                self.lost = True
                 self.change(self.since, self.size)
 
     def records(self) -> None:
@@ -107,11 +119,18 @@ class _Walk:
             if len(head) < HEAD.size:
                 return
             opcode, length = HEAD.unpack(head)
-            if opcode == 0 or opcode > Opcode.DATA_END or length > self.size - start - HEAD.size:
+            if opcode == 0 or length > self.size - start - HEAD.size:
                 return
             if opcode == Opcode.DATA_END:
                 self.end(start, head)
                 return
+            if opcode == Opcode.HEADER and start == len(MAGIC) and length <= _LONGEST_HEADER_BYTES:
+                content = self.file.read(length)
+                self.hash.update(head + content)
+                self.at += len(head) + len(content)
+                with contextlib.suppress(*UNREADABLE):
+                    self.library = Header.read(ReadDataStream(BytesIO(content))).library
+                continue
             if opcode == Opcode.METADATA and length <= _LONGEST_LINK_BYTES:
                 content = self.file.read(length)
                 if self.link(head + content, content):
@@ -133,8 +152,10 @@ class _Walk:
         if metadata.name != CHAIN:
             return False
         ended = metadata.metadata.get("end") == "1"
-        if stored != self.hash.digest() or record != link_record(self.links, stored, ended):
+        digest = self.hash.digest()
+        if stored != digest or record != link_record(self.links, stored, ended):
             self.change(self.since, self.at + len(record))
+        self.fits += stored == digest and self.at > self.since
         self.at += len(record)
         self.since = self.at
         self.links += 1
@@ -159,14 +180,25 @@ class _Walk:
             else (0, 0, 0)
         )
         footer = HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES) + struct.pack("<QQI", summary_start, offset_start, crc) + MAGIC
-        right = ending == footer and data_end == HEAD.pack(Opcode.DATA_END, 4) + bytes(4)
+        # other writers may give a checksum of the data, and none of the summary
+        own_end = data_end == HEAD.pack(Opcode.DATA_END, 4) + bytes(4)
+        right = ending == footer and (own_end or not self.links)
         if summary_start:
-            right &= summary_start == begins and crc == self.summary_crc(begins)
+            right &= summary_start == begins and (crc == self.summary_crc(begins) or not (crc or self.links))
         else:
             right &= self.size - begins == _ENDING_BYTES and not (offset_start or crc)
         # a file that was cut within its index is no changed one
         if not right and (self.closed or ending.startswith(HEAD.pack(Opcode.FOOTER, _FOOTER_BYTES))):
             self.change(start, self.size)
+
+    def rewritten_by(self) -> str:
+        """The library of the program that wrote the file anew after its recording; empty where none did."""
+        ours = self.library in READABLE
+        if self.lost:  # it may be a changed byte that makes the library another's, and the links cannot be found
+            return ""
+        if self.links > 1 and not self.fits:
+            return _ANOTHER if ours else self.library or _ANOTHER
+        return self.library if self.library and not ours and not self.fits else ""
 
     def summary_crc(self, begins: int) -> int:
         """The checksum of the index and of the footer up to its own field for it."""
@@ -190,6 +222,8 @@ def chain_of(path: Path) -> Chain:
             walk.run()
     except OSError as error:
         raise Fault("BAD_LOG", f"{path}: cannot be read: {error.strerror}; give the path of a .mcap file") from None
+    if by := walk.rewritten_by():
+        return Chain(walk.links, walk.first, walk.last, [], 0, walk.ended, 0, walk.closed, by)
     return Chain(walk.links, walk.first, walk.last, walk.changed, walk.changes, walk.ended, walk.since, walk.closed)
 
 
@@ -199,7 +233,7 @@ def chain_findings(chain: Chain, name: str) -> list[Finding]:
     if chain.changes > len(chain.changed):
         more = chain.changes - len(chain.changed)
         found.append(Finding("changed", name, f"and {counted(more, 'more stretch', 'more stretches')}", more))
-    if chain.links and chain.closed and not chain.ended:
+    if chain.links and chain.closed and not chain.ended and not chain.rewritten_by:
         text = "is closed without the end of its hash chain: what came last was not written, or was taken away"
         found.append(Finding("changed", name, text))
     return found
@@ -214,6 +248,11 @@ def _in_words(stretch: Stretch) -> str:
 
 def chain_in_words(chain: Chain) -> str:
     """One line for a person."""
+    if chain.rewritten_by:
+        return (
+            f"chain    fits no more: the log was written anew by {chain.rewritten_by!r} after its recording; "
+            "whether a byte was changed cannot be seen"
+        )
     if not (chain.links or chain.changes):
         return "chain    none: this log was written without one, so a changed byte outside of its chunks cannot be seen"
     if chain.changes:

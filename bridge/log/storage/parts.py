@@ -103,7 +103,8 @@ def chain_of_log(path: Path) -> Chain:
         said = part_of(part)
         changed = [*whole.changed, *chain.changed]
         changes = whole.changes + chain.changes
-        if said is not None and whole.last and said.follows != whole.last and not (before and before.recovered):
+        anew = (before is not None and before.recovered) or whole.rewritten_by or chain.rewritten_by
+        if said is not None and whole.last and said.follows != whole.last and not anew:
             changed.append(Stretch(part.name, 0, 0))
             changes += 1
         before = said
@@ -116,5 +117,6 @@ def chain_of_log(path: Path) -> Chain:
             whole.ended and chain.ended,
             chain.covered_bytes,
             whole.closed and chain.closed,
+            whole.rewritten_by or chain.rewritten_by,
         )
     return whole

@@ -10,7 +10,8 @@ from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.recover import recover
 from bridge.log.storage.chain import chain_in_words, chain_of
-from cockpit.judge.verdict import in_words, judge
+from cockpit.judge.verdict import judge
+from cockpit.judge.verdict_words import in_words
 from tests.logs import short_log
 
 OLD = Path(__file__).parents[2] / "old_logs" / "schema-1.mcap"  # written before there was a chain

@@ -14,7 +14,7 @@ from bridge.log.recover import recover
 from bridge.log.runlog import RunLog
 from bridge.tables.export import export
 from bridge.tables.writers import ArrowTable
-from cockpit.judge.run_plot import plot_run
+from cockpit.figures.run_figure import draw_logs
 from tests.logs import short_log
 
 
@@ -36,7 +36,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "table.parquet": table,
     "all.mat": lambda out: export(log(out.parent), out, ["trace"], overwrite=True),
     "whole.mcap": lambda out: recover(log(out.parent), out),
-    "plot.png": lambda out: plot_run(log(out.parent), out),
+    "plot.png": lambda out: draw_logs([log(out.parent)], out),
 }
 
 

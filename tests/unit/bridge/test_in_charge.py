@@ -10,7 +10,8 @@ from bridge.log.in_charge import NO_COMMAND, in_charge
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_told
-from cockpit.judge.verdict import headline, in_words, judge
+from cockpit.judge.verdict import judge
+from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
 from tests.logs import Tables, doctored, short_log, tables_of, write

@@ -14,7 +14,8 @@ from bridge.faults import Fault
 from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from cockpit.commands.log import log_app
-from cockpit.judge.verdict import in_words, judge
+from cockpit.judge.verdict import judge
+from cockpit.judge.verdict_words import in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
 from tests.logs import Tables, doctored, short_log
@@ -162,7 +163,7 @@ def test_no_log_is_a_fault(tmp_path: Path) -> None:
     (tmp_path / "folder.mcap").mkdir()
     expected = {
         "empty": "0 bytes, no MCAP file",
-        "foreign": "must be 'stickslip schema 1' or 'stickslip schema 2'",
+        "foreign": "holds no topic of a run: its messages are std_msgs/String; give a run log",
         "version": "written by 'stickslip schema 3'",
         "text": "no MCAP file",
         "folder": "is a folder, must be a file; ",

@@ -59,14 +59,14 @@ def test_a_log_goes_on_in_the_next_file_and_is_read_by_its_first_name(tmp_path: 
 
 
 def test_a_file_by_size(tmp_path: Path) -> None:
-    log = RunLog(tmp_path / "run.mcap", lockstep=True, rotation=Rotation(bytes=30_000))
-    for start in range(0, 3000, 100):
+    log = RunLog(tmp_path / "run.mcap", lockstep=True, rotation=Rotation(bytes=120_000))
+    for start in range(0, 6000, 100):
         write(log, range(start, start + 100))
     log.close()
     parts = parts_of(log.path)
     assert len(parts) > 2
-    assert all(30_000 <= part.stat().st_size < 60_000 for part in parts[:-1])
-    assert len(read_run(log.path).sensors) == 3000
+    assert all(120_000 <= part.stat().st_size < 240_000 for part in parts[:-1])
+    assert len(read_run(log.path).sensors) == 6000
 
 
 def test_a_file_of_a_log_that_was_taken_away_changed_or_exchanged_is_found(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.judge.verdict import headline, in_words, judge_run
+from cockpit.judge.verdict import judge_run
+from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.replay import outcome
 from cockpit.run.scenario import load_scenario

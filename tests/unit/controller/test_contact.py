@@ -5,8 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bridge.config import validate
 from bridge.wire import stickslip_pb2 as wire
-from tests.unit.controller.signals import STIFFNESS_N_PER_M, listen, stick_slip, time_s
+from bridge.wire.messages import sensor_block
+from controller.config import ControllerConfig
+from controller.node import ControllerNode
+from tests.unit.controller.signals import SAMPLES, STIFFNESS_N_PER_M, listen, stick_slip, time_s
 
 CHANNELS = {"both": {}, "no slide position": {"use_slide_position": False}, "no force": {"use_force": False}}
 
@@ -86,3 +90,27 @@ def test_a_slide_on_a_drive_that_stands_is_at_a_standstill_and_slips_not() -> No
     trace = listen(drive_m, drive_m, offset_N=12.0)
     assert (trace["state"][2030:] == wire.STANDSTILL).all()
     assert trace["slips"][-1] == 0
+
+
+@pytest.mark.parametrize(("stiffness", "fall_s", "drop_N"), [(168.0, 0.042, 0.019), (2254.0, 0.0116, 0.022)])
+def test_slips_are_counted_where_they_last_longer_than_a_stick_and_nothing_shows_the_slide(
+    stiffness: float, fall_s: float, drop_N: float
+) -> None:
+    """A dead slide position must not make the spring soft: it never changes by a step."""
+    speed_mps = 1.1e-3
+    stick_s = drop_N / (stiffness * speed_mps)
+    period_s = stick_s + fall_s
+    t_s = time_s(3.0)
+    phase = t_s % period_s
+    fall = 0.5 * drop_N * (1 + np.cos(np.pi * (phase - stick_s) / fall_s))
+    node = ControllerNode(
+        validate(ControllerConfig, {"drive_stiffness_N_per_m": stiffness, "policy": {"enabled_from_s": 1e9}}, "test")
+    )
+    sensors = sensor_block(SAMPLES).blank()
+    force_N = 0.1 + np.where(phase < stick_s, drop_N * phase / stick_s, fall)
+    for block in range(len(t_s) // SAMPLES):
+        own = slice(SAMPLES * block, SAMPLES * (block + 1))
+        sensors["sequence"], sensors["t_ns"] = block, 1_000_000 * (block + 1)
+        sensors["drive_force_N"], sensors["drive_position_m"] = force_N[own], speed_mps * t_s[own]
+        node.block(sensors.tobytes())
+    assert int(node._trace[0]["slips"]) == pytest.approx(3.0 / period_s, rel=0.05)

@@ -54,3 +54,26 @@ def test_a_step_of_the_velocity_is_followed(after_mps: float) -> None:
     assert trace["drive_velocity_mps"][900:1000] == pytest.approx(5e-4, rel=0.05)
     assert trace["drive_velocity_mps"][1060:] == pytest.approx(after_mps, rel=0.1)
     assert trace["drive_velocity_mps"][1500:] == pytest.approx(after_mps, rel=0.03)
+
+
+def _started(acceleration_mps2: float, velocity_mps: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity of a drive that starts after 1 s, [samples] and [blocks]."""
+    v_mps = np.clip((time_s(seconds) - 1.0) * acceleration_mps2, 0.0, velocity_mps)
+    return np.cumsum(v_mps) * 5e-5, v_mps[19::20]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_drive_that_starts_is_not_lost_again(seed: int) -> None:
+    drive_m, v_mps = _started(5e-3, 5e-4, 1.4)
+    trace = listen(drive_m, np.zeros_like(drive_m), seed=seed)
+    moving = trace["drive_velocity_mps"] > 0.0
+    assert not moving[:1000].any()
+    begins = np.flatnonzero(np.diff(moving.astype(int)) == 1)
+    assert len(begins) == 1
+    assert v_mps[begins[0] + 1] < 1.5e-4
+
+
+def test_hum_on_both_positions_is_no_motion_before_its_noise_is_known() -> None:
+    hum_m = 1e-6 * np.sin(2.0 * np.pi * 50.0 * time_s(2.0))
+    for seed in range(3):
+        assert not listen(hum_m, hum_m, seed=seed)["drive_velocity_mps"].any()

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from bridge.config import validate
+from bridge.wire import stickslip_pb2 as wire
 from controller.config import ControllerConfig
+from controller.needs.failures import forget_failures, note_lesson
 from controller.needs.need import (
     follow_swing,
     grows,
@@ -52,9 +54,10 @@ def test_each_direction_has_its_own_memory() -> None:
     assert is_needed(s, 5e-4)
     s.direction = 1
     assert not is_needed(s, 5e-4)
-    note_needless(s, 1e-3)
+    note_needless(s, 2e-3)
     s.direction = -1
-    assert not is_needless(s, 1e-3)
+    assert is_needed(s, 5e-4)
+    assert not is_needless(s, 2e-3)
 
 
 @pytest.mark.parametrize("speed_mps", [2e-4, 1e-3, 5e-3])
@@ -92,7 +95,7 @@ def test_the_ratio_never_falls_onto_the_edge_until_that_is_forgotten() -> None:
     assert s.ratio[0] == pytest.approx(1.2)
     s.swing = 0.0
     _follow(p, s, 20.0)
-    assert s.ratio[0] == pytest.approx(1.12)  # a step above
+    assert s.ratio[0] == pytest.approx(1.12)  # a step above, and twice as far after each more failure
     _follow(p, s, 60.0)
     assert s.ratio[0] < 1.12
     assert s.ratio[1] == 1.2
@@ -128,3 +131,38 @@ def test_mean_friction_grows_with_the_slide_as_the_mean_relative_speed_says(rati
 
     by = (friction(1.001) - friction(0.999)) / 0.002 / friction(1.0)
     assert grows(ratio) == pytest.approx(by, rel=0.01)
+
+
+def test_another_direction_is_as_the_one_that_is_known_until_it_says_otherwise() -> None:
+    _, s = _start()
+    note_needless(s, 1e-3)
+    s.direction = -1
+    assert is_needless(s, 1e-3)
+    note_needed(s, 1e-3)
+    assert not is_needless(s, 1e-3)
+    s.direction = 1
+    assert is_needless(s, 1e-3)
+
+
+def test_the_distance_from_the_edge_doubles_with_every_failure() -> None:
+    p, s = _start()
+    distances: list[float] = []
+    for _ in range(4):
+        s.ratio[0], s.even_s, s.swing, s.edge_ratio[0] = 1.3, 0.2, 0.0, 0.0
+        raise_ratio(p, s, 0.4)
+        s.swing = 0.0
+        _follow(p, s, 20.0)
+        distances.append(float(s.ratio[0]) - 1.3)
+    assert distances == pytest.approx([0.02, 0.04, 0.08, 0.16])
+
+
+def test_a_slip_that_comes_again_after_more_was_asked_for_is_told() -> None:
+    _, s = _start()
+    for told in (False, False, True):
+        note_lesson(s)
+        assert (s.reason == wire.CANNOT_HELP) == told
+    for _ in range(31):
+        forget_failures(s, 1.0)
+    assert s.reason == wire.HELD
+    note_lesson(s)
+    assert s.reason == wire.HELD

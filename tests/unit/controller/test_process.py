@@ -15,7 +15,7 @@ from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import ANNOUNCE, COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, Topic
 from bridge.wire.zenoh_link import Received
-from controller.app import _Process
+from controller.app import ControllerProcess
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 
@@ -30,6 +30,8 @@ class FakeBus:
         self.sent: dict[str, list[bytes]] = {}
         self.rig_left = False
         self.times_came = 1
+        self.rig_header: wire.Header | None = None
+        self.asked = threading.Event()
 
     def publisher(self, topic: Topic) -> Callable[[bytes], None]:
         return self.sent.setdefault(topic.name, []).append
@@ -46,13 +48,17 @@ class FakeBus:
     def linked(self) -> bool:
         return True
 
+    def headers(self, roles: list[str], _timeout_s: float, _stop: threading.Event) -> dict[str, wire.Header]:
+        self.asked.set()
+        return {} if self.rig_header is None else dict.fromkeys(roles, self.rig_header)
+
     def leave(self) -> None:
         """The rig says END and leaves."""
         self.say(PLANT_EVENT, END)
         self.rig_left = True
 
-    def say(self, topic: Topic, payload: bytes) -> None:
-        self.receive[topic.name](Received(topic, payload, 0))
+    def say(self, topic: Topic, payload: bytes, arrival_ns: int = 0) -> None:
+        self.receive[topic.name](Received(topic, payload, arrival_ns))
 
     def events(self) -> list[wire.Event]:
         return [wire.Event.FromString(payload) for payload in self.sent[CONTROLLER_EVENT.name]]
@@ -72,7 +78,7 @@ def block(number: int, length_ms: float = 1.0) -> bytes:
 
 def process() -> tuple[Any, FakeBus]:
     bus: Any = FakeBus()
-    made = _Process(CONFIG, ControllerNode(CONFIG), bus, lockstep=False)
+    made = ControllerProcess(CONFIG, ControllerNode(CONFIG), bus, lockstep=False)
     made.prepare()
     return made, bus
 
@@ -253,7 +259,7 @@ def test_samples_that_are_no_numbers_are_said_once() -> None:
 
 def test_a_controller_in_lockstep_refuses_a_rig_that_does_not_wait() -> None:
     bus: Any = FakeBus()
-    controller = _Process(CONFIG, ControllerNode(CONFIG), bus, lockstep=True)
+    controller = ControllerProcess(CONFIG, ControllerNode(CONFIG), bus, lockstep=True)
     controller.prepare()
     bus.say(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
     with pytest.raises(Fault, match=r"CONFIG: event/plant: START says 'SCHED_FIFO 50': must say 'lockstep'"):
@@ -331,6 +337,34 @@ def test_a_rig_that_leaves_without_an_end_is_waited_for_and_told_rightly() -> No
     thread.join(5.0)
     codes = bus.codes()
     assert codes[:6] == ["START", "STALE", "RIG_LOST", "RIG_RESTARTED", "RIG_BACK", "FRESH"]
+
+
+def test_another_rig_in_the_place_of_the_first_is_refused() -> None:
+    controller, bus = process()
+    bus.rig_header = wire.Header(
+        role="plant", schema_version=2, configuration='{"rig": {"solver": {"block_s": 0.001, "samples_per_block": 40}}}'
+    )
+    found = list[Fault]()
+
+    def loop() -> None:
+        try:
+            controller.loop(threading.Event(), "")
+        except Fault as fault:
+            found.append(fault)
+
+    thread = threading.Thread(target=loop, daemon=True)
+    thread.start()
+    for at_ms, number in enumerate([*range(1000, 1030), *range(30)]):
+        bus.say(SENSORS, block(number), (at_ms if number >= 1000 else 1000 + at_ms) * MS)
+    assert bus.asked.wait(10.0)
+    wait_for(lambda: bool(controller._rig_again._refusal))
+    bus.say(SENSORS, block(30), 2000 * MS)
+    thread.join(10.0)
+    assert (
+        str(found[0])
+        == "CONFIG: header/plant: rig.solver.samples_per_block = 40: must be controller.samples_per_block = 20; "
+        "set both to the same number"
+    )
 
 
 def test_a_clock_that_jumps_is_told() -> None:

@@ -88,3 +88,21 @@ def test_the_noise_outlives_a_new_beginning_and_what_was_not_measured_does_not_c
     for _ in range(2000):
         push(p, s, 0.0, 0.0, 0.0, False)
     assert s.noise[FORCE, 2] == before
+
+
+@pytest.mark.parametrize("known", [0, 1])
+def test_a_swing_of_the_slide_that_force_and_position_tell_alike_is_no_noise(known: int) -> None:
+    """7 Hz of a fifth of 0.5 mm/s."""
+    p, s = _start()
+    s.stiffness_N_per_m, s.stiffness_learnt, s.allowed_m = 11700.0, known, 1e-8
+    t_s = p.bin_s * np.arange(24_000)
+    drive_m = 5e-4 * t_s
+    slide_m = drive_m - 1e-4 / (2.0 * np.pi * 7.0) * np.sin(2.0 * np.pi * 7.0 * t_s)
+    chance = np.random.default_rng(1)
+    noise = chance.normal(0.0, 1.0, (3, len(t_s))) * np.array([[0.014], [3.5e-7], [3.5e-7]])
+    for n in range(len(t_s)):
+        force_N = 11700.0 * (drive_m[n] - slide_m[n])
+        push(p, s, force_N + noise[0, n], slide_m[n] + noise[1, n], drive_m[n] + noise[2, n], True)
+    level = next(i for i in range(p.levels) if p.window_s[i] > 0.04)
+    assert (s.noise[SLIDE, level] < 5e-6) == bool(known)
+    assert (s.noise[FORCE, level] / 11700.0 < 5e-6) == bool(known)

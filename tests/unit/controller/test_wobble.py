@@ -9,7 +9,18 @@ import pytest
 from bridge.config import validate
 from controller.config import ControllerConfig
 from controller.estimate.windows import DRIVE, FORCE, SLIDE
-from controller.needs.wobble import DEPTH, PERIODS, begin_wobble, can_ask, friction_falls, wobble, wobble_factor
+from controller.needs.wobble import (
+    DEPTH,
+    EVEN,
+    FALLS,
+    PERIODS,
+    UNSURE,
+    answer,
+    begin_wobble,
+    can_ask,
+    wobble,
+    wobble_factor,
+)
 from controller.records import build
 
 SPEED_MPS, RATIO = 5e-4, 1.2
@@ -25,34 +36,46 @@ def _start() -> tuple[Any, Any]:
     return p, s
 
 
-def _ask(follows: float, trend: float = 0.0, aside: float = 0.0) -> Any:
+def _ask(follows: float, trend: float = 0.0, aside: float = 0.0, rounds: int = 1) -> Any:
+    """A slide that follows v_a by a share that is `follows` in step and `aside` a quarter of a period later."""
     p, s = _start()
     assert begin_wobble(p, s, SPEED_MPS, 1.0)
-    blocks, ended = 0, False
-    while not ended:
+    blocks, answered = 0, 0
+    while answered < rounds:
         turn_rad = 2.0 * math.pi * s.wobble_s / s.wobble_period_s
         s.fast_mps = RATIO * SPEED_MPS * wobble_factor(s)
         late_rad = math.pi * (p.window_s[s.wobble_level] - p.block_s) / s.wobble_period_s
-        answer = DEPTH * SMOOTHED * (follows * math.cos(turn_rad - late_rad) + aside * math.sin(turn_rad - late_rad))
-        s.slope[SLIDE, :] = SPEED_MPS * (1.0 + answer) * (1.0 + trend * s.wobble_s / s.wobble_period_s)
-        ended = wobble(p, s, SPEED_MPS)
+        told = DEPTH * SMOOTHED * (follows * math.cos(turn_rad - late_rad) + aside * math.sin(turn_rad - late_rad))
+        s.slope[SLIDE, :] = SPEED_MPS * (1.0 + told) * (1.0 + trend * s.wobble_s / s.wobble_period_s)
+        answered += wobble(p, s, SPEED_MPS)
         blocks += 1
-    assert blocks * p.block_s == pytest.approx(PERIODS * s.wobble_period_s, abs=2.0 * p.block_s)
-    assert s.wobbles == 0
-    assert wobble_factor(s) == 1.0
+    assert blocks * p.block_s == pytest.approx(rounds * PERIODS * s.wobble_period_s, abs=2.0 * p.block_s)
     return s
 
 
-@pytest.mark.parametrize(("follows", "falls"), [(0.7, False), (1.0, False), (1.06, True), (1.2, True)])
+@pytest.mark.parametrize(("follows", "told"), [(0.7, EVEN), (0.98, EVEN), (1.06, FALLS), (1.2, FALLS)])
 @pytest.mark.parametrize("trend", [0.0, 0.01, -0.01])
 def test_a_slide_that_follows_by_more_than_its_share_tells_a_fall_of_friction(
-    follows: float, falls: bool, trend: float
+    follows: float, told: int, trend: float
 ) -> None:
-    assert friction_falls(_ask(follows, trend)) == falls
+    assert answer(_ask(follows, trend)) == told
+
+
+@pytest.mark.parametrize(("follows", "at_last"), [(1.013, EVEN), (1.03, FALLS)])
+def test_what_is_between_is_asked_on_and_then_judged(follows: float, at_last: int) -> None:
+    assert answer(_ask(follows)) == UNSURE
+    assert answer(_ask(follows, rounds=4)) == at_last
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.98, EVEN), (1.06, FALLS)])
+@pytest.mark.parametrize("late", [0.1, 0.2])
+def test_a_slide_that_its_mass_makes_late_follows_no_less(share: float, told: int, late: float) -> None:
+    in_step = 1.0 / (1.0 + late * late)
+    assert answer(_ask(share * in_step, aside=share * late * in_step)) == told
 
 
 def test_what_does_not_answer_in_step_is_no_answer() -> None:
-    assert friction_falls(_ask(1.0, aside=0.5))
+    assert answer(_ask(1.0, aside=0.5)) == FALLS
 
 
 def test_nothing_is_asked_where_the_spring_is_quicker_or_the_noise_larger() -> None:

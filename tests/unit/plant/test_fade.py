@@ -11,7 +11,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED, COMMAND
 from bridge.wire.topics import Outgoing, Topic
 from cockpit.run.scenario import load_rig
-from plant.app import _Process
+from plant.app import PlantProcess
 from plant.node import PlantNode
 
 
@@ -48,7 +48,7 @@ class Commanded(PlantNode):
 def left(node: Commanded, blocks: int, stop: threading.Event) -> Any:
     """What was applied in each block, to the end of the process."""
     bus: Any = Wire()
-    process = _Process(node, bus, None)
+    process = PlantProcess(node, bus, None)
     if node.fails_at < blocks:
         with pytest.raises(RuntimeError, match="converter"):
             process.realtime(blocks, stop)
@@ -76,7 +76,7 @@ def test_a_controller_of_another_run_moves_nothing_and_is_told() -> None:
     node = Commanded(load_rig("paper-c45-c45", []), 1, arm=True)
     node.run_of_controller = 2
     bus: Any = Wire()
-    _Process(node, bus, None).realtime(50, threading.Event())
+    PlantProcess(node, bus, None).realtime(50, threading.Event())
     assert np.frombuffer(b"".join(bus.sent["applied"]), APPLIED.dtype)["amplitude_m"].max() == 0.0
     events = [wire.Event.FromString(payload) for payload in bus.sent["event/plant"]]
     assert any(event.code == "FOREIGN" and "of another run" in event.text for event in events)

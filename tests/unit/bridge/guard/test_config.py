@@ -6,7 +6,7 @@ import pytest
 
 from bridge.config import validate
 from bridge.faults import Fault
-from bridge.guard.config import GuardConfig
+from bridge.guard.config import GuardConfig, wider
 
 
 @pytest.mark.parametrize(
@@ -28,3 +28,12 @@ def test_nonsense_is_refused(table: dict[str, Any], said: str) -> None:
 
 def test_equal_levels_are_no_nonsense() -> None:
     assert validate(GuardConfig, {"loud_ratio": {"alarm": 3.0, "abort": 3.0}}, "rig.toml").loud_ratio.abort == 3.0
+
+
+def test_limits_that_protect_less_than_the_defaults_are_named() -> None:
+    assert wider(GuardConfig()) == ""
+    assert wider(validate(GuardConfig, {"loud_ratio": {"alarm": 2.0, "abort": 3.0, "hold_s": 0.05}}, "rig.toml")) == ""
+    loose = validate(
+        GuardConfig, {"loud_ratio": {"alarm": 3.0, "abort": 1e6, "hold_s": 0.1}, "command_lost_s": 9.0}, "rig.toml"
+    )
+    assert wider(loose) == "loud_ratio.abort = 1e+06 (default 4), command_lost_s = 9 (default 0.5)"

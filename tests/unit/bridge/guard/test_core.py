@@ -54,7 +54,9 @@ def test_only_commands_of_this_run_count_that_are_newer_and_answer_a_block_that_
     assert not rig.command(block=2**64 - 1)
     assert not rig.command(block=2**62)
     assert rig.command(block=0)
-    assert rig.s.refused == 6
+    assert rig.command(amplitude_m=0.0)
+    assert not rig.command(sequence=int(rig.s.last_sequence))
+    assert rig.s.refused == 7
 
 
 @pytest.mark.parametrize(

@@ -50,3 +50,11 @@ def test_a_file_that_is_no_stop_of_ours_holds_too(folder: Path) -> None:
     folder.mkdir(parents=True)
     latch.path.symlink_to("nowhere")
     assert latch.is_set
+
+
+def test_a_folder_that_cannot_be_looked_into_holds_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_path: object) -> bool:
+        raise PermissionError
+
+    monkeypatch.setattr(os.path, "lexists", refuse)
+    assert StopLatch("lathe").is_set

@@ -18,7 +18,7 @@ from bridge.guard.codes import (
     OVERTRAVEL,
 )
 from bridge.guard.config import GuardConfig, HeatConfig, Level
-from bridge.guard.limits import exciter_gain
+from bridge.guard.limits import exciter_gain, passes
 from bridge.guard.senses import expect_drive
 from tests.unit.bridge.guard.rigs import EXCITER, NANO, Rig
 
@@ -49,6 +49,16 @@ def test_what_passes_an_abort_level_now_and_then_does_not_trip() -> None:
         rig.run(199, amplitude_m=200 * NANO)
         rig.run(1, amplitude_m=140 * NANO)
     assert rig.s.state == ACTIVE
+
+
+def test_a_value_at_its_level_keeps_to_it() -> None:
+    rig = Rig(GuardConfig(stroke_m=Level(alarm=50 * NANO, abort=80 * NANO, hold_s=0.0)))
+    assert passes(rig.p, rig.s, OVERTRAVEL, 50 * NANO)
+    assert rig.s.limit == NO_CAUSE
+    assert not passes(rig.p, rig.s, OVERTRAVEL, 80 * NANO)
+    assert (rig.s.state, rig.s.limit) == (ARMED, OVERTRAVEL)
+    passes(rig.p, rig.s, OVERTRAVEL, 80.1 * NANO)
+    assert (rig.s.state, rig.s.cause) == (FAULT, OVERTRAVEL)
 
 
 def test_the_commanded_velocity_is_held() -> None:
@@ -104,7 +114,7 @@ def test_a_vibration_of_a_drive_that_stands_is_loud() -> None:
     assert (rig.s.state, rig.s.cause) == (FAULT, LOUD)
 
 
-@pytest.mark.parametrize("frequency_Hz", [499.0, 5001.0, 4700.0])
+@pytest.mark.parametrize("frequency_Hz", [499.0, 5001.0, 4600.0, 4700.0, 4800.0])
 def test_nothing_is_vibrated_outside_of_the_bands(frequency_Hz: float) -> None:
     rig = Rig(GuardConfig(forbidden_Hz=[(4600.0, 4800.0)]))
     rig.run(200, frequency_Hz)

@@ -32,7 +32,7 @@ from bridge.guard.codes import (
 from bridge.guard.config import GuardConfig
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.records import build
-from bridge.guard.states import obey, trip
+from bridge.guard.states import enter, obey, trip
 from tests.unit.bridge.guard.rigs import EXCITER, Rig
 
 
@@ -87,6 +87,16 @@ def test_a_stop_is_taken_in_fault_too_and_the_first_cause_of_a_fault_stays_other
     assert (rig.s.state, rig.s.cause) == (FAULT, LOUD)
     assert obey(rig.s, STOP)
     assert rig.s.cause == STOP_BY_PERSON
+
+
+def test_another_state_begins_anew_what_is_counted_in_it_and_the_same_one_does_not() -> None:
+    rig = Rig()
+    for state, left in ((ARMED, 3), (DISARMED, 0)):
+        rig.s.lost_blocks = rig.s.check_blocks = rig.s.heard = 3
+        rig.s.over_blocks[:] = 3
+        enter(rig.s, state, COMMAND_LOST)
+        assert (rig.s.lost_blocks, rig.s.check_blocks, rig.s.heard) == (left, left, left)
+        assert set(rig.s.over_blocks) == {left}
 
 
 def test_a_stop_that_was_kept_holds_at_power_up_even_where_the_scenario_arms() -> None:

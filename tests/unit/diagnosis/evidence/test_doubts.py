@@ -280,7 +280,7 @@ def test_a_mapped_column_that_one_run_lacks_is_told_and_one_that_all_lack_is_ref
     evidence = load_evidence(tmp_path)
     assert ["mass_accel_mps2" in run.columns for run in evidence.runs] == [False, True]
     assert (
-        "run-01.parquet: mass_accel_mps2: column acc: not in the file; known here: drive_force_N"
+        "run-01.parquet: mass_accel_mps2: column acc: not in the file; known here: t_s, drive_force_N"
         in kinds(evidence)["column"]
     )
     pq.write_table(pa.table(data), tmp_path / "run-02.parquet")

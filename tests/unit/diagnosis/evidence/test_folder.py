@@ -13,7 +13,7 @@ import scipy.io
 
 from bridge.faults import Fault
 from diagnosis.evidence.folder import load_evidence, read_columns
-from diagnosis.evidence.manifest import ChannelMap
+from diagnosis.evidence.manifest_keys import ChannelMap
 from tests.evidence_folder import MANIFEST, Columns, columns, folder, kinds
 from tests.logs import doctored, short_log
 
@@ -57,7 +57,7 @@ def test_a_good_folder(tmp_path: Path) -> None:
         (
             "[[run]]",
             "[[run]]\nspeed = 1",
-            "manifest.toml: run.0.speed = 1: unknown key; known here: drive_velocity_mps, file",
+            "manifest.toml: run.0.speed = 1: unknown key; known here: channels, drive_velocity_mps, file",
         ),
         (
             "[[run]]",
@@ -67,8 +67,8 @@ def test_a_good_folder(tmp_path: Path) -> None:
         ("[[run]]", '[[run]]\nfile = "./run-01.csv"\n[[run]]', "run.file = './run-01.csv': 2 runs are called 'run-01'"),
         (
             "[[run]]",
-            "[channels]\nt_s = 3\n[[run]]",
-            "channels.t_s = 3: must be a table; write t_s = { column = VALUE }",
+            "[channels]\nt_s = 3.5\n[[run]]",
+            "channels.t_s = 3.5: must be a table; write t_s = { column = VALUE }",
         ),
         ("mass_kg = 1.5", "mass_kg = 1e300", "rig.mass_kg = 1e+300: must be less than"),
         (
@@ -84,7 +84,7 @@ def test_a_good_folder(tmp_path: Path) -> None:
             "drive_stiffness_N_per_m = 1.4e+09 on mass_kg = 1.5: swings at 3.06e+04 rad/s: must be 30000 at most; check",
         ),
         ("run-01.parquet", "../run-01.parquet", "file = '../run-01.parquet': must lie in the evidence folder"),
-        ("run-01.parquet", "run-01.xlsx", "file = 'run-01.xlsx': must end in .parquet, .csv, .mat, .mcap"),
+        ("run-01.parquet", "run-01.pdf", "file = 'run-01.pdf': must end in .parquet, .csv, .txt"),
         ("run-01.parquet", "run-07.parquet", "run-07.parquet: no such file; correct run.file in manifest.toml"),
         (
             "drive_velocity_mps = 0.0005",
@@ -113,9 +113,8 @@ def without(*names: str) -> Callable[[Columns], None]:
     return change
 
 
-def text_in_a_row(data: Columns) -> None:
-    data["drive_force_N"] = [str(value) for value in data["drive_force_N"]]
-    data["drive_force_N"][41] = "overload"
+def words(data: Columns) -> None:
+    data["drive_force_N"] = ["overload"] * len(data["t_s"])
 
 
 def starts_again(data: Columns) -> None:
@@ -169,7 +168,7 @@ def in_micronewton(data: Columns) -> None:
             without("drive_force_N", "mass_accel_mps2"),
             "run-01.parquet: has drive_position_m, t_s: must have drive_force_N or",
         ),
-        (text_in_a_row, "run-01.parquet: column drive_force_N: row 42 = 'overload': must be a number"),
+        (words, "run-01.parquet: column drive_force_N: row 1 = 'overload': must be a number"),
         (
             starts_again,
             "run-01.parquet: t_s: 2000 rows are not later than the one before, first row 2001: 0 s after 0.9995 s",
@@ -233,7 +232,7 @@ def test_channels_are_mapped_and_scaled(tmp_path: Path) -> None:
     evidence = load_evidence(folder(tmp_path, raw, MANIFEST.replace("[[run]]", channels)))
     assert evidence.runs[0].t_s == pytest.approx(data["t_s"])
     assert evidence.runs[0].columns["drive_force_N"] == pytest.approx(data["drive_force_N"])
-    with pytest.raises(Fault, match=r"run-01.parquet: column time: not in the file; known here: drive_force_N"):
+    with pytest.raises(Fault, match=r"run-01.parquet: column time: not in the file; known here: t_s, drive_force_N"):
         load_evidence(folder(tmp_path, data, MANIFEST.replace("[[run]]", channels)))
 
 

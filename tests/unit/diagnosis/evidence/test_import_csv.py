@@ -17,37 +17,37 @@ from tests.unit.diagnosis.evidence.measured_tables import CSV, GERMAN, MAP, SOUR
 @pytest.mark.parametrize(
     ("text", "channel_map", "expected"),
     [
-        (CSV.replace("9,56", "OVL", 1), SOURCE + GERMAN, "column F: row 7 = 'OVL': must be a number"),
-        (CSV, GERMAN, "line 1: the names are separated by ';', not by ','"),
-        (CSV.replace("F", "F/µm", 1), SOURCE + GERMAN, "line 1: is not utf-8"),
-        (CSV.replace("1,0;9,52", "1,0", 1), SOURCE + GERMAN, "line 4 = '1,0': has 1 cell: must have 2, "),
+        (CSV.replace("9,56", "OVL", 1), SOURCE + GERMAN, "row 7 = 'OVL'; left out"),
+        (CSV, GERMAN, "delimiter = ';', decimal = ','"),
+        (CSV.replace("F", "F/µm", 1), SOURCE + GERMAN.replace('"F"', '"F/µm"'), "encoding = 'cp1252'"),
         (
-            f"{CSV}End of test\n",
+            CSV.replace("1,0;9,52", "1,0", 1),
             SOURCE + GERMAN,
-            "a.csv: line 4002 = 'End of test': has 1 cell: must have 2, as many as",
+            "1 line with another number of cells left out, first '1,0'",
         ),
-        (
-            f"My rig\n{CSV}",
-            SOURCE + GERMAN,
-            "line 2 = 'Zeit;F': has 2 cells: must have 1, as many as there are names; if",
-        ),
+        (f"{CSV}End of test\n", SOURCE + GERMAN, "1 line with another number of cells left out, first 'End of test'"),
+        (f"My rig\n{CSV}", SOURCE + GERMAN, "skip_rows = 1"),
+        (CSV + "2000,0;ü\n", SOURCE + GERMAN, "row 4001 = 'ü'; left out"),
     ],
-    ids=["text", "delimiter", "encoding", "ragged", "footer", "names further down"],
+    ids=["text", "delimiter", "encoding", "ragged", "footer", "names further down", "a cell"],
 )
-def test_a_csv_file_of_another_kind_names_place_and_remedy(tmp_path: Path, text: str, channel_map: str, expected: str):
+def test_a_csv_file_of_another_kind_is_read_and_says_so(tmp_path: Path, text: str, channel_map: str, expected: str):
     (tmp_path / "a.csv").write_text(text, encoding="latin-1")
     (tmp_path / "map.toml").write_text(channel_map)
-    with pytest.raises(Fault) as caught:
-        import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out")
-    assert expected in caught.value.line
-    assert not (tmp_path / "out").exists()
+    done = import_file(tmp_path / "a.csv", tmp_path / "map.toml", tmp_path / "out.mcap")
+    assert any(expected in finding.text for finding in done.findings)
+    assert done.rows >= 3980
 
 
-def test_a_cell_in_another_encoding_is_told_with_its_row(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(CSV + "0,1;ü\n", encoding="latin-1")
-    table = read_table(tmp_path / "a.csv", Dialect(";", ","))
-    with pytest.raises(Fault, match=r"a.csv: column F: row 4001 = b'\\xfc': must be a number, and is no UTF-8; remove"):
-        table.column("F")
+def test_what_a_map_says_and_the_file_is_not_names_the_place(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(CSV.replace("F", "F/µm", 1), encoding="latin-1")
+    with pytest.raises(Fault, match=r"a.csv: line 1: is not utf-8: .*leave source.encoding out"):
+        read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-8"))
+    with pytest.raises(Fault, match=r"source.encoding = 'utf-9': is none that Python knows"):
+        read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-9"))
+    (tmp_path / "words.csv").write_text("a;b\n" + "x;y\n" * 40)
+    with pytest.raises(Fault, match=r"words.csv: no row of numbers .*state source.delimiter"):
+        read_table(tmp_path / "words.csv")
 
 
 def test_a_name_with_a_control_character_stays_readable(tmp_path: Path) -> None:
@@ -82,8 +82,7 @@ def test_a_csv_file_of_windows_says_itself_that_it_is_utf_16(tmp_path: Path, sta
 
 def test_a_csv_file_in_a_wide_encoding_that_does_not_say_so(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_bytes(CSV.encode("utf-16-le"))
-    with pytest.raises(Fault, match=r'a.csv: line 1: has zero bytes.* encoding = "utf-16-le"'):
-        read_table(tmp_path / "a.csv", Dialect(";", ","))
+    assert len(read_table(tmp_path / "a.csv").column("F")) == 4000
     assert len(read_table(tmp_path / "a.csv", Dialect(";", ",", encoding="utf-16-le")).column("F")) == 4000
 
 

@@ -1,0 +1,95 @@
+"""Schemas and channels of one file of a log: which topic a channel is, and whether it is one of this project.
+
+A channel is known by its definition and never by its number: other programs number the channels anew. The definition of a
+channel stands before its first message, in a chunk or outside, and again in the summary at the end of the file.
+"""
+
+import contextlib
+from io import BytesIO
+from pathlib import Path
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Channel, Schema
+
+from bridge.log.reading.chunk_bytes import UNREADABLE
+from bridge.log.viewers import foxglove_log
+from bridge.wire.stickslip_pb2 import DESCRIPTOR
+from bridge.wire.topics import BY_NAME, SCOPE
+
+_OWN = DESCRIPTOR.package + "."
+# topics of the recorder that say again for viewers what others say
+DERIVED = {SCOPE.name: SCOPE.message.DESCRIPTOR.full_name, foxglove_log.TOPIC: foxglove_log.SCHEMA}
+_KNOWN = BY_NAME.keys() | DERIVED.keys()
+
+
+class Definitions:
+    """What a file says of its channels.
+
+    Args:
+        path: the file, whose summary is looked into where a definition is missing.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._summary: Definitions | None = None
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+
+    def learn(self, opcode: int, content: bytes) -> None:
+        """Take in a definition. Raises one of UNREADABLE where it is damaged."""
+        stream = ReadDataStream(BytesIO(content))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self.schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(stream)
+            self.channels[channel.id] = channel
+
+    def find(self, channel_id: int) -> bool:
+        """Whether the channel is defined; where its definition is missing or makes no sense, by the one in the summary."""
+        channel = self.channels.get(channel_id)
+        if channel is not None and channel.schema_id in self.schemas and _name(channel) in _KNOWN:
+            return True
+        again = self.of_summary()
+        other = again.channels.get(channel_id)
+        if other is not None and (channel is None or _name(other) in _KNOWN):
+            channel = self.channels[channel_id] = other
+        if channel is not None and channel.schema_id in again.schemas:
+            self.schemas.setdefault(channel.schema_id, again.schemas[channel.schema_id])
+        return channel is not None
+
+    def of_summary(self) -> "Definitions":
+        """The definitions in the summary of the file; none where it has no summary that can be read."""
+        if self._summary is None:
+            self._summary = Definitions(self._path)
+            with contextlib.suppress(OSError, ValueError, *UNREADABLE), self._path.open("rb") as file:
+                summary = make_reader(file).get_summary()
+                if summary is not None:
+                    self._summary.schemas = summary.schemas
+                    self._summary.channels = summary.channels
+        return self._summary
+
+    def topic(self, channel_id: int) -> str | None:
+        """The topic of a channel of this project without its stroke; None for a channel of another program."""
+        channel = self.channels[channel_id]
+        name = _name(channel)
+        schema = self.schemas.get(channel.schema_id)
+        if schema is None:  # the definition of the schema is lost; the messages are read as what the topic is
+            return name if name in BY_NAME else None
+        return name if schema.name.startswith(_OWN) or DERIVED.get(name) == schema.name else None
+
+    def any_own(self) -> bool:
+        """Whether a channel is one of this project."""
+        topics = {self.topic(channel_id) for channel_id in self.channels}
+        return bool(topics - {None, foxglove_log.TOPIC})
+
+    def foreign_schemas(self) -> list[str]:
+        """The names of the schemas that are not of this project."""
+        return sorted({schema.name for schema in self.schemas.values() if not schema.name.startswith(_OWN)})
+
+
+def _name(channel: Channel) -> str:
+    return channel.topic.removeprefix("/")

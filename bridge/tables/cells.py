@@ -1,0 +1,213 @@
+"""Cells of a stored column as numbers or as times: what is neither is NaN, and a finding says where."""
+
+import datetime as dt
+import re
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from bridge.faults import Fault
+from bridge.log.finding import Finding
+from bridge.units import counted
+
+Floats = npt.NDArray[np.float64]
+_SHOWN = 60  # characters of a cell in a finding
+_MOST_BAD = 0.5  # share of cells that are neither empty nor numbers, from which a column is one of words
+# blanks and apostrophes that part thousands, all of which are written as one in a dialect
+BLANKS = (" ", "\xa0", "\u202f", "\u2009")
+APOSTROPHES = ("'", "\u2019")
+_CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?\s*([AaPp][Mm])?")
+_DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
+_ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
+_DAY_S = 86400.0
+
+
+def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floats, list[Finding]]:
+    """A column as float64 [rows], NaN where a cell is empty or no number; and a finding for the latter.
+
+    Raises Fault BAD_TABLE when most cells are no numbers.
+    """
+    if isinstance(values, pa.ChunkedArray):
+        kind: Any = values.type
+        if _is_text(kind):
+            return _from_text(_texts(values), where, decimal, thousands)
+        try:
+            return np.asarray(values.cast(pa.float64(), safe=False).to_numpy(), np.float64), []
+        except pa.ArrowException:
+            raise Fault("BAD_TABLE", f"{where}: is {kind}: must be numbers; name another column") from None
+    array = np.asarray(values)
+    if array.dtype.kind == "O":
+        return _from_text(["" if cell is None else str(cell) for cell in array.ravel()], where, decimal, thousands)
+    if array.dtype.kind in "US":
+        return _from_text([str(cell) for cell in array.ravel()], where, decimal, thousands)
+    if array.dtype.kind not in "fiub":
+        raise Fault("BAD_TABLE", f"{where}: is {array.dtype}: must be numbers; name another column")
+    return array.astype(np.float64), []
+
+
+def number_in(text: str, decimal: str, thousands: str) -> float | None:
+    """The number in a cell; None where there is none."""
+    word = text.strip()
+    if thousands:
+        for mark in BLANKS if thousands == " " else APOSTROPHES if thousands == "'" else (thousands,):
+            word = word.replace(mark, "")
+    if decimal != ".":
+        if "." in word:
+            return None
+        word = word.replace(decimal, ".")
+    try:
+        return float(word) if "_" not in word else None
+    except ValueError:
+        try:  # Fortran writes 1.0D-3
+            return float(word.replace("D", "E")) if re.fullmatch(r"[-+.\d]+D[-+]?\d+", word) else None
+        except ValueError:
+            return None
+
+
+def _from_text(texts: list[str], where: str, decimal: str, thousands: str) -> tuple[Floats, list[Finding]]:
+    result = np.full(len(texts), np.nan)
+    bad: list[int] = []
+    filled = 0
+    for row, text in enumerate(texts):
+        if not text.strip():
+            continue
+        filled += 1
+        value = number_in(text, decimal, thousands)
+        if value is None:
+            bad.append(row)
+        else:
+            result[row] = value
+    if not bad:
+        return result, []
+    # rows as a person counts them: the first row under the names is 1
+    first = f"row {bad[0] + 1} = {texts[bad[0]][:_SHOWN]!r}"
+    if len(bad) > _MOST_BAD * filled:
+        raise Fault("BAD_TABLE", f"{where}: {first}: must be a number; name another column")
+    return result, [
+        Finding("not-finite", where, f"{counted(len(bad), 'cell')} without a number, first {first}; left out", len(bad))
+    ]
+
+
+def seconds(values: Any, where: str) -> tuple[Floats | None, list[Finding]]:
+    """Times in a column, in s from its first one, [rows]; None where the column holds no times.
+
+    Dates, clock times and both are understood; over midnight a clock goes on counting.
+    """
+    stamps: Any = None
+    if isinstance(values, pa.ChunkedArray):
+        kind: Any = values.type
+        if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
+            stamps = values.cast(pa.timestamp("ns"), safe=False).cast(pa.int64()).to_numpy()
+        elif pa.types.is_time(kind):
+            stamps = _over_midnight(
+                np.asarray([np.nan if one is None else _of_day(one) for one in values.to_pylist()], np.float64) * 1e9
+            )
+        elif _is_text(kind):
+            return _times_from_text(_texts(values), where)
+    else:
+        array = np.asarray(values)
+        if array.dtype.kind == "M":
+            stamps = array.astype("datetime64[ns]").astype(np.int64)
+        elif array.dtype.kind == "m":
+            stamps = array.astype("timedelta64[ns]").astype(np.int64)
+        elif array.dtype.kind == "O" and len(array) and not isinstance(array[0], int | float):
+            return _times_from_text([_as_text(cell) for cell in array.ravel()], where)
+        elif array.dtype.kind in "US":
+            return _times_from_text([str(cell) for cell in array.ravel()], where)
+    if stamps is None:
+        return None, []
+    stamps = np.asarray(stamps)
+    started = stamps[np.isfinite(stamps)]
+    from_first = (stamps - started[0]) * 1e-9 if len(started) else stamps * 1e-9
+    return from_first.astype(np.float64), [_said(where)]
+
+
+def _said(where: str) -> Finding:
+    return Finding("time", where, "holds times: counted in seconds from the first row")
+
+
+def _as_text(cell: Any) -> str:
+    if isinstance(cell, dt.datetime | dt.date | dt.time):
+        return cell.isoformat()
+    if isinstance(cell, dt.timedelta):
+        return str(cell)
+    return "" if cell is None else str(cell)
+
+
+def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[Finding]]:
+    filled = [text for text in texts if text.strip()]
+    if not filled or _time_in(filled[0]) is None:
+        return None, []
+    stamps = [_time_in(text) for text in texts]
+    began = next(day for day, _ in filter(None, stamps))  # a calendar in seconds would cost microseconds of its digits
+    times = [None if one is None else (one[0] - began) * _DAY_S + one[1] for one in stamps]
+    if sum(time is None for time in times) > _MOST_BAD * len(texts):
+        return None, []
+    raw = np.array([np.nan if time is None else time for time in times])
+    counted_on = raw if began else _over_midnight(raw * 1e9) * 1e-9
+    first = counted_on[np.isfinite(counted_on)][0]
+    bad = [row for row, time in enumerate(times) if time is None]
+    found = [_said(where)]
+    if bad:
+        text = (
+            f"{counted(len(bad), 'cell')} without a time, first row {bad[0] + 1} = {texts[bad[0]][:_SHOWN]!r}; left out"
+        )
+        found.append(Finding("not-finite", where, text, len(bad)))
+    return counted_on - first, found
+
+
+def _time_in(text: str) -> tuple[int, float] | None:
+    """Day (0 without a date) and second of a date, a clock time or both; None where there is none."""
+    word = _ZONE.sub("", text.strip())
+    clock = _CLOCK.search(word)
+    date = _DATE.search(word)
+    rest = word
+    for found in (clock, date):
+        if found is not None:
+            rest = rest.replace(found[0], "", 1)
+    if (clock is None and date is None) or rest.strip(" T,;\t"):
+        return None
+    day = 0
+    if date is not None:
+        first, mark, second, third = int(date[1]), date[2], int(date[3]), int(date[4])
+        year, month, of_month = (first, second, third) if first > 31 else (third, second, first)
+        if mark == "/" and first <= 12:
+            month, of_month = first, second
+        year += 2000 if year < 100 else 0
+        try:
+            day = dt.date(year, month, of_month).toordinal()
+        except ValueError:
+            return None
+    if clock is None:
+        return day, 0.0
+    hours, minutes, secs = int(clock[1]), int(clock[2]), float((clock[3] or "0").replace(",", "."))
+    if clock[4]:
+        hours = hours % 12 + (12 if clock[4].lower() == "pm" else 0)
+    return day, 3600.0 * hours + 60.0 * minutes + secs
+
+
+def is_time(text: str) -> bool:
+    """Whether a cell holds a date or a clock time."""
+    return _time_in(text) is not None
+
+
+def _of_day(time: Any) -> float:
+    return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
+
+
+def _over_midnight(times_ns: Floats) -> Floats:
+    """Clock times that go on over midnight, [rows]."""
+    back = np.concatenate([[0.0], np.diff(times_ns)]) < -0.5e9 * _DAY_S
+    return times_ns + np.cumsum(back) * _DAY_S * 1e9
+
+
+def _is_text(kind: Any) -> bool:
+    types = pa.types
+    return types.is_string(kind) or types.is_large_string(kind) or types.is_binary(kind) or types.is_large_binary(kind)
+
+
+def _texts(column: Any) -> list[str]:
+    cells = (one.decode(errors="replace") if isinstance(one, bytes) else one for one in column.to_pylist())
+    return ["" if cell is None else cell for cell in cells]

@@ -1,0 +1,37 @@
+"""What kind of file a table is, from its first bytes; a suffix may be in any case, and wrong."""
+
+from pathlib import Path
+from typing import Literal
+
+Kind = Literal["text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap"]
+KINDS: tuple[Kind, ...] = ("text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap")
+_MARKS: tuple[tuple[bytes, Kind], ...] = (
+    (b"PAR1", "parquet"),
+    (b"MATLAB 5.0", "mat"),
+    (b"TDSm", "tdms"),
+    (b"\x89HDF\r\n\x1a\n", "hdf5"),
+    (b"PK\x03\x04", "sheet"),
+    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "sheet"),
+    (b"\x89MCAP0\r\n", "mcap"),
+)
+_HDF5_AT = 512  # MATLAB v7.3 writes its own head before the HDF5
+_BY_SUFFIX: dict[str, Kind] = {
+    ".parquet": "parquet",
+    ".mat": "mat",
+    ".tdms": "tdms",
+    ".xlsx": "sheet",
+    ".xls": "sheet",
+    ".ods": "sheet",
+}
+
+
+def kind_of(path: Path) -> Kind:
+    """The kind of a table: by its marks; by its suffix where a damaged file has none; else text."""
+    with path.open("rb") as file:
+        start = file.read(_HDF5_AT + 8)
+    if start[_HDF5_AT:].startswith(b"\x89HDF"):
+        return "hdf5"
+    for mark, kind in _MARKS:
+        if start.startswith(mark):
+            return kind
+    return _BY_SUFFIX.get(path.suffix.lower(), "text")

@@ -1,0 +1,139 @@
+"""Variables of a MATLAB file: vectors, matrices, and structs in structs."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridge.tables.table import Clock, Table
+
+_DEEPEST = 8  # structs one in the other
+_MOST_COLUMNS = 4096  # of a file: a matrix of more columns than that is a picture
+
+
+def read_mat(path: Path) -> Table:
+    """Variables of a file of MATLAB v5 to v7, by name: `NAME`, `NAME.FIELD`, `NAME[0]` for elements and columns of a matrix.
+
+    What dSPACE ControlDesk writes (X and Y with Name, Data, Unit) has its signals by their Name as well, each on its raster.
+    """
+    variables = {name: value for name, value in _loaded(path).items() if not name.startswith("__")}
+    return table_of(path, variables)
+
+
+def table_of(path: Path, variables: dict[str, Any]) -> Table:
+    """A table of variables that may hold structs."""
+    columns = dict(_flat(variables))
+    table = Table(path, columns)
+    for name, value in variables.items():
+        _add_dspace(table, name, value)
+    return table
+
+
+def _flat(variables: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    for name, value in variables.items():
+        yield from _parts(name, value, 0)
+
+
+def _parts(key: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
+    if depth > _DEEPEST:
+        return
+    fields = _fields(value)
+    if fields is not None:
+        for field, inner in fields.items():
+            yield from _parts(f"{key}.{field}", inner, depth + 1)
+        return
+    array = np.atleast_1d(np.asarray(value))
+    if array.dtype.kind == "O":
+        for i, inner in enumerate(array.ravel()[:_MOST_COLUMNS]):
+            yield from _parts(f"{key}[{i}]", inner, depth + 1)
+    elif array.ndim == 1:
+        yield key, array
+    elif array.ndim == 2 and array.shape[1] <= _MOST_COLUMNS:
+        if 1 in array.shape:
+            yield key, array.ravel()
+            return
+        for i in range(array.shape[1]):
+            yield f"{key}[{i}]", array[:, i]
+
+
+def _fields(value: Any) -> dict[str, Any] | None:
+    if isinstance(value, dict):
+        return value
+    names = getattr(value, "_fieldnames", None)
+    return None if names is None else {name: getattr(value, name) for name in names}
+
+
+def _add_dspace(table: Table, name: str, value: Any) -> None:
+    """Add the signals of a recording of dSPACE by their Name, with their units and the raster of their XIndex."""
+    fields = _fields(value)
+    if fields is None or not {"X", "Y"} <= fields.keys():
+        return
+    rasters, signals = _structs(fields["X"]), _structs(fields["Y"])
+    times = [(f"{name}.X" + (f"[{i}]" if len(rasters) > 1 else ""), one) for i, one in enumerate(rasters)]
+    for i, one in enumerate(signals):
+        key = f"{name}.Y[{i}]"
+        if "Data" not in one:
+            continue
+        data = np.atleast_1d(one["Data"]).ravel()
+        if len(signals) == 1:
+            table.columns[f"{key}.Data"] = data
+        label = _text(one.get("Name"))
+        keys = [f"{key}.Data", *([label] if label and label not in table.columns else [])]
+        table.columns.update(dict.fromkeys(keys, data))
+        raster = _raster(one, rasters)
+        for at in keys:
+            if unit := _text(one.get("Unit")):
+                table.units[at] = unit
+            if raster is not None and len(raster) == len(data):
+                table.clocks[at] = Clock(0.0, 0.0, raster)
+    for key, one in times:
+        if unit := _text(one.get("Unit")):
+            table.units[f"{key}.Data"] = unit
+
+
+def _raster(signal: dict[str, Any], rasters: list[dict[str, Any]]) -> Any:
+    """The instants of a signal [samples], by its XIndex, from 0 or from 1; None where its raster has none."""
+    data = [np.atleast_1d(one["Data"]).ravel().astype(np.float64) for one in rasters if "Data" in one]
+    if len(data) == 1:
+        return data[0]
+    length = len(np.atleast_1d(signal["Data"]).ravel())
+    index = signal.get("XIndex")
+    at = int(np.atleast_1d(index).ravel()[0]) if index is not None and np.size(index) else 0
+    for number in (at - 1, at):
+        if 0 <= number < len(data) and len(data[number]) == length:
+            return data[number]
+    return next((one for one in data if len(one) == length), None)
+
+
+def _structs(value: Any) -> list[dict[str, Any]]:
+    if _fields(value) is not None:
+        return [_fields(value) or {}]
+    found = (_fields(one) for one in np.atleast_1d(np.asarray(value, object)).ravel())
+    return [one for one in found if one is not None]
+
+
+def _text(value: Any) -> str:
+    return (
+        value
+        if isinstance(value, str)
+        else str(value.item())
+        if isinstance(value, np.ndarray) and value.size == 1
+        else ""
+    )
+
+
+def _loaded(path: Path) -> dict[str, Any]:
+    """The variables of a MATLAB file, read first in a process of its own: a damaged file may crash SciPy's compiled reader."""
+    import scipy.io
+
+    trial = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"
+    status = subprocess.run([sys.executable, "-P", "-c", trial, str(path)], capture_output=True, check=False).returncode
+    if status < 0:
+        raise ValueError(f"it is damaged: its reader died of signal {-status}")
+    try:
+        return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
+    except (UnboundLocalError, ArithmeticError, MemoryError) as error:  # an unknown type, or an impossible size
+        raise ValueError(f"it is damaged: {error}") from None

@@ -1,0 +1,144 @@
+"""How a text table is written: delimiter, marks of decimals and thousands.
+
+CleverCSV finds the delimiter and the quotes (docs/decisions/29-sniffing.md). It knows no decimal comma, so the form of the
+numbers is found here: the one in which most cells are numbers.
+"""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from bridge.tables.cells import APOSTROPHES, BLANKS, is_time
+
+BLANK = " "  # the delimiter of columns that are parted by any number of blanks and tabs
+_DELIMITERS = (",", ";", "\t", "|", " ")
+_SNIFFED_LINES = 60  # CleverCSV takes 30 ms for these, and its time grows with them
+_NO_NUMBER = frozenset(("", *"- -- --- nan #nv #n/a n/a na null none inf -inf ovl ovr ovrflw #nan 1.#qnan".split(" ")))  # noqa: SIM905
+_FIRST_LINES = 2000  # in which a time that begins at 0 is still below 1 s, up to 2 kHz
+_BELOW_ONE = re.compile(r"[-+]?0([.,])\d+")
+# decimals and thousands in the order in which equally good ones are chosen
+_FORMS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", "'"), (",", "'"), (".", " "), (",", " "))
+
+
+class Dialect(NamedTuple):
+    """What a map says of a text table, keys of [source]; None: it is found."""
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    skip_rows: int | None = None  # lines before the line of the names
+    encoding: str | None = None
+    thousands: str | None = None
+    names: tuple[str, ...] | None = None  # of the columns; the file has none, or others
+    units_row: bool | None = None  # whether a line of units follows the names
+    comment: str | None = None  # what a line begins with that is passed over
+    sheet: str | None = None  # of a workbook
+
+
+class Form(NamedTuple):
+    """How a text table is written, with nothing left open."""
+
+    delimiter: str
+    quote: str
+    decimal: str
+    thousands: str
+
+    def cells(self, line: str) -> list[str]:
+        """The cells of one line."""
+        if self.delimiter == BLANK:
+            return line.split()
+        if not self.quote:
+            return line.split(self.delimiter)
+        row: list[str] = next(csv.reader([line], delimiter=self.delimiter, quotechar=self.quote), [])
+        return row
+
+    def is_number(self, cell: str) -> bool:
+        """Whether a cell is a number of this form."""
+        return _pattern(self.decimal, self.thousands).fullmatch(cell.strip()) is not None
+
+    def is_value(self, cell: str) -> bool:
+        """Whether a cell is a number, a time, empty, or a word that stands for a missing number."""
+        return cell.strip().lower() in _NO_NUMBER or self.is_number(cell) or is_time(cell)
+
+
+def form_of(lines: Sequence[str], given: Dialect, quoted: bool, begin: Sequence[str] = ()) -> Form:
+    """The form of a table from lines of its body; what `given` states is taken as it is.
+
+    `quoted`: names have quotes. `begin`: the first lines, where a time below 1 s shows which mark is that of decimals.
+    """
+    lines = [line for line in lines if line.strip()]
+    sniffed = lines[:: max(len(lines) // _SNIFFED_LINES, 1)][:_SNIFFED_LINES]
+    delimiter, quote = _delimiter(sniffed, lines, given, '"' if quoted else "")
+    decimal, thousands = _numbers(lines, begin[:_FIRST_LINES], delimiter, quote, given)
+    return Form(delimiter, quote, decimal, thousands)
+
+
+def _delimiter(lines: Sequence[str], whole: Sequence[str], given: Dialect, quote: str) -> tuple[str, str]:
+    if given.delimiter is not None:
+        return given.delimiter, quote
+    # no number has these marks: where every line has as many of them, they part columns, and commas are decimal ones
+    for mark in (";", "\t"):
+        counts = {line.rstrip("\r\n").count(mark) for line in lines}
+        if len(counts) == 1 and counts != {0}:
+            return mark, quote
+    from clevercsv.detect import Detector
+
+    found = Detector().detect("\n".join(lines), delimiters=_DELIMITERS) if lines else None
+    if found is None or not found.delimiter:
+        return ",", quote
+    if found.delimiter == "," and given.decimal != "." and _one_column_with_commas(whole):
+        return ";", quote
+    return found.delimiter, found.quotechar or quote
+
+
+def _one_column_with_commas(lines: Sequence[str]) -> bool:
+    """Whether the lines are a single column of numbers with a decimal comma, and no two columns of integers.
+
+    Decimals have the same number of digits in most lines, or leading zeros.
+    """
+    parts = [re.fullmatch(r"\s*[-+]?(\d+),(\d+)(?:[eE][-+]?\d+)?\s*", line) for line in lines]
+    digits = Counter(len(part[2]) for part in parts if part is not None)
+    if None in parts or not digits:
+        return False
+    return digits.most_common(1)[0][0] > 1 and any(part is not None and part[2].startswith("0") for part in parts)
+
+
+def _numbers(lines: Sequence[str], begin: Sequence[str], delimiter: str, quote: str, given: Dialect) -> tuple[str, str]:
+    """Marks of decimals and thousands with which most cells are numbers."""
+    trial = Form(delimiter, quote, ".", "")
+    cells = [cell.strip() for line in lines for cell in trial.cells(line)]
+    decimals = {
+        found[1] for line in begin for cell in trial.cells(line) if (found := _BELOW_ONE.fullmatch(cell.strip()))
+    }
+    best, most = (given.decimal or ".", given.thousands or ""), -1
+    for decimal, thousands in _FORMS:
+        if given.decimal not in (None, decimal) or given.thousands not in (None, thousands):
+            continue
+        if (delimiter == BLANK and thousands == " ") or thousands in decimals:
+            continue
+        pattern = _pattern(decimal, thousands)
+        count = sum(pattern.fullmatch(cell) is not None for cell in cells)
+        if count > most:
+            best, most = (decimal, thousands), count
+    return best
+
+
+_PATTERNS: dict[tuple[str, str], re.Pattern[str]] = {}
+
+
+def _pattern(decimal: str, thousands: str) -> re.Pattern[str]:
+    """Of a number: digits with a decimal mark, or in groups of three."""
+    key = (decimal, thousands)
+    if key not in _PATTERNS:
+        point = re.escape(decimal)
+        grouped = ""
+        if thousands:
+            marks = BLANKS if thousands == " " else APOSTROPHES if thousands == "'" else (thousands,)
+            between = "[" + "".join(re.escape(mark) for mark in marks) + "]"
+            # no number of thousands begins with 0: `0,001` has a decimal comma
+            grouped = rf"|[1-9]\d{{0,2}}(?:{between}\d{{3}})+(?:{point}\d*)?"
+        _PATTERNS[key] = re.compile(
+            rf"[-+]?(?:\d+(?:{point}\d*)?|{point}\d+{grouped})(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf)", re.I
+        )
+    return _PATTERNS[key]

@@ -1,0 +1,187 @@
+"""What stands above the rows of a text table: title lines, the names of the columns, their units, a rate."""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from bridge.faults import Fault
+from bridge.tables.text.dialect import BLANK, Dialect, Form
+from bridge.tables.unit_words import is_unit_row, known_unit
+
+COMMENTS = ("#", "%", "//", "!", "*", ";;", "'")
+_CONFIRMED = 5  # rows under the first one, of which most must be rows too
+_MOST_ABOVE = 6  # lines above the first row among which the names are looked for
+_RATE = re.compile(
+    r"(?:sampl|abtast|scan|acqui|messrate|datenrate|data\s*rate)[\w .\-/]*?(?:rate|freq\w*|messrate)?"
+    r"[^\w+-]*(?:\[(?P<u1>\w+)\]\W*)?"
+    r"(?P<value>\d[\d.,]*(?:[eE][-+]?\d+)?)\s*(?P<unit>k?Hz|k?S/s|1/s|sps)?",
+    re.IGNORECASE,
+)
+_STEP = re.compile(
+    r"(?:delta_?[xt]|dt|(?:sampl|abtast)\w*[ _\-]?(?:interval|intervall|period|time|zeit|schritt))[^\w+-]*(?:\[(?P<u1>\w+)\]\W*)?"
+    r"(?P<value>\d[\d.,]*(?:[eE][-+]?\d+)?)\s*(?P<unit>ms|µs|us|s)?\b",
+    re.IGNORECASE,
+)
+
+
+class Head(NamedTuple):
+    """The lines above the rows. `lines` counts all of them."""
+
+    lines: int
+    names_line: int  # from 0; -1: there is none
+    names: list[str]  # as many as there are columns
+    units: list[str]  # as many, or none
+    step_s: float | None  # between rows, as a line above states
+
+    @property
+    def unit_of(self) -> dict[str, str]:
+        """The units by column, as the line of units writes them."""
+        return {name: unit for name, unit in zip(self.names, self.units, strict=False) if unit}
+
+
+def read_head(lines: Sequence[str], body: Sequence[str], form: Form, given: Dialect, file: str) -> Head:
+    """The head of a table.
+
+    Args:
+        lines: the first ones of the file.
+        body: lines from further down, of rows alone.
+        form: how the cells are written.
+        given: what a map says.
+        file: for errors.
+
+    Raises Fault BAD_TABLE when no row of numbers is found.
+
+    """
+    width, numeric = _columns(body, form)
+    first = _first_row(lines, form, width, numeric, given)
+    if first is None:
+        line = f"{file}: no row of numbers with {width} cells, parted by {form.delimiter!r}, in the first {len(lines)} lines"
+        raise Fault("BAD_TABLE", f"{line}; state source.delimiter and source.skip_rows")
+    names_line, units_line = _names_above(lines, first, form, width, given)
+    names = list(given.names or [])
+    if not names and names_line >= 0:
+        names = _named(lines[names_line], form, width)
+    names = _each_once([name.strip() for name in names], width)
+    units = [unit.strip().strip("[]()") for unit in _named(lines[units_line], form, width)] if units_line >= 0 else []
+    units = (units + [""] * width)[:width] if units else []
+    return Head(first, names_line, names, units, _step_s(lines[:first]))
+
+
+def _columns(body: Sequence[str], form: Form) -> tuple[int, list[bool]]:
+    """Cells of most rows, and whether each column has a value in most of them."""
+    rows = [form.cells(line) for line in body if line.strip()]
+    if not rows:
+        return 1, [True]
+    width = Counter(len(row) for row in rows).most_common(1)[0][0]
+    whole = [row for row in rows if len(row) == width]
+    return width, [sum(form.is_value(row[i]) for row in whole) > 0.9 * len(whole) for i in range(width)]
+
+
+def _first_row(lines: Sequence[str], form: Form, width: int, numeric: list[bool], given: Dialect) -> int | None:
+    """The line from which on there are rows."""
+
+    def is_row(line: str) -> bool:
+        if line.lstrip().startswith(given.comment or COMMENTS):
+            return False
+        cells = form.cells(line)
+        if abs(len(cells) - width) > 1 or not any(form.is_number(cell) for cell in cells):
+            return False
+        return all(form.is_value(cell) for cell, value in zip(cells, numeric, strict=False) if value)
+
+    begin = 0 if given.skip_rows is None else given.skip_rows + (0 if given.names else 1)
+    for at in range(begin, len(lines)):
+        if not is_row(lines[at]):
+            continue
+        next_ones = [line for line in lines[at + 1 : at + 1 + _CONFIRMED] if line.strip()]
+        if 2 * sum(map(is_row, next_ones)) >= len(next_ones):
+            return at
+    return None
+
+
+def _names_above(lines: Sequence[str], first: int, form: Form, width: int, given: Dialect) -> tuple[int, int]:
+    """The lines of names and of units above the first row, -1 where there is none."""
+    if given.skip_rows is not None and not given.names:
+        units = range(given.skip_rows + 1, first)
+        found = [at for at in units if is_unit_row(_named(lines[at], form, width)) and given.units_row is not False]
+        return given.skip_rows, found[0] if found else -1
+    fitting: list[int] = []
+    for at in range(first - 1, max(first - 1 - _MOST_ABOVE, -1), -1):
+        if not lines[at].strip():
+            if fitting:
+                break
+            continue
+        cells = _named(lines[at], form, width)
+        fits = len(cells) == width and any(cell.strip() and not form.is_number(cell) for cell in cells)
+        if fits:
+            fitting.append(at)
+        elif fitting:
+            break
+    units_line = -1
+    for at in fitting:
+        units = _named(lines[at], form, width)
+        above = any(other < at for other in fitting)
+        if is_unit_row(units) and (given.units_row is True or (above and given.units_row is None)):
+            units_line = at
+            break
+    left = [at for at in fitting if at != units_line]
+    if units_line >= 0:
+        left = [at for at in left if at < units_line] or left
+    if width == 1:
+        return (left[0] if left else -1), units_line
+    # the line with most different names; of equally good ones the nearest
+    many = {at: len({cell.strip() for cell in _named(lines[at], form, width) if cell.strip()}) for at in left}
+    return max(left, key=lambda at: (many[at], at), default=-1), units_line
+
+
+def _named(line: str, form: Form, width: int) -> list[str]:
+    """The cells of a line of names, without the mark of a comment and without empty ones behind the last column."""
+    text = line.strip("\r\n\ufeff")
+    for mark in COMMENTS:
+        if text.lstrip().startswith(mark) and (mark != "%" or text.lstrip()[1:2].isspace()):  # `%time` of ROS is a name
+            text = text.lstrip().removeprefix(mark).lstrip(mark).strip()
+            break
+    if form.delimiter == BLANK:
+        wide = [part for part in re.split(r"\t+|\s{2,}", text.strip()) if part]
+        cells = (
+            wide if len(wide) == width else re.findall(r"(?:\[[^\]]*\]|\([^)]*\)|\S)+(?:\s+[\[(][^\])]*[\])])?", text)
+        )
+    else:
+        cells = form.cells(text)
+    while len(cells) > width and (not cells[-1].strip() or cells[-1].strip().lower() == "comment"):
+        cells = cells[:-1]
+    if len(cells) == width - 1:
+        cells = [*cells, ""]  # rows may end in a delimiter
+    return cells
+
+
+def _each_once(names: list[str], width: int) -> list[str]:
+    """A name for each column: its number where it has none, and `NAME.1` for one that comes again."""
+    seen: Counter[str] = Counter()
+    result: list[str] = []
+    for number in range(width):
+        name = names[number] if number < len(names) and names[number] else str(number + 1)
+        result.append(f"{name}.{seen[name]}" if seen[name] else name)
+        seen[name] += 1
+    return result
+
+
+def _step_s(lines: Sequence[str]) -> float | None:
+    """Seconds between rows, as a line above the rows states them."""
+    for line in lines:
+        for pattern, is_rate in ((_STEP, False), (_RATE, True)):
+            found = pattern.search(line)
+            if found is None:
+                continue
+            text = found["value"]
+            try:
+                value = float(text.replace(",", ".") if "," in text and "." not in text else text.replace(",", ""))
+            except ValueError:
+                continue
+            unit = (found["unit"] or found["u1"] or "").replace("S/s", "Hz").replace("sps", "Hz")
+            known = known_unit(unit) if unit else None
+            if value <= 0.0 or (is_rate and known is None and "hz" not in line.lower()):
+                continue
+            value *= known[1] if known is not None else 1.0
+            return 1.0 / value if is_rate else value
+    return None

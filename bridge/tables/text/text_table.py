@@ -1,0 +1,137 @@
+"""The rows of a text table as columns. Arrow reads them; what it cannot part or count is told, or made readable before."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+
+from bridge.faults import Fault
+from bridge.log.finding import Finding
+from bridge.tables.table import Table
+from bridge.tables.text.dialect import BLANK, Dialect, Form, form_of
+from bridge.tables.text.encoding import decoded
+from bridge.tables.text.head import COMMENTS, Head, read_head
+from bridge.tables.unit_words import unknown_units
+from bridge.units import counted
+
+# Arrow handles Ctrl-C and SIGTERM itself while it reads a CSV file, and loses a signal that comes near the end.
+pa.enable_signal_handlers(False)
+
+_HEAD_CHARACTERS = 1 << 18  # in which the rows must begin; LabVIEW and DIAdem write some 10 kB above them
+_PIECES, _PIECE_CHARACTERS = 12, 4096  # of the rest, in which the form of the rows is found
+_MOST_LEFT_OUT = 0.1  # share of rows with too many or too few cells, from which it is another kind of file
+_SHOWN = 60  # characters of a line in a finding
+
+
+def read_text(path: Path, given: Dialect) -> Table:
+    """Read a text table; what `given` leaves open is found and said. Raises Fault BAD_TABLE."""
+    text, encoding = decoded(path.read_bytes(), given.encoding, path.name)
+    head_lines = text[:_HEAD_CHARACTERS].splitlines()
+    if not any(line.strip() for line in head_lines):
+        raise Fault("BAD_TABLE", f"{path.name}: is empty; give a file with rows")
+    body = _spread(text, head_lines, given)
+    form = form_of(body, given, any('"' in line for line in (*head_lines, *body)), head_lines)
+    head = read_head(head_lines, body, form, given, path.name)
+    rows, left_out, some = _rows(text, head, form, given)
+    columns = {name: rows.column(i) for i, name in enumerate(head.names)}
+    findings = [*_told(path.name, head, form, encoding, given), *_lost(path.name, left_out, some, rows.num_rows)]
+    written: dict[str, Any] = {"delimiter": form.delimiter, "decimal": form.decimal, "encoding": encoding}
+    written |= {"thousands": form.thousands} if form.thousands else {}
+    written |= {"names": head.names} if head.names_line < 0 else {"skip_rows": head.names_line}
+    return Table(
+        path,
+        columns,
+        units=head.unit_of,
+        sample_rate_Hz=1.0 / head.step_s if head.step_s else None,
+        decimal=form.decimal,
+        thousands=form.thousands,
+        findings=findings,
+        written=written,
+    )
+
+
+def _spread(text: str, head_lines: list[str], given: Dialect) -> list[str]:
+    """Lines of the rows alone, from all over the file, without those that are cut."""
+    if len(text) <= _HEAD_CHARACTERS:
+        filled = [
+            line for line in head_lines if line.strip() and not line.lstrip().startswith(given.comment or COMMENTS)
+        ]
+        # the end may have a trailing line, and the beginning titles
+        return filled[max(len(filled) // 3, min(len(filled) - 2, 60)) :] if len(filled) > 3 else filled[-1:]
+    lines: list[str] = []
+    for piece in range(1, _PIECES + 1):
+        at = len(text) * piece // (_PIECES + 1)
+        lines += text[at : at + _PIECE_CHARACTERS].splitlines()[1:-1]
+    return lines
+
+
+def _rows(text: str, head: Head, form: Form, given: Dialect) -> tuple[Any, int, str]:
+    """The rows as an Arrow table, how many were left out, and one of them."""
+    at = _offset(text, head.lines)
+    rows = text[at:]
+    delimiter = form.delimiter
+    if given.comment or any(f"\n{mark}" in rows for mark in COMMENTS):
+        marks = tuple([given.comment] if given.comment else COMMENTS)
+        rows = "\n".join(line for line in rows.splitlines() if not line.lstrip().startswith(marks))
+    if delimiter == BLANK:
+        rows = re.sub(r"[ \t]+", "\t", re.sub(r"^[ \t]+|[ \t]+$", "", rows, flags=re.MULTILINE))
+        delimiter = "\t"
+    lost: list[str] = []
+
+    def pass_over(row: Any) -> str:
+        lost.append(row.text)
+        return "skip"
+
+    table = pa_csv.read_csv(
+        pa.BufferReader(rows.encode()),
+        read_options=pa_csv.ReadOptions(column_names=head.names, use_threads=True),
+        parse_options=pa_csv.ParseOptions(
+            delimiter=delimiter, quote_char=form.quote or False, invalid_row_handler=pass_over
+        ),
+        convert_options=pa_csv.ConvertOptions(decimal_point=form.decimal, strings_can_be_null=True),
+    )
+    return table, len(lost), lost[0] if lost else ""
+
+
+def _offset(text: str, lines: int) -> int:
+    """Characters before line `lines`, from 0; lines end as `splitlines` says for CR, LF and both."""
+    at = 0
+    for _ in range(lines):
+        found = re.compile(r"\r\n|\n|\r").search(text, at)
+        if found is None:
+            return len(text)
+        at = found.end()
+    return at
+
+
+def _told(file: str, head: Head, form: Form, encoding: str, given: Dialect) -> list[Finding]:
+    """What was assumed where the map says nothing, where it is not what most files have."""
+    found: list[Finding] = []
+    parts = [
+        (given.delimiter is None and form.delimiter != ",", f"delimiter = {form.delimiter!r}"),
+        (given.decimal is None and form.decimal != ".", f"decimal = {form.decimal!r}"),
+        (given.thousands is None and bool(form.thousands), f"thousands = {form.thousands!r}"),
+        (given.encoding is None and encoding != "utf-8", f"encoding = {encoding!r}"),
+        (given.skip_rows is None and head.names_line > 0, f"skip_rows = {head.names_line}"),
+        (given.names is None and head.names_line < 0, "no line of names: columns have numbers"),
+    ]
+    if told := [text for wanted, text in parts if wanted]:
+        found.append(Finding("assumed", file, ", ".join(told)))
+    if head.units:
+        found.append(Finding("assumed", file, f"line {head.lines} is of units: {', '.join(filter(None, head.units))}"))
+        if unknown := unknown_units(head.unit_of):
+            found.append(Finding("units", file, f"no known unit: {unknown}; taken as it is"))
+    return found
+
+
+def _lost(file: str, left_out: int, some: str, rows: int) -> list[Finding]:
+    if not left_out:
+        return []
+    text = f"{counted(left_out, 'line')} with another number of cells left out, first {some[:_SHOWN]!r}"
+    if left_out > _MOST_LEFT_OUT * (rows + left_out):
+        raise Fault(
+            "BAD_TABLE", f"{file}: {text}, of {rows + left_out}: must be few; cut the file, or state source.delimiter"
+        )
+    return [Finding("cut", file, text, left_out)]

@@ -1,0 +1,133 @@
+"""Units as people and programs write them: `kN`, `mm/s`, `[N]`, `Nm`, `°`; and units in the names of columns."""
+
+import re
+
+# what a column holds, its SI unit, and the factors of units without a prefix
+_DEGREE, _TURN = 0.017453292519943295, 6.283185307179586  # rad
+_POUND_N = 4.4482216152605
+_UNITS: dict[str, tuple[str, dict[str, float]]] = {
+    "time": (
+        "s",
+        dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sekunden"), 1.0) | {"min": 60.0, "h": 3600.0},
+    ),
+    "force": ("N", {"N": 1.0, "newton": 1.0, "lbf": _POUND_N, "kgf": 9.80665, "kp": 9.80665, "gf": 9.80665e-3}),
+    "length": (
+        "m",
+        {"m": 1.0, "meter": 1.0, "metre": 1.0, "in": 0.0254, "inch": 0.0254, "mil": 2.54e-5, "micron": 1e-6},
+    ),
+    "velocity": ("m/s", {"m/s": 1.0, "mm/min": 1e-3 / 60.0, "m/min": 1.0 / 60.0, "in/s": 0.0254}),
+    "acceleration": ("m/s²", {"m/s2": 1.0, "g": 9.80665, "gn": 9.80665, "Gal": 0.01}),
+    "frequency": ("Hz", {"Hz": 1.0, "1/s": 1.0}),
+    "mass": ("kg", {"kg": 1.0, "lb": 0.45359237, "lbs": 0.45359237, "t": 1000.0}),
+    "torque": ("N m", {"Nm": 1.0, "N.m": 1.0, "inlb": 0.0254 * _POUND_N}),
+    "angle": ("rad", {"rad": 1.0, "deg": _DEGREE, "°": _DEGREE, "rev": _TURN, "U": _TURN}),
+    "angular velocity": (
+        "rad/s",
+        {"rad/s": 1.0, "deg/s": _DEGREE, "°/s": _DEGREE} | dict.fromkeys(("rpm", "1/min", "U/min"), _TURN / 60.0),
+    ),
+    "angular acceleration": ("rad/s²", {"rad/s2": 1.0, "deg/s2": _DEGREE, "°/s2": _DEGREE}),
+    "inertia": ("kg m²", {"kgm2": 1.0}),
+    "share": ("1", {"-": 1.0, "1": 1.0, "%": 0.01}),
+    "voltage": ("V", {"V": 1.0}),
+    "current": ("A", {"A": 1.0}),
+    "pressure": ("Pa", {"Pa": 1.0, "bar": 1e5, "psi": 6894.757293168}),
+    "temperature": ("K", {"K": 1.0, "°C": 1.0, "degC": 1.0, "C": 1.0}),
+}
+_PREFIXES = {"n": 1e-9, "µ": 1e-6, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6, "G": 1e9}
+# units that take a prefix; `min` is no milli-inch and `cd` no centi-day
+_PREFIXED = {"s", "N", "m", "m/s", "m/s2", "Hz", "g", "Nm", "rad", "rad/s", "V", "A", "Pa", "bar", "gn"}
+_SAME = str.maketrans(
+    {"μ": "µ", "²": "2", "·": "", "*": "", " ": "", "^": "", "−": "-", "⁻": "-", "¹": "1", "\xa0": "", "º": "°"}
+)
+_WORDS = {
+    "m/sec2": "m/s2",
+    "m/sec": "m/s",
+    "m/s/s": "m/s2",
+    "ms-2": "m/s2",
+    "ms-1": "m/s",
+    "newtons": "newton",
+    "Umin": "U/min",
+}
+# a unit behind a name: `Force [N]`, `Force (N)`, `Force / N`, `Force, N`, `Force in N`, `Force_N`
+_BEHIND = re.compile(
+    r"^(?P<name>.*?\S)\s*(?:\[(?P<a>[^\][]*)\]|\((?P<b>[^()]*)\)|\s/\s*(?P<c>\S+)|,\s*(?P<d>\S+)|\s+in\s+(?P<e>\S+)|_(?P<f>[^\W_]+))\s*$"
+)
+
+# that a name may end in after a low line: `x_t` and `force_p` have no unit
+_AFTER_LINE = {
+    "s",
+    "ms",
+    "us",
+    "ns",
+    "N",
+    "kN",
+    "mN",
+    "m",
+    "mm",
+    "um",
+    "µm",
+    "nm",
+    "Hz",
+    "kHz",
+    "Nm",
+    "rad",
+    "deg",
+    "g",
+    "rpm",
+}
+_LONGEST_UNIT = 8  # characters of a unit that is not known here
+
+
+def known_unit(text: str) -> tuple[str, float] | None:
+    """What a unit measures, and its factor to SI: ("force", 1000.0) of `kN`; None where it is none known here."""
+    word = text.strip().strip("[](){}").translate(_SAME)
+    word = _WORDS.get(word, word)
+    for what, (_, units) in _UNITS.items():
+        for same in (word, word.lower()):
+            if same in units and (len(same) > 2 or same == word):
+                return what, units[same]
+    prefix, rest = word[:1], _WORDS.get(word[1:], word[1:])
+    if prefix in _PREFIXES and rest in _PREFIXED:
+        if rest == "g" and prefix == "k":
+            return "mass", 1.0
+        for what, (_, units) in _UNITS.items():
+            if rest in units:
+                return what, _PREFIXES[prefix] * units[rest]
+    return None
+
+
+def si_unit(what: str) -> str:
+    """The SI unit of what is measured, such as `N` of `force`."""
+    return _UNITS[what][0]
+
+
+def unit_in_name(name: str) -> str:
+    """The unit at the end of a column's name, as it is written there; empty where there is none that is known."""
+    found = _BEHIND.match(name)
+    if found is None:
+        return ""
+    unit = next((text for key in "abcdef" if (text := found[key]) is not None), "").strip()
+    if found["f"] is not None and unit not in _AFTER_LINE:
+        return ""
+    return unit if known_unit(unit) else ""
+
+
+def bare_name(name: str) -> str:
+    """A column's name without the unit at its end, and with single blanks."""
+    name = re.sub(r"\s+", " ", name).strip()
+    found = _BEHIND.match(name)
+    brackets = found is not None and (found["a"] is not None or found["b"] is not None)
+    return found["name"] if found is not None and (brackets or unit_in_name(name)) else name
+
+
+def is_unit_row(cells: list[str]) -> bool:
+    """Whether the cells are units or empty: all of them, or most and the rest short words that may be units too."""
+    words = [cell.strip() for cell in cells if cell.strip()]
+    units = [known_unit(word) is not None or re.fullmatch(r"\[.*\]|\(.*\)", word) is not None for word in words]
+    rest = [word for word, unit in zip(words, units, strict=True) if not unit]
+    return sum(units) > len(rest) and all(len(word) <= _LONGEST_UNIT and not word[0].isdigit() for word in rest)
+
+
+def unknown_units(units: dict[str, str]) -> str:
+    """Which units, by column, are not known here, in words; empty where all are."""
+    return ", ".join(f"{unit!r} of column {name}" for name, unit in units.items() if known_unit(unit) is None)

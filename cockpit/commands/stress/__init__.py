@@ -1,0 +1,1 @@
+"""Commands that try a loop: `fault` injects a fault into one that runs, `soak` watches one for hours."""

@@ -1,0 +1,70 @@
+"""`stickslip soak`: plant, controller and recorder for hours, watched from outside."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridge.faults import Fault
+from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.options import (
+    Certs,
+    Endpoint,
+    LogFile,
+    Prefix,
+    ScenarioName,
+    Seed,
+    Settings,
+    as_settings,
+    watched_share,
+)
+from cockpit.run.child_process import stopped_once
+
+_PAGE = (".md",)
+
+
+def soak(
+    scenario: ScenarioName = "belt-axis",
+    hours: Annotated[float, typer.Option(min=0.0, help="How long.")] = 0.0,
+    minutes: Annotated[float, typer.Option(min=0.0, help="The same in minutes; both count.")] = 0.0,
+    settings: Settings = [],  # noqa: B006
+    seed: Seed = None,
+    endpoint: Endpoint = None,
+    prefix: Prefix = None,
+    certs: Certs = None,
+    log: LogFile = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a page, one .md file.")] = None,
+    as_json: Json = None,
+) -> None:
+    """Run a loop for hours: memory of each process, lost blocks, latency over time; exit status 1: not to its end, or not whole.
+
+    Ctrl-C ends it with a result. Its log is gone afterwards, unless --log keeps it.
+    """
+
+    def work() -> int:
+        from bridge.files import write_whole
+        from cockpit.run.child_process import warn_without_priority
+        from cockpit.run.scenario import load_scenario, refuse_what_takes_no_clock
+        from cockpit.run.soak import soak as run
+        from cockpit.run.writable import LOG, check_output, writing
+
+        seconds = 3600.0 * hours + 60.0 * minutes
+        if seconds <= 0.0:
+            raise Fault("CONFIG", "--hours, --minutes: missing: must be above 0 together; give one")
+        changed = as_settings(settings, seed, endpoint, prefix, certs)
+        made = load_scenario(scenario, [*changed, f"duration_s={seconds}"])
+        refuse_what_takes_no_clock(made)
+        for path, option, kind in ((report, "--report", _PAGE), (log, "--log", LOG)):
+            if path is not None:
+                check_output(option, path, kind)
+        warn_without_priority()
+        arguments = ["--scenario", scenario, *(part for setting in changed for part in ("--set", setting))]
+        with stopped_once(), watched_share("soaking", quiet=False) as progress:
+            soaked = run(made.name, arguments, made.bus, seconds, log, progress)
+        if report is not None:
+            with writing(report):
+                write_whole(report, soaked.page())
+        tell(as_json, soaked._asdict() | {"good": soaked.good}, soaked.in_words())
+        return 0 if soaked.good else 1
+
+    carry_out(work, as_json)

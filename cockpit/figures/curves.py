@@ -1,0 +1,61 @@
+"""The numbers that a figure shows, and the same numbers as a table."""
+
+import csv
+import io
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bridge.faults import Fault
+from bridge.log.logfile import RunData
+from cockpit.figures.grid import Envelope, Grid, on_grid
+from cockpit.figures.request import Request
+from cockpit.figures.signals import Floats, Signal, samples_of
+
+_BINS = 2000  # across a figure: 300 dots an inch over 170 mm; fewer samples are drawn as they are
+
+
+class Curve(NamedTuple):
+    """One signal of one log in a figure, in SI units; where `is_raw`, least, mean and largest are the samples themselves."""
+
+    log: str
+    signal: Signal
+    t_s: Floats  # [points]
+    values: Envelope
+    is_raw: bool
+
+
+def window_of(runs: Sequence[RunData], request: Request) -> tuple[float, float]:
+    """From and until when a figure shows the logs [s]. Raises Fault CONFIG where that is outside of them."""
+    ends_s = [float(run.sensors["t_ns"].max()) * 1e-9 for run in runs if len(run.sensors)]
+    starts_s = [max(float(run.sensors["t_ns"].min()) * 1e-9, 0.0) for run in runs if len(run.sensors)]
+    end_s, start_s = max(ends_s, default=0.0), min(starts_s, default=0.0)
+    from_s, to_s = max(request.from_s, start_s), min(request.to_s, end_s)
+    if request.is_window and from_s >= to_s:
+        line = f"--from {request.from_s:g} --to {request.to_s:g}: the log is from {start_s:g} to {end_s:g} s"
+        raise Fault("CONFIG", f"{line}; choose times inside")
+    return from_s, to_s
+
+
+def curve_of(run: RunData, log: str, signal: Signal, from_s: float, to_s: float) -> Curve:
+    """A signal between two times, as samples where these are few, else in bins."""
+    t_s, values = samples_of(run, signal)
+    inside = (t_s >= from_s) & (t_s <= to_s)
+    t_s, values = t_s[inside], values[inside]
+    if len(t_s) <= _BINS or to_s <= from_s:
+        return Curve(log, signal, t_s, Envelope(values, values, values), is_raw=True)
+    grid = Grid(from_s, (to_s - from_s) / (_BINS - 1), _BINS)
+    return Curve(log, signal, grid.t_s, on_grid(t_s, values, grid), is_raw=False)
+
+
+def as_table(curves: Sequence[Curve]) -> str:
+    """The curves as CSV: a row for each point, values in SI units as the signal's name says; nothing where there is no value."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["log", "signal", "t_s", "least", "mean", "largest"])
+    for curve in curves:
+        rows = np.column_stack([curve.t_s, curve.values.least, curve.values.mean, curve.values.most])
+        for row in rows[np.isfinite(rows[:, 2])].tolist():
+            table.writerow([curve.log, curve.signal.name, *(f"{number:.9g}" for number in row)])
+    return text.getvalue()

@@ -1,0 +1,261 @@
+"""A log as a figure, or two laid over each other: for a screen with the answer above it, or for a paper without."""
+
+import textwrap
+from collections.abc import Sequence
+from itertools import groupby, pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bridge.files import replacing, write_whole
+from bridge.log.logfile import RunData, read_run
+from bridge.provenance import Provenance, provenance, shown_name
+from bridge.units import counted
+from bridge.wire import stickslip_pb2 as wire
+from cockpit.figures.curves import Curve, as_table, curve_of, window_of
+from cockpit.figures.request import PAPER, SCREEN, Request
+from cockpit.figures.signals import Signal, limits_of, named
+from cockpit.judge.verdict import RunVerdict, cycles_of, judge_run
+from cockpit.judge.verdict_words import headline
+from diagnosis.features.cycles import Cycles
+
+_SHADES: dict[int, str] = {wire.EXCITE: "#dcebd8", wire.WAIT: "#f2d694", wire.PROBE: "#d5e3f0", wire.STOPPED: "#f0d5d5"}
+_NAMES: dict[int, str] = {
+    wire.EXCITE: "vibrating",
+    wire.WAIT: "waiting for re-stick",
+    wire.PROBE: "probing",
+    wire.STOPPED: "stopped",
+}
+_INK, _SLIP = "#1f2d3a", "#b5402a"
+_MM = 1.0 / 25.4  # inch
+_FIRST_MM = {SCREEN: 90.0, PAPER: 42.0}  # height of the first panel, and of each that follows
+_NEXT_MM = {SCREEN: 60.0, PAPER: 30.0}
+_FOOT_MM = 1.35  # of a letter of the line at the foot
+_LETTER_MM, _KEY_MM = 1.75, 13.0  # of a letter in a legend, and of what stands before it
+_ON_TOP = 3.0  # of what is drawn over each other; the first signal is in front
+_OTHER_ALPHA = 0.55  # of the second log, which is dashed besides
+
+
+class _Shown(NamedTuple):
+    """A log in a figure."""
+
+    run: RunData
+    name: str
+    verdict: RunVerdict
+    cycles: Cycles | None
+
+
+def draw_logs(
+    logs: Sequence[Path], out: Path, request: Request | None = None, data: Path | None = None
+) -> list[RunVerdict]:
+    """Draw one log, or two over each other, to `out`, a .png, .svg or .pdf file; what came of each.
+
+    Where `data` is given, the numbers of the curves go there as CSV. Raises Fault BAD_LOG, CONFIG, LOG_WRITE, and OSError where
+    a file cannot be written.
+    """
+    wanted = request or Request()
+    made = provenance(logs)
+    shown = [_shown(path, name) for path, name in zip(logs, _names(logs), strict=True)]
+    from_s, to_s = window_of([one.run for one in shown], wanted)
+    signals = [named(wanted.signals, one.run) for one in shown]
+    panels = [list(group) for _, group in groupby(signals[0], lambda one: (one.axis, one.unit))]
+    curves = [[_curves(shown, signal, signals, from_s, to_s) for signal in panel] for panel in panels]
+    _save(_figure(shown, panels, curves, wanted, (from_s, to_s), made), shown, out, wanted, made)
+    if data is not None:
+        write_whole(data, as_table([one for panel in curves for same in panel for one in same]))
+    return [one.verdict for one in shown]
+
+
+def _shown(path: Path, name: str) -> _Shown:
+    run = read_run(path)
+    return _Shown(run, name, judge_run(run), cycles_of(run))
+
+
+def _names(logs: Sequence[Path]) -> list[str]:
+    """What the logs are called; two of one name by their folders too, and a log beside itself by a number."""
+    alone = [shown_name(path.name) for path in logs]
+    if len({*alone}) == len(alone):
+        return alone
+    whole = [shown_name(str(path)) for path in logs]
+    return whole if len({*whole}) == len(whole) else [f"{name} ({at})" for at, name in enumerate(alone, 1)]
+
+
+def _literal(name: str) -> str:
+    """A name for matplotlib, to which a dollar begins a formula."""
+    return name.replace("$", r"\$")
+
+
+def _curves(
+    shown: Sequence[_Shown], signal: Signal, signals: Sequence[Sequence[Signal]], from_s: float, to_s: float
+) -> list[Curve]:
+    """One signal of every log that holds it."""
+    return [
+        curve_of(one.run, one.name, signal, from_s, to_s)
+        for one, there in zip(shown, signals, strict=True)
+        if signal in there
+    ]
+
+
+def _figure(
+    shown: Sequence[_Shown],
+    panels: Sequence[Sequence[Signal]],
+    curves: Sequence[Sequence[Sequence[Curve]]],
+    request: Request,
+    window_s: tuple[float, float],
+    made: Provenance,
+) -> Any:
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    paper = request.style == PAPER
+    rest_mm = _NEXT_MM[request.style] * (len(panels) - 1)
+    size = (request.width_mm * _MM, (_FIRST_MM[request.style] + rest_mm) * _MM)
+    with mpl.rc_context(_rules(paper)):
+        figure = Figure(figsize=size, layout="constrained")
+        heights = [_FIRST_MM[request.style], *([_NEXT_MM[request.style]] * (len(panels) - 1))]
+        every: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        if not paper:
+            figure.suptitle(_title(shown, request, window_s), color=_INK, parse_math=False)
+            foot = textwrap.fill(made.in_words(), int(request.width_mm / _FOOT_MM))
+            figure.supxlabel(foot, fontsize=6, color="#808b96", x=0.01, ha="left", parse_math=False)
+        for number, (axes, panel, drawn) in enumerate(zip(every, panels, curves, strict=True)):
+            _panel(axes, shown, panel, drawn, window_s)
+            if len(shown) == 1:
+                _shade(axes, shown[0], named=number == 0)
+            _legend(axes, request)
+        every[-1].set_xlabel("time [s]")
+        every[-1].set_xlim(*window_s) if window_s[1] > window_s[0] else None
+    return figure
+
+
+def _rules(paper: bool) -> Any:
+    """Settings of matplotlib: a paper's text is small and can be searched, and an SVG is the same each time."""
+    size = 7.0 if paper else 10.0
+    return {
+        "font.family": "DejaVu Sans",  # comes with matplotlib: the same everywhere
+        "font.size": size,
+        "axes.linewidth": 0.5 if paper else 0.8,
+        "lines.linewidth": 0.8 if paper else 1.2,
+        "lines.markersize": 3.0 if paper else 6.0,
+        "legend.fontsize": size - (0.5 if paper else 1.0),
+        "pdf.fonttype": 42,
+        "svg.hashsalt": "stickslip",
+    }
+
+
+def _title(shown: Sequence[_Shown], request: Request, window_s: tuple[float, float]) -> str:
+    """The answer for each log; of a part of a run also how many of its slips are in it."""
+    lines: list[str] = []
+    for one in shown:
+        name = f"{one.name}: " if len(shown) > 1 else ""
+        part = ""
+        if request.is_window:
+            part = f"\nshown: {window_s[0]:g} to {window_s[1]:g} s of {one.verdict.seconds:.4g} s"
+            if one.cycles is not None:
+                inside = one.cycles.between(*window_s).slips
+                part += f", {inside} of {counted(one.cycles.slips, 'slip')}"
+        lines.append(name + headline(one.verdict) + part)
+    return "\n".join(lines)
+
+
+def _panel(
+    axes: Any,
+    shown: Sequence[_Shown],
+    panel: Sequence[Signal],
+    curves: Sequence[Sequence[Curve]],
+    window_s: tuple[float, float],
+) -> None:
+    names = {one.name: number for number, one in enumerate(shown)}
+    axes.margins(x=0)
+    axes.spines[["top", "right"]].set_visible(False)
+    for number, same in enumerate(curves):
+        for curve in same:
+            whose = f", {_literal(curve.log)}" if len(shown) > 1 else ""
+            _draw(axes, curve, curve.signal.title + whose, names[curve.log] > 0, _ON_TOP - 0.1 * number)
+    for words, value in limits_of(shown[0].run, panel[0].axis):
+        axes.axhline(value * panel[0].factor, color=_SLIP, linewidth=0.6, linestyle="--", label=words)
+    if panel[0].name == "drive_force_N":
+        for one in shown:
+            _mark_slips(axes, one, window_s, second=names[one.name] > 0, several=len(shown) > 1)
+    axes.set_ylabel(panel[0].axis_title)
+    if panel[0].axis in {"velocity", "amplitude"} and axes.get_ylim()[1] > 0.0:
+        axes.set_ylim(bottom=min(_least(curves), 0.0) * panel[0].factor * 1.05)
+
+
+def _least(curves: Sequence[Sequence[Curve]]) -> float:
+    """The least value of all curves, in SI units; 0 without any."""
+    every = [curve.values.least[np.isfinite(curve.values.least)] for same in curves for curve in same]
+    return float(np.concatenate([*every, np.zeros(1)]).min())
+
+
+def _legend(axes: Any, request: Request) -> None:
+    """Above the axes on a screen, in as many columns as there is room for; inside them in a paper."""
+    handles, labels = axes.get_legend_handles_labels()
+    if len(handles) < 2:
+        return
+    if request.style == PAPER:
+        axes.legend(handles, labels, loc="best", borderaxespad=0.2, handlelength=1.5, labelspacing=0.3)
+        return
+    room = int(0.85 * request.width_mm / (_KEY_MM + _LETTER_MM * max(map(len, labels))))
+    columns = min(max(room, 1), len(handles))
+    axes.legend(handles, labels, ncols=columns, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+
+def _draw(axes: Any, curve: Curve, label: str, second: bool, zorder: float) -> None:
+    """The mean as a line and the range from least to largest behind it."""
+    factor, colour = curve.signal.factor, curve.signal.colour
+    alpha = _OTHER_ALPHA if second else 1.0
+    if not curve.is_raw:
+        low, high = factor * curve.values.least, factor * curve.values.most
+        axes.fill_between(curve.t_s, low, high, color=colour, alpha=0.3 * alpha, linewidth=0, zorder=zorder)
+    line = "--" if second else "-"
+    mean = factor * curve.values.mean
+    axes.plot(curve.t_s, mean, color=colour, alpha=alpha, linestyle=line, label=label, zorder=zorder)
+
+
+def _mark_slips(axes: Any, shown: _Shown, window_s: tuple[float, float], second: bool, several: bool) -> None:
+    """A triangle at each breakaway; the legend says how many there are in the picture."""
+    if shown.cycles is None:
+        return
+    inside = (shown.cycles.breakaway_t_s >= window_s[0]) & (shown.cycles.breakaway_t_s <= window_s[1])
+    if not inside.any():
+        return
+    whose = f", {_literal(shown.name)}" if several else ""
+    axes.plot(
+        shown.cycles.breakaway_t_s[inside],
+        shown.cycles.breakaway_force_N[inside],
+        color=_SLIP,
+        marker="^" if second else "v",
+        markerfacecolor="none" if second else _SLIP,
+        linestyle="none",
+        zorder=_ON_TOP,
+        label=f"{counted(np.count_nonzero(inside), 'slip')}{whose}",
+    )
+
+
+def _shade(axes: Any, shown: _Shown, named: bool) -> None:
+    """Colour the background by mode and mark where the controller's time begins; with labels for the legend where `named`."""
+    t_s, mode = shown.run.trace["t_ns"] * 1e-9, shown.run.trace["mode"]
+    if shown.verdict.enabled_from_s > 0.0 and not shown.verdict.imported:
+        label = "in charge from here" if named else None
+        axes.axvline(shown.verdict.enabled_from_s, color=_INK, linewidth=0.6, linestyle=":", label=label)
+    if not len(mode):
+        return
+    edges = [0, *(np.flatnonzero(np.diff(mode.astype(int))) + 1).tolist(), len(mode) - 1]
+    labelled: set[int] = set()
+    for start, end in pairwise(edges):
+        now = int(mode[start])
+        if now in _SHADES and end > start:
+            label = _NAMES[now] if named and now not in labelled else None
+            labelled.add(now)
+            axes.axvspan(t_s[start], t_s[end], color=_SHADES[now], label=label, linewidth=0, zorder=0)
+
+
+def _save(figure: Any, shown: Sequence[_Shown], out: Path, request: Request, made: Provenance) -> None:
+    import matplotlib as mpl
+
+    suffix = out.suffix.lower()
+    metadata = made.metadata(suffix, "; ".join(one.name for one in shown))
+    with mpl.rc_context(_rules(request.style == PAPER)), replacing(out) as file:
+        figure.savefig(file, dpi=request.dpi, format=suffix.removeprefix("."), metadata=metadata)

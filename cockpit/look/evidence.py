@@ -1,0 +1,90 @@
+"""A record as evidence: the rig's numbers filled in from what is seen, with the tolerance that their scatter gives."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from bridge.config import validate
+from bridge.faults import Fault
+from bridge.files import replacing
+from cockpit.look.source import Record
+from diagnosis.evidence.assumed import with_assumed
+from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
+from diagnosis.evidence.manifest_text import manifest_text
+from diagnosis.look.look import Look
+
+_LEAST_TOLERANCE = 0.01  # relative, of a number that scatters less: sensors are calibrated to a per cent
+_FRICTION_TOLERANCE = 0.05  # of F_s and F_k: what a slip shows is friction under the load of that slip
+_STRIBECK_TOLERANCE = 0.5  # of a velocity that one speed of the drive does not show
+_OF_90 = 1.645  # standard deviations in half an interval of 90 %
+_GUESSED_MPS = 5e-4  # Stribeck velocity of the paper's pairs
+
+
+def rig_of(seen: Look, file: str) -> tuple[RigTable, list[str]]:
+    """A rig with the numbers of a record, and the names of those that are assumed.
+
+    Raises Fault CONFIG with a line to copy where a number can be neither seen nor assumed.
+    """
+    numbers = seen.numbers
+    if seen.known.coefficient:
+        raise Fault(
+            "CONFIG", f"{file}: holds a friction coefficient and no load, so no force is known; add --load 94.5N"
+        )
+    if "kinetic_force_N" not in numbers or "static_force_N" not in numbers:
+        raise Fault(
+            "CONFIG", f"{file}: shows no slip, so it fills in no rig number; import it with a map that has [rig]"
+        )
+    if "stiffness_N_per_m" not in numbers:
+        raise Fault("CONFIG", f"{file}: the speed of the drive is not known; add --speed 0.5mm/s")
+    mass = numbers.get("mass_kg")
+    if seen.known.mass_kg is None and (mass is None or not np.isfinite(mass.low) or mass.low <= 0.0):
+        raise Fault("CONFIG", f"{file}: its slips are too quick to show the mass of the slide; add --mass 1.5kg")
+    table = {"drive": "spring", "tolerance": {}, "stribeck_velocity_mps": _GUESSED_MPS}
+    tolerance: dict[str, float] = {"stribeck_velocity_mps": _STRIBECK_TOLERANCE}
+    wanted = (
+        ("drive_stiffness_N_per_m", numbers["stiffness_N_per_m"], _LEAST_TOLERANCE),
+        ("coulomb_force_N", numbers["kinetic_force_N"], _FRICTION_TOLERANCE),
+        ("static_force_N", numbers["static_force_N"], _FRICTION_TOLERANCE),
+        ("mass_kg", mass, _LEAST_TOLERANCE),
+    )
+    for name, number, least in wanted:
+        if number is None:
+            continue
+        half = (number.high - number.low) / (2.0 * _OF_90 * number.value)
+        tolerance[name] = min(max(half if np.isfinite(half) else least, least), 1.0)
+        table[name] = float(number.value)
+    if seen.known.mass_kg is not None:
+        table["mass_kg"] = float(seen.known.mass_kg)
+        tolerance["mass_kg"] = _LEAST_TOLERANCE
+    table["tolerance"] = tolerance
+    filled, assumed = with_assumed(table)
+    return validate(RigTable, filled, file), [*assumed, "stribeck_velocity_mps"]
+
+
+def full_map(record: Record, seen: Look) -> str:
+    """The map of a record with its rig, as `log import` reads it. Raises Fault as `rig_of`."""
+    rig, assumed = rig_of(seen, record.path.name)
+    lines = [f'drive = "{rig.drive}"']
+    for name, value in rig.values().items():
+        if value is not None:
+            lines.append(f"{name} = {value!r}" + ("  # assumed, not measured" if name in assumed else ""))
+    tolerance = [f"{name} = {value!r}" for name, value in rig.tolerance.items()]
+    return "\n".join([record.map_text.rstrip(), "", "[rig]", *lines, "", "[rig.tolerance]", *tolerance]) + "\n"
+
+
+def write_evidence(record: Record, seen: Look, folder: Path) -> tuple[RigTable, list[str]]:
+    """Make `folder` an evidence folder of this record alone; its rig and what is assumed of it. Raises Fault, OSError."""
+    rig, assumed = rig_of(seen, record.path.name)
+    columns = {"t_s": record.t_s, "drive_force_N": record.force_N}
+    if record.position_m is not None:
+        columns["drive_position_m"] = record.position_m
+    speed = seen.known.speed_mps if record.position_m is None else None
+    run = RunTable(file=record.path.stem + ".parquet", drive_velocity_mps=speed)
+    folder.mkdir(parents=True, exist_ok=True)
+    schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in columns])
+    with replacing(folder / MANIFEST) as manifest, replacing(folder / run.file) as file:
+        manifest.write(manifest_text(rig, [run], assumed).encode("utf-8"))
+        pq.write_table(pa.table(list(columns.values()), schema=schema), file, use_dictionary=False)
+    return rig, assumed

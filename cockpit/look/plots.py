@@ -1,0 +1,169 @@
+"""The pictures of a look: the whole force with its slips, all cycles over each other, histograms, friction over speed."""
+
+import io
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnosis.look.look import Look
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_INK, _RED, _BLUE, _PALE = "#1f2d3a", "#b5402a", "#2a6fb5", "#9fb3c8"
+_COLUMNS = 2000  # of an envelope: more than a screen or a page has
+_MOST_LAID = 200  # cycles that are drawn over each other
+
+
+def pictures(seen: Look) -> list[tuple[str, str, "Figure"]]:
+    """Title, caption and figure of each picture that the record allows."""
+    found = [
+        (
+            "The force",
+            "The whole record: breakaways red, re-sticks blue. Long records are drawn as envelopes.",
+            whole(seen),
+        )
+    ]
+    if seen.sticks and len(seen.cycles) > 1:
+        found.append(("Cycles over each other", "Each stick and slip, counted from its breakaway.", laid_over(seen)))
+        found.append(("Slips", "How the breakaway forces and the stick times are spread.", histograms(seen)))
+    if seen.at_speeds:
+        found.append(
+            (
+                "Friction over speed",
+                "Mean force and breakaway force at each speed of the drive, 90 %.",
+                over_speed(seen),
+            )
+        )
+    return found
+
+
+def whole(seen: Look, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figure":
+    """The force over time with its slips."""
+    figure, axes = _figure(size_in)
+    for part in seen.parts:
+        _draw(axes, part.t_s, part.sign * part.force_N)
+    if seen.sticks:
+        sign = np.array([cycle.sign for cycle in seen.cycles])
+        tops = np.array([(cycle.breakaway_t_s, cycle.breakaway_force_N) for cycle in seen.cycles])
+        ends = np.array([(cycle.restick_t_s, cycle.restick_force_N) for cycle in seen.cycles])
+        axes.plot(tops[:, 0], sign * tops[:, 1], "v", color=_RED, markersize=4, label="breakaway")
+        axes.plot(ends[:, 0], sign * ends[:, 1], "^", color=_BLUE, markersize=4, label="re-stick")
+        axes.legend(loc="lower right", frameon=False, ncols=2)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("friction coefficient" if seen.known.coefficient else "force [N]")
+    return figure
+
+
+def laid_over(seen: Look) -> "Figure":
+    """The cycles, each from its re-stick before to its own."""
+    figure, axes = _figure((9.0, 3.2))
+    cycles = seen.cycles[:: max(len(seen.cycles) // _MOST_LAID, 1)]
+    for cycle in cycles:
+        part = next((one for one in seen.parts if one.t_s[0] <= cycle.breakaway_t_s <= one.t_s[-1]), None)
+        if part is None or not np.isfinite(cycle.dwell_s) or not np.isfinite(cycle.restick_t_s):
+            continue
+        slip_s = cycle.restick_t_s - cycle.breakaway_t_s
+        own = (part.t_s >= cycle.breakaway_t_s - cycle.dwell_s) & (part.t_s <= cycle.restick_t_s + slip_s)
+        _draw(axes, part.t_s[own] - cycle.breakaway_t_s, part.force_N[own], alpha=max(0.08, 1.0 / len(cycles) ** 0.5))
+    axes.set_xlabel("time from breakaway [s]")
+    axes.set_ylabel("friction coefficient" if seen.known.coefficient else "force along the motion [N]")
+    return figure
+
+
+def histograms(seen: Look) -> "Figure":
+    """Breakaway forces and stick times."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 2.8), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    dwells = np.array([cycle.dwell_s for cycle in seen.cycles])
+    for axes, values, label in (
+        (
+            left,
+            np.array([cycle.breakaway_force_N for cycle in seen.cycles]),
+            "coefficient at breakaway" if seen.known.coefficient else "force at breakaway [N]",
+        ),
+        (right, dwells[np.isfinite(dwells)], "stick time [s]"),
+    ):
+        spread = float(np.ptp(values)) > 1e-6 * abs(
+            float(values.mean())
+        )  # finer than a float can part, there are no bins
+        bins = min(max(int(len(values) ** 0.5) + 1, 5), 40) if spread else 1
+        axes.hist(values, bins=bins, color=_PALE, edgecolor="white")
+        axes.axvline(float(values.mean()), color=_RED, linewidth=1.2)
+        axes.set_xlabel(label)
+        axes.set_ylabel("slips")
+        _plain(axes)
+    return figure
+
+
+def over_speed(seen: Look) -> "Figure":
+    """Friction at each speed; over the load where it is known."""
+    figure, axes = _figure((9.0, 3.2))
+    load = seen.known.load_N
+    scale = 1.0 / load if load else 1.0
+    speeds = [1e3 * one.speed_mps for one in seen.at_speeds]
+    for label, color, numbers in (
+        ("mean", _INK, [one.mean_N for one in seen.at_speeds]),
+        ("breakaway", _RED, [one.breakaway_N for one in seen.at_speeds]),
+    ):
+        rows = [(v, number) for v, number in zip(speeds, numbers, strict=True) if number is not None]
+        if not rows:
+            continue
+        values = np.array([number.value for _, number in rows])
+        errors = np.nan_to_num(np.array([number.high - number.value for _, number in rows]))
+        axes.errorbar(
+            [v for v, _ in rows], scale * values, scale * errors, fmt="o-", color=color, capsize=3, label=label
+        )
+    axes.set_xscale("log")
+    axes.set_xlabel("speed of the drive [mm/s]")
+    axes.set_ylabel("friction coefficient" if load or seen.known.coefficient else "force [N]")
+    axes.legend(frameon=False)
+    return figure
+
+
+def save(figure: "Figure", file: IO[bytes], kind: str, dpi: int = 200, note: str = "") -> None:
+    """Write a figure; `kind` is svg, pdf or png, and `note` goes to its foot and its metadata."""
+    from matplotlib import rc_context
+
+    metadata = {"Title": note} if kind in ("svg", "pdf") else {"Description": note}
+    with rc_context({"svg.fonttype": "none", "pdf.fonttype": 42}):
+        if note:
+            figure.text(0.005, 0.005, note, fontsize=4.5, color="#808b96", va="bottom")
+            figure.get_layout_engine().set(rect=(0.0, 0.03, 1.0, 0.97))  # type: ignore[union-attr]
+        figure.savefig(file, dpi=dpi, format=kind, metadata=metadata | ({"Date": None} if kind == "svg" else {}))
+
+
+def as_svg(figure: "Figure") -> str:
+    """A figure as SVG to stand in a page."""
+    file = io.BytesIO()
+    save(figure, file, "svg")
+    text = file.getvalue().decode()
+    return text[text.index("<svg") :]
+
+
+def _figure(size_in: tuple[float, float]) -> tuple["Figure", Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size_in, layout="constrained")
+    axes = figure.subplots()
+    _plain(axes)
+    return figure, axes
+
+
+def _plain(axes: Any) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _draw(axes: Any, x: Any, y: Any, alpha: float = 1.0) -> None:
+    """A line; of many samples their envelope, in which no slip is lost."""
+    if len(x) > 4 * _COLUMNS:
+        width = len(x) // _COLUMNS
+        whole_columns = len(x) // width * width
+        rows = y[:whole_columns].reshape(-1, width)
+        middle = x[:whole_columns].reshape(-1, width)
+        x = np.column_stack([middle[:, 0], middle[:, width // 2]]).ravel()
+        y = np.column_stack([rows.min(axis=1), rows.max(axis=1)]).ravel()
+    axes.plot(x, y, color=_INK, linewidth=0.8, alpha=alpha)
+    axes.margins(x=0.01)

@@ -1,0 +1,29 @@
+"""A quantity of the command line: a number and its unit, as people write them."""
+
+import math
+import re
+
+from bridge.faults import Fault
+from bridge.tables.unit_words import known_unit, si_unit
+
+_EXAMPLES = {"velocity": "0.5mm/s", "force": "94.5N", "mass": "1.5kg", "frequency": "1kHz"}
+_GRAMS = {"g": 1e-3, "mg": 1e-6}  # where a mass is asked for, g is no acceleration
+
+
+def quantity(option: str, text: str, what: str) -> float | None:
+    """The value in SI, above 0; None for an empty text. Raises Fault CONFIG for another quantity, or no number."""
+    if not text:
+        return None
+    found = re.fullmatch(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", text)
+    example = f"write for example {option} {_EXAMPLES[what]}"
+    try:
+        value = float(found[1]) if found is not None else math.nan
+    except ValueError:
+        value = math.nan
+    unit = "" if found is None else found[2]
+    known = (what, _GRAMS[unit]) if what == "mass" and unit in _GRAMS else known_unit(unit)
+    if not unit:
+        raise Fault("CONFIG", f"{option} {text}: has no unit, and may be in {si_unit(what)} or not; {example}")
+    if not value > 0.0 or not math.isfinite(value) or known is None or known[0] != what:
+        raise Fault("CONFIG", f"{option} {text}: is no {what} above 0; {example}")
+    return value * known[1]

@@ -1,0 +1,212 @@
+"""A measured file and what a person knows of it, as one record; what was assumed, as findings and as a map to correct."""
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.config import read_toml, validate
+from bridge.faults import Fault
+from bridge.log.finding import Finding
+from bridge.tables.kinds import kind_of
+from bridge.tables.readers import read_table
+from bridge.tables.table import Table
+from bridge.tables.unit_words import known_unit
+from cockpit.look.told import of_time, without_outliers
+from diagnosis.evidence.import_table import ImportMap
+from diagnosis.evidence.manifest_keys import ChannelMap
+from diagnosis.evidence.mapped import mapped
+from diagnosis.evidence.run_log import columns_of_log
+from diagnosis.look.guess import Guess, guess
+from diagnosis.look.look import Known
+from diagnosis.look.whose_way import is_of_slide
+
+Floats = npt.NDArray[np.float64]
+
+
+class Asked(NamedTuple):
+    """What the command line says, SI units; None and empty: nothing."""
+
+    speed_mps: float | None = None
+    load_N: float | None = None
+    mass_kg: float | None = None
+    rate_Hz: float | None = None
+    time: str = ""
+    force: str = ""
+    map: Path | None = None
+
+
+class Record(NamedTuple):
+    """A record, [samples] each, SI units."""
+
+    path: Path
+    t_s: Floats
+    force_N: Floats
+    position_m: Floats | None  # of the drive
+    known: Known
+    findings: list[Finding]
+    map_text: str  # a map that reads the file in the same way; empty where one was given, or for a run log
+    of_load: bool  # the force is the friction coefficient: it is told over the load
+
+
+def read_record(path: Path, asked: Asked) -> Record:
+    """Read a table or a run log. Raises Fault BAD_TABLE, BAD_LOG, CONFIG."""
+    if path.is_file() and kind_of(path) == "mcap" and _is_run_log(path):
+        columns, findings = columns_of_log(path)
+        return _record(path, columns, Known(asked.speed_mps, asked.load_N, asked.mass_kg), findings, "")
+    if asked.map is not None:
+        wanted = validate(ImportMap, read_toml(asked.map), asked.map.name)
+        table = read_table(path, wanted.source.dialect, wanted.source.format)
+        columns, findings = mapped(table, wanted.channels, asked.rate_Hz or wanted.source.sample_rate_Hz)
+        speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
+        mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
+        _leave_out(path, columns, findings)
+        if asked.speed_mps is not None:
+            columns.pop("drive_position_m", None)
+        return _record(path, columns, Known(speed, asked.load_N, mass), findings, "")
+    table = read_table(path)
+    found = guess(table, {"time": asked.time, "force": asked.force})
+    channels = _channels(table, found)
+    columns, findings = mapped(table, channels, asked.rate_Hz)
+    findings = [Finding("assumed", path.name, "; ".join(found.reasons)), *findings, *_unitless(table, channels)]
+    load_N, of_load = asked.load_N, not found.force and bool(found.coefficient)
+    if load_N is None and found.load:
+        load_N = _mean_load(table, found.load)
+        findings.append(Finding("assumed", path.name, f"load = mean of {found.load!r}, {load_N:.6g} N"))
+    if of_load:
+        factor = load_N or 1.0
+        columns["drive_force_N"] = columns["drive_force_N"] * factor
+        of_map = channels["drive_force_N"]
+        channels["drive_force_N"] = of_map.model_copy(update={"scale": (of_map.scale or 1.0) * factor})
+        text = f"force = {found.coefficient!r} times a load of {factor:g} N"
+        if load_N is None:
+            text = f"{found.coefficient!r} is told as a coefficient: the load is not known; add --load 94.5N"
+        findings.append(Finding("assumed", path.name, text))
+    _leave_out(path, columns, findings)
+    if found.position and asked.speed_mps is not None:
+        del columns["drive_position_m"], channels["drive_position_m"]
+        findings.append(Finding("assumed", path.name, f"the speed is that of --speed: {found.position!r} is not used"))
+    elif found.position and is_of_slide(columns["t_s"], columns["drive_force_N"], columns["drive_position_m"]):
+        del columns["drive_position_m"]
+        channels["mass_position_m"] = channels.pop("drive_position_m")
+        text = f"{found.position!r} stands still in the sticks: it is the slide's, and tells no speed of the drive"
+        findings.append(Finding("assumed", path.name, f"{text}; add --speed 0.5mm/s"))
+    if (
+        found.speed
+        and not found.position
+        and asked.speed_mps is None
+        and len(table.columns[found.speed]) == len(columns["t_s"])
+    ):
+        columns["drive_position_m"] = _way(columns["t_s"], _si(table, found.speed))
+    known = Known(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None)
+    return _record(path, columns, known, findings, map_text(table, channels, asked), of_load)
+
+
+def _is_run_log(path: Path) -> bool:
+    """Whether a log in MCAP has the sensors of this project."""
+    try:
+        columns_of_log(path)
+    except Fault as fault:
+        if fault.kind.code in ("BAD_LOG", "BAD_MESSAGE"):
+            return False
+        raise
+    return True
+
+
+def _record(
+    path: Path, columns: dict[str, Floats], known: Known, findings: list[Finding], text: str, of_load: bool = False
+) -> Record:
+    if "drive_force_N" not in columns:
+        raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map one in [channels]")
+    position = columns.get("drive_position_m")
+    if position is not None and (
+        not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0
+    ):
+        position = None
+    return Record(path, columns["t_s"], columns["drive_force_N"], position, known, findings, text, of_load)
+
+
+def _leave_out(path: Path, columns: dict[str, Floats], findings: list[Finding]) -> None:
+    """Put NaN for values that are no measurement, and tell which rows the times leave out."""
+    findings += of_time(columns["t_s"], f"{path.name}: t_s")
+    for name in ("drive_force_N", "drive_position_m"):
+        if name in columns:
+            columns[name], told = without_outliers(columns[name], f"{path.name}: {name}")
+            findings += told
+
+
+def _channels(table: Table, found: Guess) -> dict[str, ChannelMap]:
+    channels: dict[str, ChannelMap] = {}
+    if found.time:
+        channels["t_s"] = ChannelMap(column=found.time)
+    if found.force:
+        channels["drive_force_N"] = ChannelMap(column=found.force)
+    else:
+        known = known_unit(table.unit(found.coefficient))
+        channels["drive_force_N"] = ChannelMap(column=found.coefficient, scale=known[1] if known else 1.0)
+    if found.position:
+        channels["drive_position_m"] = ChannelMap(column=found.position)
+    return channels
+
+
+def _si(table: Table, column: str) -> Floats:
+    known = known_unit(table.unit(column))
+    return table.column(column) * (known[1] if known else 1.0)
+
+
+def _mean_load(table: Table, column: str) -> float:
+    values = np.abs(_si(table, column))
+    return float(np.nanmean(values))
+
+
+def _way(t_s: Floats, speed_mps: Floats) -> Floats:
+    """The way at a speed, [samples]."""
+    steps = 0.5 * (speed_mps[1:] + speed_mps[:-1]) * np.diff(t_s)
+    return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(steps), steps, 0.0))])
+
+
+def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
+    """A finding for each channel whose unit nobody states."""
+    taken = {"t_s": "s", "drive_force_N": "N", "drive_position_m": "m"}
+    return [
+        Finding(
+            "assumed",
+            f"{table.path.name}: {channel.column}",
+            f"states no unit: taken as {taken[name]}; a map may say unit = ...",
+        )
+        for name, channel in channels.items()
+        if channel.scale is None and not table.unit(channel.column) and not (name == "t_s" and _is_time(table, channel))
+    ]
+
+
+def _is_time(table: Table, channel: ChannelMap) -> bool:
+    return table.seconds(channel.column)[1]
+
+
+def map_text(table: Table, channels: dict[str, ChannelMap], asked: Asked) -> str:
+    """The map that reads the file as it was read: to be corrected, and given to `--map`."""
+    lines = [f"# how {table.path.name} was read; correct what is wrong and give this file to --map"]
+    source: dict[str, Any] = dict(table.written)
+    source.pop("columns", None)
+    if "t_s" not in channels and (rate_Hz := asked.rate_Hz or table.sample_rate_Hz):
+        source["sample_rate_Hz"] = float(rate_Hz)
+    if source:
+        lines += [
+            "[source]",
+            *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in source.items()),
+            "",
+        ]
+    lines.append("[channels]")
+    for name, channel in channels.items():
+        unit = table.unit(channel.column)
+        keys = [f"column = {json.dumps(channel.column, ensure_ascii=False)}"]
+        if channel.scale is not None:
+            keys.append(f"scale = {channel.scale!r}")
+        elif unit and known_unit(unit):
+            keys.append(f"unit = {json.dumps(unit, ensure_ascii=False)}")
+        lines.append(f"{name} = {{ {', '.join(keys)} }}")
+    if asked.speed_mps is not None:
+        lines += ["", "[run]", f"drive_velocity_mps = {asked.speed_mps!r}"]
+    return "\n".join(lines) + "\n"

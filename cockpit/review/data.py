@@ -1,0 +1,194 @@
+"""What a page shows of one or two logs, as one JSON object; curves are base64 of little-endian float32 in an even time grid."""
+
+import base64
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridge.log.logfile import RunData, block_period_ns, read_run
+from bridge.provenance import Provenance, shown_name
+from bridge.wire.event_codes import EVENTS, LETTERS
+from cockpit.figures.grid import Envelope, Grid, on_grid
+from cockpit.figures.signals import SIGNALS, Floats, Signal, holds, limits_of, samples_of
+from cockpit.judge.verdict import RunVerdict, cycles_of, judge_run
+from cockpit.judge.verdict_words import headline, in_words
+from cockpit.review.bands import bands_of, title_of, used_words
+from cockpit.review.differences import differences, parameters_of
+from cockpit.review.panels import PANELS
+
+FORMAT = "stickslip-review/1"
+# of all logs together where a run is longer: 11 signals of three values are 3.5 MB then; two runs of 20 s are 4.5 MB
+_MOST_BINS = 20_000
+_PER_DECADE = 20  # bars of the histogram of latency
+_MOST_EVENTS = 2000  # of one log that are listed
+
+
+def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any], list[RunVerdict]]:
+    """The page's data and what came of each log. Raises Fault BAD_LOG."""
+    runs = [read_run(path) for path in paths]
+    grid = _grid(runs)
+    verdicts = [judge_run(run) for run in runs]
+    labels = [chr(ord("A") + number) for number in range(len(runs))]
+    shown = [_log(run, verdict, label, grid) for run, verdict, label in zip(runs, verdicts, labels, strict=True)]
+    parameters = [parameters_of(run) for run in runs]
+    rows = [row for run in runs for row in bands_of(run, grid)]
+    data = {
+        "format": FORMAT,
+        "made": made.in_words(),
+        "grid": {"start_s": grid.start_s, "step_s": grid.step_s, "bins": grid.bins},
+        "logs": shown,
+        "figures": _figures(verdicts),
+        "panels": [one for one in (_panel(panel, runs, grid) for panel in PANELS) if one["curves"]],
+        "words": [
+            {"row": title_of(one.column), "word": _said(one.word), "help": one.help.replace("`", "")}
+            for one in used_words(rows)
+        ],
+        "parameters": [{"key": key, "value": value} for key, value in sorted(parameters[0].items())],
+        "differences": [one._asdict() for one in differences([*parameters])] if len(runs) > 1 else [],
+    }
+    return data, verdicts
+
+
+def _grid(runs: Sequence[RunData]) -> Grid:
+    """One grid for all logs: a bin a block, or wider ones where the run is long."""
+    t_s = [run.sensors["t_ns"] * 1e-9 for run in runs if len(run.sensors)]
+    if not t_s:
+        return Grid(0.0, 1e-3, 1)
+    start_s, end_s = min(float(one.min()) for one in t_s), max(float(one.max()) for one in t_s)
+    step_s = min(block_period_ns(run.sensors) for run in runs if len(run.sensors)) * 1e-9
+    most = _MOST_BINS
+    if (end_s - start_s) / step_s > most:
+        step_s = (end_s - start_s) / (most // len(runs))
+    return Grid(start_s, step_s, math.floor((end_s - start_s) / step_s + 0.5) + 1)
+
+
+def _log(run: RunData, verdict: RunVerdict, label: str, grid: Grid) -> dict[str, Any]:
+    cycles = cycles_of(run)
+    return {
+        "label": label,
+        "name": shown_name(run.path.name),
+        "answer": headline(verdict),
+        "good": verdict.good,
+        "in_charge_from_s": verdict.enabled_from_s if verdict.enabled_from_s > 0 and not verdict.imported else None,
+        "slips": []
+        if cycles is None
+        else np.round(np.column_stack([cycles.breakaway_t_s, cycles.breakaway_force_N]), 6).tolist(),
+        "bands": [
+            {"title": row.title, "stretches": [(start, end, _said(word)) for start, end, word in row.stretches]}
+            for row in bands_of(run, grid)
+        ],
+        "events": _events(run),
+        "latency": _latency(run),
+    }
+
+
+def _said(word: str) -> str:
+    return word.lower().replace("_", " ")
+
+
+def _figures(verdicts: Sequence[RunVerdict]) -> list[dict[str, Any]]:
+    """The lines of the verdicts side by side: a row for each thing that they tell, with the words of each log."""
+    told: list[dict[str, list[str]]] = []
+    for verdict in verdicts:
+        lines: dict[str, list[str]] = {}
+        for line in in_words(verdict):
+            what, _, words = line.partition(" ")
+            lines.setdefault(what, []).append(words.strip())
+        told.append(lines)
+    names = list(dict.fromkeys(name for lines in told for name in lines if name != "log"))
+    return [{"what": name, "logs": [lines.get(name, []) for lines in told]} for name in names]
+
+
+def _panel(panel: Any, runs: Sequence[RunData], grid: Grid) -> dict[str, Any]:
+    signals = [SIGNALS[name] for name in panel.signals]
+    curves = [
+        _curve(run, number, signal, grid)
+        for signal in signals
+        for number, run in enumerate(runs)
+        if holds(run, signal.name)
+    ]
+    limits = [limits_of(run, signals[0].axis) for run in runs]
+    named = [
+        (words if len({*map(tuple, limits)}) == 1 else f"{words} ({chr(ord('A') + number)})", value)
+        for number, one in enumerate(limits)
+        for words, value in one
+    ]
+    return {
+        "title": panel.title,
+        "hint": panel.hint,
+        "unit": signals[0].unit,
+        "axis": signals[0].axis,
+        "open": panel.is_open,
+        "empty": not any(one["known"] for one in curves),
+        "slips": panel.signals[0] == "drive_force_N",
+        "limits": [{"words": words, "value": value * signals[0].factor} for words, value in dict.fromkeys(named)],
+        "curves": curves,
+    }
+
+
+def _curve(run: RunData, number: int, signal: Signal, grid: Grid) -> dict[str, Any]:
+    t_s, values = samples_of(run, signal)
+    made = on_grid(t_s, values * signal.factor, grid)
+    if signal.topic != "sensors" and len(t_s) > 1:
+        made = _held(made, math.ceil(float(np.median(np.diff(t_s))) / grid.step_s - 0.5))
+    curve = {
+        "log": number,
+        "name": signal.name,
+        "symbol": signal.symbol,
+        "words": signal.words,
+        "colour": signal.colour,
+        "known": bool(np.isfinite(made.mean).any()),
+        "mean": _packed(made.mean),
+    }
+    if not np.array_equal(made.least, made.most, equal_nan=True):
+        curve |= {"least": _packed(made.least), "most": _packed(made.most)}
+    return curve
+
+
+def _held(made: Envelope, bins: int) -> Envelope:
+    """Values that come every so many bins hold until the next one comes."""
+    if bins <= 1:
+        return made
+    known = np.flatnonzero(np.isfinite(made.mean))
+    if not len(known):
+        return made
+    every = np.arange(len(made.mean))
+    before = known[np.maximum(np.searchsorted(known, every, side="right") - 1, 0)]
+    near = (every >= before) & (every - before < bins)
+    return Envelope(*(np.where(near, values[before], np.nan) for values in made))
+
+
+def _packed(values: Floats) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")
+
+
+def _events(run: RunData) -> list[dict[str, Any]]:
+    # pauses of the machine may be many, and must not crowd out what matters
+    first = sorted(run.events, key=lambda one: (one.code.endswith("PAUSE"), one.t_ns))[:_MOST_EVENTS]
+    events = sorted(first, key=lambda one: one.t_ns)
+    return [
+        {
+            "t_s": round(one.t_ns * 1e-9, 6),
+            "source": one.source,
+            "code": one.code,
+            "text": one.text,
+            "help": EVENTS[one.code].help.replace("`", "") if one.code in EVENTS else "",
+            "weight": LETTERS[EVENTS[one.code].letter] if one.code in EVENTS else "",
+        }
+        for one in events
+    ]
+
+
+def _latency(run: RunData) -> dict[str, Any] | None:
+    """How often a command took how long, from the block out to its command in; None in lockstep and without commands."""
+    round_trip_us = run.applied["round_trip_ns"][run.applied["round_trip_ns"] > 0] * 1e-3
+    if not len(round_trip_us):
+        return None
+    lowest = math.floor(math.log10(float(round_trip_us.min())) * _PER_DECADE)
+    highest = math.floor(math.log10(float(round_trip_us.max())) * _PER_DECADE) + 1
+    edges_us = 10.0 ** (np.arange(lowest, highest + 1) / _PER_DECADE)
+    counts = np.histogram(round_trip_us, edges_us)[0]
+    return {"edges_us": [round(float(one), 3) for one in edges_us], "counts": counts.tolist()}

@@ -1,0 +1,180 @@
+// The page: the answer first, then figures, differences, curves, latency, events and words. Texts are set as texts, never as HTML.
+"use strict";
+
+const data = JSON.parse(document.getElementById("data").textContent);
+const logs = data.logs;
+const axis = new TimeAxis(data.grid.start_s, data.grid.start_s + (data.grid.bins - 1) * data.grid.step_s);
+
+/** An element with a text or with children; `more` are its properties. */
+function made(tag, content, more = {}) {
+  const element = Object.assign(document.createElement(tag), more);
+  element.append(...(Array.isArray(content) ? content : [content]).flatMap((one) => (typeof one === "string" ? rich(one) : [one])));
+  return element;
+}
+
+function into(id, ...children) {
+  document.getElementById(id).append(...children);
+}
+
+function table(head, rows) {
+  const heads = made("tr", head.map((text) => made("th", text)));
+  return made("div", [made("table", [heads, ...rows])], { className: "wide" });
+}
+
+function answers() {
+  for (const log of logs) {
+    const name = logs.length > 1 ? `${log.label}: ${log.name}` : log.name;
+    into("answers", made("p", [made("small", name), log.answer], { className: `verdict ${log.good ? "good" : "bad"}` }));
+  }
+  if (logs.length < 2) return;
+  const first = data.differences.slice(0, 4).map((row) => `${row.key} ${row.values.map((value) => value || "(none)").join(" \u2192 ")}`);
+  const more = data.differences.length - first.length;
+  const told = first.length ? `From A to B: ${first.join("; ")}${more > 0 ? `; and ${more} more below` : ""}.` : "A and B have the same parameters.";
+  into("answers", made("p", told));
+}
+
+function figures() {
+  const rows = data.figures.map((row) => {
+    const cells = row.logs.map((lines) => made("td", lines.length ? lines.flatMap((line, at) => (at ? [made("br", ""), line] : [line])) : "\u2013"));
+    return made("tr", [made("td", row.what, { className: "key" }), ...cells], { className: row.what === "warning" ? "warning" : "" });
+  });
+  into("figures", made("h2", "What came of it"), table(["", ...logs.map((log) => (logs.length > 1 ? `${log.label}: ${log.name}` : log.name))], rows));
+}
+
+function differences() {
+  if (logs.length < 2) return;
+  const rows = data.differences.map((row) => made("tr", [made("td", row.key), ...row.values.map((value) => made("td", value || "(none)"))]));
+  into("differences", made("h2", "Parameters that differ"));
+  into("differences", rows.length ? table(["parameter", ...logs.map((log) => log.label)], rows) : made("p", "None: both logs hold the same."));
+}
+
+function curves() {
+  const x = Array.from({ length: data.grid.bins }, (_, at) => data.grid.start_s + at * data.grid.step_s);
+  document.getElementById("key").hidden = logs.length > 1;
+  const step_ms = 1e3 * data.grid.step_s;
+  document.getElementById("step").textContent = `${Number(step_ms.toPrecision(3))} ms`;
+  for (const panel of data.panels) {
+    const place = made("div", []);
+    const hint = made("p", panel.empty ? `${panel.hint} There is none in this run.` : panel.hint, { className: "small" });
+    if (panel.empty) {
+      into("curves", made("h3", panel.title), hint);
+      continue;
+    }
+    if (panel.open) {
+      into("curves", made("h3", panel.title), hint, place);
+      plotOf(place, panel, x, logs, axis);
+      continue;
+    }
+    const folded = made("details", [made("summary", panel.title), hint, place]);
+    folded.addEventListener("toggle", () => {
+      if (folded.open && !place.childElementCount) plotOf(place, panel, x, logs, axis);
+    });
+    into("curves", folded);
+  }
+}
+
+function zoom() {
+  const on = (id, work) => document.getElementById(id).addEventListener("click", work);
+  const width = () => axis.to - axis.from, middle = () => (axis.from + axis.to) / 2;
+  on("whole", () => axis.show(axis.least, axis.most));
+  on("nearer", () => axis.around(middle(), width() / 2));
+  on("farther", () => axis.around(middle(), width() * 2));
+  on("back", () => axis.show(axis.from - width() / 2, axis.to - width() / 2));
+  on("forth", () => axis.show(axis.from + width() / 2, axis.to + width() / 2));
+  const slips = logs.flatMap((log) => log.slips.map(([t_s]) => t_s)).sort((one, other) => one - other);
+  const button = document.getElementById("slip");
+  button.disabled = !slips.length;
+  let last = -Infinity;
+  on("slip", () => {
+    last = slips.find((t_s) => t_s > last) ?? slips[0];
+    axis.around(last, 0.3);
+  });
+  const tell = () => {
+    const [from, to] = [axis.from.toFixed(3), axis.to.toFixed(3)];
+    document.getElementById("shown").textContent = `${from} to ${to} s`;
+    history.replaceState(null, "", axis.to - axis.from < axis.most - axis.least ? `#${from}-${to}` : location.pathname);
+  };
+  axis.listeners.push(tell);
+  tell();
+}
+
+/** The histogram of latency as SVG: a bar for each stretch of time, its height the logarithm of how many. */
+function latency() {
+  const with_ = logs.filter((log) => log.latency);
+  into("latency", made("h2", "From a block to its command"));
+  if (!with_.length) {
+    into("latency", made("p", "Not measured: the run was in lockstep, in one process, or without a controller.", { className: "small" }));
+    return;
+  }
+  into("latency", made("p", "How many commands took how long; both axes are logarithmic. What is right of 1 ms came too late for its block.", { className: "small" }));
+  const w = 900, h = 200, left = 60, bottom = 40;
+  const least = Math.min(...with_.map((log) => log.latency.edges_us[0])), most = Math.max(1500, ...with_.map((log) => log.latency.edges_us.at(-1)));
+  const highest = Math.max(...with_.flatMap((log) => log.latency.counts));
+  const px = (us) => left + ((w - left - 10) * Math.log(us / least)) / Math.log(most / least);
+  const py = (count) => h - bottom - ((h - bottom - 10) * Math.log10(1 + count)) / Math.log10(1 + highest);
+  const svg = (tag, attributes, text = "") => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+    element.textContent = text;
+    return element;
+  };
+  const picture = svg("svg", { viewBox: `0 0 ${w} ${h}`, style: "width: 100%; max-width: 900px", "font-size": 12, role: "img", "aria-label": "histogram of latency" });
+  for (const log of with_) {
+    const fill = log === logs[0] ? "#2a6fb5" : "none";
+    log.latency.counts.forEach((count, at) => {
+      const [from, to] = [px(log.latency.edges_us[at]), px(log.latency.edges_us[at + 1])];
+      picture.append(svg("rect", { x: from, y: py(count), width: to - from, height: h - bottom - py(count), fill, stroke: fill === "none" ? "#b5402a" : "none" }));
+    });
+  }
+  picture.append(svg("line", { x1: px(1000), x2: px(1000), y1: 5, y2: h - bottom, stroke: "#b5402a", "stroke-dasharray": "6 4" }));
+  const ticks = [1, 10, 100, 1e3, 1e4, 1e5, 1e6].flatMap((us) => [us, 2 * us, 5 * us]);
+  for (const us of ticks.filter((one) => one >= least && one <= most)) picture.append(svg("text", { x: px(us), y: h - bottom + 16, "text-anchor": "middle" }, us < 1000 ? `${us} µs` : `${us / 1000} ms`));
+  for (let count = 1; count <= highest; count *= 10) picture.append(svg("text", { x: left - 6, y: py(count) + 4, "text-anchor": "end" }, String(count)));
+  picture.append(svg("text", { x: (left + w) / 2, y: h - 6, "text-anchor": "middle" }, "from the block out to its command in"));
+  picture.append(svg("line", { x1: left, x2: w - 10, y1: h - bottom, y2: h - bottom, stroke: "#808b96" }));
+  picture.append(svg("text", { x: 0, y: 14 }, "commands"));
+  into("latency", picture);
+  if (with_.length > 1) into("latency", made("p", "Filled: A. Outlined: B.", { className: "small" }));
+}
+
+function events() {
+  const all = logs.flatMap((log) => log.events.map((event) => ({ ...event, log: log.label }))).sort((one, other) => one.t_s - other.t_s);
+  const isPause = (event) => event.code.endsWith("PAUSE");
+  const row = (event) => {
+    const cells = [event.t_s.toFixed(3), ...(logs.length > 1 ? [event.log] : []), event.source, event.code, event.text, event.help];
+    const line = made("tr", cells.map((text, at) => made("td", text, { className: at ? (cells.length - at > 2 ? "key" : "") : "number" })), { className: "go" });
+    line.addEventListener("click", () => {
+      axis.around(event.t_s, 1);
+      document.getElementById("zoom").scrollIntoView({ behavior: "smooth" });
+    });
+    return line;
+  };
+  const head = ["time [s]", ...(logs.length > 1 ? ["log"] : []), "who", "event", "its words", "what it means"];
+  into("events", made("h2", "Events"), table(head, all.filter((event) => !isPause(event)).map(row)));
+  const pauses = all.filter(isPause);
+  if (pauses.length) into("events", made("details", [made("summary", `${pauses.length} pauses of the machine`), table(head, pauses.map(row))]));
+}
+
+function words() {
+  if (!data.words.length) return;
+  const rows = data.words.map((one) => made("tr", [made("td", one.row), made("td", one.word), made("td", one.help)]));
+  into("words", made("h2", "Words of the rows above the curves"), table(["row", "word", "what it means"], rows));
+}
+
+function parameters() {
+  const rows = data.parameters.map((one) => made("tr", [made("td", one.key), made("td", one.value)]));
+  into("parameters", made("h2", "Parameters"), made("details", [made("summary", `all ${rows.length} of ${logs[0].name}`), table(["parameter", "value"], rows)]));
+}
+
+answers();
+figures();
+differences();
+ribbon(document.getElementById("ribbon"), logs, axis, new Map(data.words.map((one) => [one.word, one.help])));
+curves();
+zoom();
+latency();
+events();
+words();
+parameters();
+into("made", `Made by ${data.made}`);
+document.body.dataset.ready = "yes";

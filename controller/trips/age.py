@@ -1,0 +1,43 @@
+"""How old the blocks are when they come, against the youngest that ever came: a link or a rig that became slow.
+
+The clocks of rig and controller are two: what they drift apart is forgotten, and with it a delay that has been there for minutes.
+"""
+
+MARGIN_NS = 15_000_000  # by which the loop may be late: v_a then stays within 4 %
+HOLD_NS = 200_000_000  # for which blocks are older until it is told: a pause of the machine is made up for in less
+_DRIFT = 2e-4  # of two clocks
+
+
+class Age:
+    """Follows the age of blocks."""
+
+    def __init__(self) -> None:
+        self.late_ns = 0  # of the last block, against the youngest
+        self._youngest_ns = 0.0
+        self._last_ns: int | None = None
+        self._since_ns: int | None = None
+
+    @property
+    def is_late(self) -> bool:
+        """Whether every block of the last HOLD_NS was older than the margin."""
+        return self._since_ns is not None and self._last_ns is not None and self._last_ns - self._since_ns >= HOLD_NS
+
+    def note(self, arrival_ns: int, t_ns: int) -> None:
+        """Take a block: when it came by the controller's clock, and its time by the rig's."""
+        if arrival_ns <= 0:  # in one process there is no clock
+            return
+        age_ns = float(arrival_ns - t_ns)
+        if self._last_ns is None:
+            self._youngest_ns = age_ns
+        else:
+            self._youngest_ns = min(age_ns, self._youngest_ns + _DRIFT * (arrival_ns - self._last_ns))
+        self._last_ns = arrival_ns
+        self.late_ns = round(age_ns - self._youngest_ns)
+        if self.late_ns <= MARGIN_NS:
+            self._since_ns = None
+        elif self._since_ns is None:
+            self._since_ns = arrival_ns
+
+    def forget(self) -> None:
+        """Begin anew, as the rig's clock jumped or began anew."""
+        self._last_ns = self._since_ns = None

@@ -1,0 +1,122 @@
+"""v_a as measured, against what the command gives by the known gain, while the command is even.
+
+Less than the band allows: OPEN_LOOP, or what a look at the block says more. A gain that is lost within a second, by more than
+the band, trips as well. A slow loss inside of the band is what an exciter does that warms up; beyond it `band` holds the stroke.
+More than the band allows: RESONANCE, and the command follows down, as a mount may have come loose.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import CLIPPED, FROZEN, NOISE, OPEN_LOOP, SWAPPED
+from controller.trips.band import is_known
+from controller.trips.doubts import ACCELEROMETER, OF_BASE, trip
+from controller.vibration import velocity_of
+
+_TWO_PI = 2.0 * math.pi
+SOME = 4  # steps in which what need not be quick is looked at once
+_EVEN = 0.05  # change of the commanded v_a, over its low-pass, up to which it is even
+HOLD_S = 0.05  # of too little v_a until it trips; the band bounds v_a meanwhile
+LOUD_HOLD_S = 0.1  # of too much, until it is told; a slip that shakes the base is shorter
+PASSED_S = 1.0  # without too much until that is over
+FOLLOW_S = 1.0  # time constant of the gain that a sudden loss is compared with
+_NO_SINE = 0.25  # mean square beside the sine, over that of the sine, from which an acceleration is no sine any more
+_NOISIER = 16.0  # and over what it was before
+_AT_EXTREME = 0.99  # of the largest sample of a block, from which another is as large
+_CLIPPED_SHARE = 0.3  # of samples at the extremes; a sine has 0.09 there
+_MOST_OFF = 1.6  # factor by which the slide's accelerometer may miss the known gain when it is in the base's place
+
+
+@kernel
+def note_command(s: Record, expected_mps: float) -> None:
+    """Count for how many steps the commanded v_a that is heard now has been even [m/s]."""
+    apart_mps = math.fabs(expected_mps - s.expected_mps)
+    s.even_steps = s.even_steps + 1 if expected_mps > 0.0 and apart_mps < _EVEN * expected_mps else 0
+
+
+@kernel
+def is_even(p: Record, s: Record) -> bool:
+    """Whether the measured v_a can be compared with the commanded one, whichever of the delays that were seen holds."""
+    return s.even_steps > p.settle_steps + s.loop_delay_steps // 2 and s.demodulated_Hz == s.allowed_Hz
+
+
+@kernel
+def watch_delivered(p: Record, s: Record, block: Record) -> None:
+    """Compare; trip where v_a is too little for its hold time, and count for how long it is too much."""
+    i = s.candidate
+    if s.followed != i:
+        s.followed, s.followed_gain, s.low_steps = i, s.known_gain[i], 0
+    if not is_known(p, s, i) or not is_even(p, s):
+        s.high_steps = min(s.high_steps + 1, 0)
+        return
+    now_mps, per_band = s.vibration_velocity_mps, 1.0 / p.gain_band
+    least = max(s.followed_gain, s.known_gain[i] * per_band) * per_band
+    if now_mps < least * s.expected_mps:
+        s.low_steps += 1
+        if s.low_steps > p.low_steps:
+            trip(s, _cause(p, s, block), ACCELEROMETER)
+    else:
+        s.low_steps = 0
+        if s.steps % SOME == 0:
+            s.followed_gain += p.follow_share * (now_mps / s.expected_mps - s.followed_gain)
+    high = now_mps > s.known_gain[i] * p.gain_band * s.expected_mps
+    if high and s.high_steps < 0:
+        s.high_steps = -p.passed_steps
+    elif high:
+        s.high_steps = s.high_steps + 1 if s.high_steps < p.high_steps else -p.passed_steps
+    else:
+        s.high_steps = min(s.high_steps + 1, 0)
+
+
+@kernel
+def _cause(p: Record, s: Record, block: Record) -> int:
+    """What a block says of an accelerometer that shows too little: clipped, the slide's instead of the base's, or neither."""
+    if clips(block.base_accel_mps2):
+        return CLIPPED
+    of_slide_mps = velocity_of(p, s.demodulated_Hz, block.mass_accel_mps2)
+    known_mps = s.expected_mps * s.known_gain[s.candidate]
+    if known_mps / _MOST_OFF < of_slide_mps < known_mps * _MOST_OFF:
+        return SWAPPED
+    return OPEN_LOOP
+
+
+@kernel
+def clips(samples: Record) -> bool:
+    """Whether samples stay at their extremes for longer than a sine does."""
+    largest, at_extreme = 0.0, 0
+    for i in range(samples.shape[0]):
+        largest = max(largest, math.fabs(float(samples[i])))
+    for i in range(samples.shape[0]):
+        at_extreme += 1 if math.fabs(float(samples[i])) >= _AT_EXTREME * largest else 0
+    return largest > 0.0 and at_extreme > _CLIPPED_SHARE * samples.shape[0]
+
+
+@kernel
+def watch_rest(p: Record, s: Record, block: Record) -> None:
+    """Trip where the acceleration is no sine any more, though it was: clipped, or drowned in noise. Once in SOME steps.
+
+    The sine is that of the wanted v_a: noise that is far louder is taken for v_a, and less is commanded.
+    """
+    if s.wanted_velocity_mps == 0.0 or not is_known(p, s, s.candidate):
+        return
+    square = 0.0
+    for i in range(block.base_accel_mps2.shape[0]):
+        square += float(block.base_accel_mps2[i]) * float(block.base_accel_mps2[i])
+    fitted_mps2_2 = 0.5 * (s.in_phase_mps2 * s.in_phase_mps2 + s.quadrature_mps2 * s.quadrature_mps2)
+    rest_mps2_2 = max(square / block.base_accel_mps2.shape[0] - fitted_mps2_2, 0.0)
+    wanted_mps2 = _TWO_PI * s.wanted_Hz * s.wanted_velocity_mps
+    if s.rest_mps2_2 > 0.0 and rest_mps2_2 > max(_NOISIER * s.rest_mps2_2, _NO_SINE * 0.5 * wanted_mps2 * wanted_mps2):
+        s.rest_steps += SOME
+        if s.rest_steps > p.low_steps:
+            repeats = s.same_steps[OF_BASE] >= SOME
+            trip(s, FROZEN if repeats else CLIPPED if clips(block.base_accel_mps2) else NOISE, ACCELEROMETER)
+        return
+    s.rest_steps = 0
+    if is_even(p, s):
+        s.rest_mps2_2 += (p.follow_share if s.rest_mps2_2 > 0.0 else 1.0) * (rest_mps2_2 - s.rest_mps2_2)
+
+
+@kernel
+def is_loud(s: Record) -> bool:
+    """Whether more v_a is measured than the known gain gives, now or a moment ago."""
+    return s.high_steps < 0

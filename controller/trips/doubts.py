@@ -1,0 +1,46 @@
+"""Which signals are doubted, and what follows.
+
+A doubted accelerometer: the vibration goes on open loop, at the known gain. A doubted force, or place of the slide: it vibrates
+whenever the drive moves, as where it is blind. A doubted place of the drive: it fades to zero, as no v_a can be related to v_d.
+A trip stays until a person has looked: a reset, or a new loop check of the rig.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import CHECKING, RESET
+from controller.trips.band import begin_known
+
+ACCELEROMETER, CONTACT, DRIVE = 1, 2, 4  # bits of `s.doubted`
+OF_FORCE, OF_SLIDE, OF_DRIVE, OF_BASE = range(4)  # channels, in `s.same_steps`
+CHANNELS = 4
+
+
+@kernel
+def trip(s: Record, reason: int, doubts: int) -> None:
+    """Doubt signals; the first trip is the one that is told until it ends."""
+    if s.trip == 0:
+        s.trip = reason
+    s.doubted |= doubts
+
+
+@kernel
+def end_trips(p: Record, s: Record, events: int) -> None:
+    """End all trips on a person's reset; a loop check begins the known gain anew, too."""
+    if events & RESET:
+        _forget(s)
+        for i in range(p.candidates):  # without a step: what a doubted accelerometer taught is forgotten
+            if s.known_steps[i] > 0:
+                s.log_gain[i] = math.log(s.known_gain[i])
+    if s.guard_state == CHECKING:
+        _forget(s)
+        s.gain_known[:] = 0
+        begin_known(p, s)
+
+
+@kernel
+def _forget(s: Record) -> None:
+    s.trip, s.doubted = 0, 0
+    s.low_steps, s.high_steps = 0, 0
+    s.rest_steps, s.broken_steps = 0, 0
+    s.same_steps[:] = 0

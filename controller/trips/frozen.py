@@ -1,0 +1,107 @@
+"""Channels that repeat their bits: a converter that hangs, a wire that is cut, a range that is at its end.
+
+A channel that has noise never shows the same number for long. Whether it has is learnt from the samples of a block, apart for a
+drive that moves and one that stands: noise goes up and down within a block, while the steps of an encoder without noise go one
+way, and show one number for hours where the drive stands.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import DRIVE_DOUBTED, FROZEN
+from controller.trips.doubts import (
+    ACCELEROMETER,
+    CHANNELS,
+    CONTACT,
+    DRIVE,
+    OF_BASE,
+    OF_DRIVE,
+    OF_FORCE,
+    OF_SLIDE,
+    trip,
+)
+from controller.trips.noise import look_at_noise
+
+HOLD_S, FEWEST = (
+    0.05,
+    40,
+)  # of equal samples, and blocks of them, until it trips: at a noise of one step half of all are equal
+_FASTEST_MPS = 100.0  # of a drive; a place that goes faster was not gone through
+_LOOK_STEPS = 16  # blocks from one look at the noise of a channel to that of the next
+_LOOKS = 8  # until a channel counts as one with noise
+_LIVELY = 0.9  # share of the looks that must show it
+_SAME = 4  # equal samples in a row from which a look says nothing of the noise
+
+
+@kernel
+def watch_frozen(p: Record, s: Record, block: Record) -> None:
+    """Count blocks that begin with the same number as the one before; trip where a channel that has noise shows none.
+
+    A drive that is somewhere else from one block to the next has another unit, or another channel's wire.
+    """
+    if s.steps % _LOOK_STEPS == 0:
+        _look_at_one(s, block)
+        look_at_noise(s, block.drive_position_m)
+    blocks = s.block - s.seen_block
+    s.seen_block = s.block
+    went_m = math.fabs(float(block.drive_position_m[0]) - s.first_sample[OF_DRIVE])
+    if blocks > 0 and s.first_seen == 1 and went_m > _FASTEST_MPS * blocks * p.block_s:
+        trip(s, DRIVE_DOUBTED, DRIVE)
+    s.first_seen = 1
+    if p.use_force == 1 and _repeats(p, s, OF_FORCE, float(block.drive_force_N[0])):
+        trip(s, FROZEN, CONTACT)
+    if p.use_slide_position == 1 and _repeats(p, s, OF_SLIDE, float(block.mass_position_m[0])):
+        trip(s, FROZEN, CONTACT)
+    if _repeats(p, s, OF_DRIVE, float(block.drive_position_m[0])):
+        trip(s, FROZEN, DRIVE)
+    if _repeats(p, s, OF_BASE, float(block.base_accel_mps2[0])):
+        trip(s, FROZEN, ACCELEROMETER)
+
+
+@kernel
+def _look_at_one(s: Record, block: Record) -> None:
+    """Look at one channel in turn."""
+    channel = s.looked % CHANNELS
+    s.looked += 1
+    if s.same_steps[channel] >= _SAME:
+        return
+    if channel == OF_FORCE:
+        shows = _goes_up_and_down(block.drive_force_N)
+    elif channel == OF_SLIDE:
+        shows = _goes_up_and_down(block.mass_position_m)
+    elif channel == OF_DRIVE:
+        shows = _goes_up_and_down(block.drive_position_m)
+    else:
+        shows = _goes_up_and_down(block.base_accel_mps2)
+    way = _state(s, channel)
+    s.looks[channel, way] = min(s.looks[channel, way] + 1, _LOOKS)
+    s.lively[channel, way] += ((1.0 if shows else 0.0) - s.lively[channel, way]) / s.looks[channel, way]
+
+
+@kernel
+def _state(s: Record, channel: int) -> int:
+    """What the noise of a channel depends on: whether the base vibrates, or the drive moves."""
+    if channel == OF_BASE:
+        return 1 if s.allowed_m > 0.0 else 0
+    return s.moving
+
+
+@kernel
+def _goes_up_and_down(samples: Record) -> bool:
+    went = 0.0
+    for i in range(1, samples.shape[0]):
+        step = float(samples[i]) - float(samples[i - 1])
+        if step * went < 0.0:
+            return True
+        went = step if step != 0.0 else went
+    return False
+
+
+@kernel
+def _repeats(p: Record, s: Record, channel: int, first: float) -> bool:
+    same = s.same_steps[channel] + 1 if first == s.first_sample[channel] else 0
+    s.same_steps[channel], s.first_sample[channel] = same, first
+    if same <= p.frozen_steps:
+        return False
+    way = _state(s, channel)
+    return s.looks[channel, way] == _LOOKS and s.lively[channel, way] > _LIVELY

@@ -1,0 +1,48 @@
+"""Noise that becomes many times larger: the windows learn it anew, as what they knew of it would pass noise for motion.
+
+And slips of which there are more than the spring could wind up for: they are noise.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.estimate.windows import DRIVE, LEVELS
+from controller.trips.delivered import SOME
+
+_LOUDER = 4.0  # bend of the drive's place from sample to sample, over what it was, from which its noise is another
+_LEARN = 1.0 / 16.0  # share of one look
+_SLIPS_S = 1.0  # time constant of the count of slips
+_MOST_SLIPS, _TIMES = 8.0, 3.0  # in it, besides what the spring can wind up for, and times that
+_UNBELIEVED_S = 2.0  # for which slips are not believed after too many of them
+_TOLD_S = 2.0  # for which noise that became larger is told
+
+
+@kernel
+def look_at_noise(s: Record, samples: Record) -> None:
+    """Follow the bend of the drive's place within a block; begin to learn the noise anew after two looks at much more of it."""
+    bend_m = 0.0
+    for i in range(2, samples.shape[0]):
+        bend_m += math.fabs(float(samples[i]) - 2.0 * float(samples[i - 1]) + float(samples[i - 2]))
+    bend_m /= samples.shape[0] - 2
+    floor_m = s.resolution[DRIVE]
+    if s.bend_m > 0.0 and bend_m > _LOUDER * max(s.bend_m, floor_m):
+        s.bent += 1
+        if s.bent >= 2:
+            for level in range(LEVELS):
+                s.differences[level] = 0
+                s.sigma[:, level], s.noise[:, level] = 0.0, 0.0
+            s.bend_m, s.bent, s.noise_told_s = bend_m, 0, _TOLD_S
+        return
+    s.bent = 0
+    s.bend_m = bend_m if s.bend_m == 0.0 else s.bend_m + _LEARN * (bend_m - s.bend_m)
+
+
+@kernel
+def watch_slips(p: Record, s: Record) -> None:
+    """Do not believe slips for a while where there are too many. Once in SOME steps."""
+    some_s = SOME * p.block_s
+    s.slip_count *= 1.0 - min(some_s / _SLIPS_S, 1.0)
+    s.unbelieved_s = max(s.unbelieved_s - some_s, 0.0)
+    s.noise_told_s = max(s.noise_told_s - some_s, 0.0)
+    if s.slip_count > _MOST_SLIPS and s.slip_count * s.expected_stick_s > _TIMES * _SLIPS_S:
+        s.unbelieved_s = _UNBELIEVED_S

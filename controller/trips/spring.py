@@ -1,0 +1,89 @@
+"""Force and positions against the law of the drive's spring: F' = k_d (v_d - v_s).
+
+The law holds while the slide sticks, slips, slides and vibrates, as the force is that of the spring. It does not hold where the
+force is dead, frozen, of another gain or sign and the spring is wound up, nor where a position has another unit. It is looked at
+in the shortest window in which half of v_d stands out from the noise, and doubted once it is broken for longer than a window
+remembers a jump. The place of the drive is doubted where v_d is what changed, else the force, or the place of the slide, which
+the contact is judged by. Meanwhile v_d counts as before, and slips are not believed.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import DRIVE_DOUBTED, FORCE_DOUBTED
+from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
+from controller.trips.delivered import SOME
+from controller.trips.doubts import CONTACT, trip
+from controller.trips.doubts import DRIVE as DRIVE_DOUBT
+
+SHORTEST_S = 0.01  # window; shorter: a force that comes 2 ms late breaks the law in every slip
+HOLD_S, _WINDOWS = 0.05, 2.0  # and windows, in which the law is broken until it trips
+FIRST_S = 0.015  # of them, that say which signal it is
+_SIGMAS = 8.0
+# Of the larger of the two sides by which they may differ: a spring is softer or stiffer at places by a factor of 5. Where k_d is
+# told and not learnt yet, by a factor of 20.
+_OFF, _TOLD_OFF = 0.8, 0.95
+_HALF = 0.5  # of v_d: a difference that counts
+_TWICE = 2.0  # change of v_d over that of v_s from which the drive is what changed
+
+
+@kernel
+def watch_spring(p: Record, s: Record) -> None:
+    """Look at one window; trip where it has broken the law for too long. Once in SOME steps."""
+    level = _level(p, s)
+    if level < 0:
+        return
+    if s.broken_steps == 0:  # a fault teaches another stiffness
+        s.kept_N_per_m = s.stiffness_N_per_m
+    by_force_mps = s.slope[FORCE, level] / s.kept_N_per_m
+    drive_mps, slide_mps = s.slope[DRIVE, level], s.slope[SLIDE, level]
+    apart_mps = drive_mps - slide_mps
+    off_mps = math.fabs(apart_mps - by_force_mps)
+    larger_mps = max(math.fabs(apart_mps), math.fabs(by_force_mps))
+    counts_mps = _HALF * _largest_mps(p, s)
+    most_off = _OFF if s.stiffness_learnt == 1 else _TOLD_OFF
+    if off_mps <= most_off * larger_mps or off_mps <= counts_mps:
+        s.broken_steps = max(s.broken_steps - (SOME if larger_mps > counts_mps else SOME // 2), 0)
+        if s.broken_steps == 0:
+            s.kept_mps[DRIVE], s.kept_mps[SLIDE] = drive_mps, slide_mps
+        return
+    drive_by_mps, slide_by_mps = math.fabs(drive_mps - s.kept_mps[DRIVE]), math.fabs(slide_mps - s.kept_mps[SLIDE])
+    if s.broken_steps == 0:
+        s.broken_drive = 0
+    s.broken_steps += SOME
+    if s.broken_steps <= p.first_steps:  # later the slide has changed, too, as the vibration follows v_d
+        s.broken_drive += 1 if drive_by_mps > _TWICE * slide_by_mps else -1
+    if s.broken_steps > p.broken_steps + _WINDOWS * p.window_s[level] / p.block_s:
+        if s.broken_drive > 0:
+            trip(s, DRIVE_DOUBTED, DRIVE_DOUBT)
+        else:
+            trip(s, FORCE_DOUBTED, CONTACT)
+
+
+@kernel
+def _largest_mps(p: Record, s: Record) -> float:
+    return max(math.fabs(s.kept_mps[DRIVE]), math.fabs(s.drive_velocity_mps), p.least_feed_mps)
+
+
+@kernel
+def _level(p: Record, s: Record) -> int:
+    """The shortest windows in which half of v_d stands out from the noise; -1 for none. Once broken, the same as before."""
+    if s.broken_steps > 0:
+        return s.spring_level
+    counts_mps = _HALF * _largest_mps(p, s)
+    for level in range(p.spring_level, p.levels):
+        if s.pushed[level] < 2 * BINS or s.differences[level] < WELL_KNOWN:
+            return -1
+        by_noise_mps = s.noise[FORCE, level] / s.stiffness_N_per_m
+        noise_slide, noise_drive = s.noise[SLIDE, level], s.noise[DRIVE, level]
+        square = by_noise_mps * by_noise_mps + noise_slide * noise_slide + noise_drive * noise_drive
+        if _SIGMAS * _SIGMAS * square < counts_mps * counts_mps:
+            s.spring_level = level
+            return level
+    return -1
+
+
+@kernel
+def is_drive_off(s: Record) -> bool:
+    """Whether the law is broken now, and the drive is what changed."""
+    return s.broken_steps > 0 and s.broken_drive > 0

@@ -1,0 +1,63 @@
+"""What a controller has to say of its trips and limits: when one begins, and when a trip is over."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.event_codes import TRIPS, WEAK_REASONS
+from bridge.wire.words import words
+
+_LIMITS: dict[int, str] = {wire.RANGE: "STROKE_MAX", wire.GAIN_LIMIT: "GAIN_LIMIT"}
+_HELD_S = 0.2  # of a limit until it is told: every start of a vibration passes some
+_AGAIN_S = 1.0  # the same is told at most once in so long
+
+
+def changes(trace: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Which rows of a trace may hold news: the first, those that differ from the row before, and the last."""
+    new = np.zeros(len(trace), bool)
+    new[:1] = new[-1:] = True
+    for name in ("reason", "limit"):
+        new[1:] |= trace[name][1:] != trace[name][:-1]
+    return np.flatnonzero(new)
+
+
+class TripTeller:
+    """Turns what a controller did into events, step by step."""
+
+    def __init__(self) -> None:
+        help_of = {(one.column, one.number): one.help for one in words()}
+        names = {wire.Reason.Value(name): name for name in (*TRIPS, *WEAK_REASONS)}
+        self._reasons = {number: (name, help_of[("reason", number)]) for number, name in names.items()}
+        self._limits = {number: (name, help_of[("limit", number)]) for number, name in _LIMITS.items()}
+        self._reason = self._limit = 0
+        self._limit_since_ns = 0
+        self._limit_told = True
+        self._told_ns: dict[str, int] = {}
+
+    def news(self, trace: Any) -> list[tuple[str, str]]:
+        """Codes and texts of what is new in a record of `Trace` since the last one."""
+        reason, limit = int(trace.reason), int(trace.limit)
+        if reason == self._reason and limit == self._limit and self._limit_told:
+            return []
+        t_ns = int(trace.t_ns)
+        found: list[tuple[str, str]] = []
+        if reason != self._reason:
+            before, self._reason = self._reasons.get(self._reason), reason
+            if before is not None and before[0] in TRIPS:
+                found.append(("CLEARED", f"{before[0]} is over"))
+            if reason in self._reasons:
+                found += self._once(*self._reasons[reason], t_ns)
+        if limit != self._limit:
+            self._limit, self._limit_since_ns, self._limit_told = limit, t_ns, limit not in self._limits
+        elif not self._limit_told and t_ns - self._limit_since_ns >= _HELD_S * 1e9:
+            self._limit_told = True
+            found += self._once(*self._limits[limit], t_ns)
+        return found
+
+    def _once(self, code: str, text: str, t_ns: int) -> list[tuple[str, str]]:
+        if t_ns - self._told_ns.get(code, -round(_AGAIN_S * 1e9)) < _AGAIN_S * 1e9:
+            return []
+        self._told_ns[code] = t_ns
+        return [(code, text)]

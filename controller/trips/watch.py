@@ -1,0 +1,59 @@
+"""All trips, once a block: what the block shows, before the policy decides, and what a doubt does to what it wants."""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import NOISE, RESONANCE, TRAVEL_END
+from controller.estimate.windows import DRIVE as DRIVE_ROW
+from controller.trips.delivered import SOME, is_loud, watch_delivered, watch_rest
+from controller.trips.doubts import ACCELEROMETER, CONTACT, DRIVE, OF_DRIVE
+from controller.trips.frozen import watch_frozen
+from controller.trips.noise import watch_slips
+from controller.trips.spring import is_drive_off, watch_spring
+
+
+@kernel
+def watch(p: Record, s: Record, block: Record) -> None:
+    """Look for faults in a block that was measured and estimated, and keep the policy from what is doubted."""
+    watch_frozen(p, s, block)
+    watch_delivered(p, s, block)
+    s.slip_count += s.slip_began
+    place_m = s.first_sample[OF_DRIVE]
+    s.outside = 0 if p.travel_low_m <= place_m <= p.travel_high_m else 1
+    turn = s.steps % SOME
+    if turn == 0 and p.use_force == 1 and p.use_slide_position == 1 and s.doubted & (CONTACT | DRIVE) == 0:
+        watch_spring(p, s)
+    elif turn == 1:
+        watch_rest(p, s, block)
+    elif turn == 2:
+        watch_slips(p, s)
+    doubted = s.doubted & (CONTACT | DRIVE) != 0 or s.unbelieved_s > 0.0
+    if doubted or s.broken_steps > 0:
+        s.slip_began, s.stick_began = 0, 0
+    if doubted:
+        s.blind = 1
+        for way in range(s.ratio.shape[0]):  # what doubtful slips have raised
+            s.ratio[way] = min(s.ratio[way], p.v_ratio)
+
+
+@kernel
+def restrain(p: Record, s: Record) -> None:
+    """After the policy: no vibration without a v_d or outside of the travel, and no frequency whose gain is not known."""
+    if s.doubted & DRIVE or s.outside == 1:
+        s.wanted_velocity_mps = 0.0
+    elif is_drive_off(s):
+        s.wanted_velocity_mps = s.ratio_now * math.fabs(s.kept_mps[DRIVE_ROW])
+    if s.doubted & ACCELEROMETER and s.followed >= 0 and s.wanted_Hz != p.candidate_Hz[s.followed]:
+        s.candidate, s.wanted_Hz = s.followed, p.candidate_Hz[s.followed]
+
+
+@kernel
+def told_reason(s: Record) -> int:
+    """The reason that a command carries: that of a trip, before what passes by itself, before that of the policy."""
+    if s.trip > 0:
+        return s.trip
+    if s.outside == 1:
+        return TRAVEL_END
+    if is_loud(s):
+        return RESONANCE
+    return NOISE if s.noise_told_s > 0.0 or s.unbelieved_s > 0.0 else s.reason

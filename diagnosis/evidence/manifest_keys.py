@@ -1,0 +1,61 @@
+"""Keys that a manifest and a channel map share: the standard columns, and where a column comes from."""
+
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from bridge.config import Strict
+from bridge.tables.unit_words import known_unit
+
+STANDARD = (
+    "t_s",
+    "drive_force_N",
+    "mass_accel_mps2",
+    "base_accel_mps2",
+    "mass_position_m",
+    "drive_position_m",
+    "vibration_frequency_Hz",
+    "vibration_amplitude_m",
+)
+# The upper limit is far above any rig, and low enough that no product of such numbers overflows.
+Positive = Annotated[float, Field(gt=0, lt=1e12)]
+NotNegative = Annotated[float, Field(ge=0, lt=1e12)]
+
+
+class ChannelMap(Strict):
+    """Source of a standard column: value = column * scale + offset, in its SI unit. A text alone is the column."""
+
+    column: Annotated[str, Field(min_length=1)] = Field(description="Its name, or its number, from 1 on.")
+    scale: float | None = Field(default=None, description="To SI; if not given, from the unit of the column.")
+    offset: float = Field(default=0.0, description="In SI.")
+    unit: str = Field(default="", description="Of the column, such as mm or kN, where its name does not say it.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _text_is_the_column(cls, table: Any) -> Any:
+        if isinstance(table, str | int) and not isinstance(table, bool):
+            table = {"column": table}
+        if isinstance(table, dict) and isinstance(table.get("column"), int) and not isinstance(table["column"], bool):
+            table = table | {"column": str(table["column"])}
+        return table
+
+    @model_validator(mode="after")
+    def _unit_is_known(self) -> "ChannelMap":
+        if self.unit and known_unit(self.unit) is None:
+            raise ValueError(f"unit = {self.unit!r}: is none that is known here, such as mm, kN, g or ms; give a scale")
+        if self.unit and self.scale is not None:
+            raise ValueError("scale and unit: must be one of them; remove the other")
+        return self
+
+    @model_validator(mode="after")
+    def _scale_is_not_zero(self) -> "ChannelMap":
+        if self.scale == 0.0:
+            raise ValueError("scale = 0: must not be 0, it would erase the column; 1 keeps it as it is")
+        return self
+
+
+def check_channel_names(channels: dict[str, Any]) -> None:
+    """Raise ValueError when a channel is not a standard column."""
+    for name in channels:
+        if name not in STANDARD:
+            raise ValueError(f"channels.{name}: unknown key; known here: {', '.join(STANDARD)}")

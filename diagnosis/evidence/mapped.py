@@ -1,0 +1,149 @@
+"""The standard columns of a table: which column is which, in which unit, and all on one clock."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.faults import Fault
+from bridge.log.finding import Finding
+from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_rows
+from bridge.tables.table import Table
+from bridge.tables.unit_words import known_unit, si_unit
+from bridge.units import counted
+from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
+
+Floats = npt.NDArray[np.float64]
+Columns = dict[str, Floats]
+# what each standard column measures: on a rig of a spring, and on one that turns
+_MEASURES = {
+    "t_s": ("time", "time"),
+    "drive_force_N": ("force", "torque"),
+    "mass_accel_mps2": ("acceleration", "angular acceleration"),
+    "base_accel_mps2": ("acceleration", "angular acceleration"),
+    "mass_position_m": ("length", "angle"),
+    "drive_position_m": ("length", "angle"),
+    "vibration_frequency_Hz": ("frequency", "frequency"),
+    "vibration_amplitude_m": ("length", "angle"),
+}
+# Seconds from which a column of times without a unit is no time of a run but of a calendar, by the unit that it is then in
+_SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
+
+
+class Mapped(NamedTuple):
+    """The standard columns of a table, [rows] each, in SI units, and what was found and assumed."""
+
+    columns: Columns
+    findings: list[Finding]
+
+
+def mapped(
+    table: Table, channels: dict[str, ChannelMap], sample_rate_Hz: float | None = None, rotary: bool | None = None
+) -> Mapped:
+    """The standard columns that `channels` names.
+
+    The time comes from its column, from `sample_rate_Hz`, or from what the file says itself. `rotary`: the rig turns; None: it is
+    not known, and both N and N m are taken.
+
+    Raises Fault BAD_TABLE for a column that is missing, is of another length or of another quantity; CONFIG without a time.
+    """
+    found: list[Finding] = []
+    values = {
+        name: _in_si(table, name, channels[name], found, rotary)
+        for name in STANDARD
+        if name in channels and name != "t_s"
+    }
+    file = table.path.name
+    if "t_s" in channels:
+        t_s = _time(table, channels["t_s"], found)
+        _same_length(table, channels, values, len(t_s), "the time")
+        if with_own_rows(t_s, values):
+            t_s, values, moved = on_one_clock(own_rows(t_s, values), file)
+            found += moved
+        return Mapped({"t_s": t_s} | values, table.findings + found)
+    clocks = {name: table.clocks.get(table.find(channels[name].column)) for name in values}
+    if sample_rate_Hz is None and values and all(clock is not None for clock in clocks.values()):
+        sampled = {
+            name: Sampled(clock.times(len(values[name])), values[name])
+            for name, clock in clocks.items()
+            if clock is not None
+        }
+        t_s, values, moved = on_one_clock(sampled, file)
+        return Mapped({"t_s": t_s} | values, table.findings + found + moved)
+    rate_Hz = sample_rate_Hz or table.sample_rate_Hz
+    if rate_Hz is None:
+        line = f'{file}: no time: name its column, channels.t_s = "NAME", or add under [source] sample_rate_Hz = 1000.0'
+        raise Fault("CONFIG", f"{line} (columns here: {', '.join(table.columns)})")
+    if sample_rate_Hz is None:
+        found.append(Finding("assumed", file, f"sample_rate_Hz = {rate_Hz:.9g}, as the file states"))
+    rows = len(next(iter(values.values())))
+    _same_length(table, channels, values, rows, "the first channel")
+    return Mapped({"t_s": np.arange(rows) / rate_Hz} | values, table.findings + found)
+
+
+def has_time(table: Table, channels: dict[str, ChannelMap]) -> bool:
+    """Whether a column, the file, or the clocks of all channels tell the time."""
+    own = [table.clocks.get(table.find(channel.column)) is not None for channel in channels.values()]
+    return "t_s" in channels or table.sample_rate_Hz is not None or (bool(own) and all(own))
+
+
+def _same_length(table: Table, channels: dict[str, ChannelMap], values: Columns, rows: int, what: str) -> None:
+    for name, column in values.items():
+        if len(column) != rows:
+            line = (
+                f"{table.path.name}: column {channels[name].column}: {counted(len(column), 'row')}: must have {rows}, as {what}; "
+                "every channel needs one value a sample"
+            )
+            raise Fault("BAD_TABLE", line)
+
+
+def _in_si(table: Table, name: str, channel: ChannelMap, found: list[Finding], rotary: bool | None) -> Floats:
+    """A channel in its SI unit: by its scale, by the unit of the map, or by that of the file."""
+    values = table.column(channel.column)
+    return values * _factor(table, name, channel, found, rotary) + channel.offset
+
+
+def _factor(table: Table, name: str, channel: ChannelMap, found: list[Finding], rotary: bool | None) -> float:
+    if channel.scale is not None:
+        return channel.scale
+    unit = channel.unit or table.unit(channel.column)
+    known = known_unit(unit) if unit else None
+    if known is None:
+        return 1.0
+    what, factor = known
+    if rotary is False and what == _MEASURES[name][1] != _MEASURES[name][0]:
+        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {what}, and the rig slides"
+        raise Fault("BAD_TABLE", f'{line}; a rig that turns has drive = "torsion" under [rig]')
+    if what not in _MEASURES[name]:
+        line = f"{table.path.name}: column {channel.column}: is in {unit}, a {what}: must be a {_MEASURES[name][0]}, as {name}"
+        raise Fault("BAD_TABLE", f"{line}; name another column, or give channels.{name}.scale")
+    if factor != 1.0 and not channel.unit:
+        text = f"column {channel.column} is in {unit}: times {factor:g} to be in {si_unit(what)}"
+        found.append(Finding("units", f"{table.path.name}: {name}", text))
+    return factor
+
+
+def _time(table: Table, channel: ChannelMap, found: list[Finding]) -> Floats:
+    """The time in s, [rows]; a time of the calendar is counted from the first row."""
+    times_s, counted_already = table.seconds(channel.column)
+    where = f"{table.path.name}: t_s"
+    if counted_already:
+        if channel.scale not in (None, 1.0):
+            raise Fault(
+                "CONFIG", f"{where}: column {channel.column} holds times: scale must be left out; they count in s"
+            )
+        return times_s + channel.offset
+    if channel.scale is not None or channel.unit or table.unit(channel.column):
+        return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
+    finite = np.flatnonzero(np.isfinite(times_s))
+    if len(finite):
+        first = float(times_s[finite[0]])
+        for least, factor in _SINCE_1970:
+            if first > least:
+                found.append(
+                    Finding(
+                        "time", where, f"is a time of the calendar in steps of {factor:g} s: counted from the first row"
+                    )
+                )
+                return (times_s - first) * factor + channel.offset
+    return times_s + channel.offset

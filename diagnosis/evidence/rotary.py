@@ -1,0 +1,64 @@
+"""A rig that turns, told as one that slides at a radius: N m, rad and kg m2 become N, m and kg there.
+
+At a radius of 1 m every number keeps its digits.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.log.finding import Finding
+from diagnosis.evidence.manifest import MANIFEST, RigTable, RunTable
+
+Columns = dict[str, npt.NDArray[np.float64]]
+# power of the radius by which a number of a rig that turns is multiplied
+_POWERS = {
+    "mass_kg": -2,
+    "drive_stiffness_N_per_m": -2,
+    "drive_damping_Ns_per_m": -2,
+    "contact_stiffness_N_per_m": -2,
+    "contact_damping_Ns_per_m": -2,
+    "viscous_damping_Ns_per_m": -2,
+    "coulomb_force_N": -1,
+    "static_force_N": -1,
+    "stribeck_velocity_mps": 1,
+    "drive_force_N": -1,
+    "mass_accel_mps2": 1,
+    "base_accel_mps2": 1,
+    "mass_position_m": 1,
+    "drive_position_m": 1,
+    "vibration_amplitude_m": 1,
+    "drive_velocity_mps": 1,
+}
+
+
+def as_sliding(rig: RigTable) -> RigTable:
+    """The rig as one with a spring; `radius_m` says at which radius. A rig that does not turn is returned as it is."""
+    if rig.drive != "torsion":
+        return rig
+    radius_m = rig.radius_m or 1.0
+    numbers = {name: _at(name, value, radius_m) for name, value in rig.values().items() if value is not None}
+    return rig.model_copy(update=numbers | {"drive": "spring", "radius_m": radius_m})
+
+
+def run_as_sliding(rig: RigTable, columns: Columns, table: RunTable) -> tuple[Columns, RunTable]:
+    """The columns [samples] and the run of a rig that turns, at its radius; others as they are."""
+    if rig.drive != "torsion":
+        return columns, table
+    radius_m = rig.radius_m or 1.0
+    moved = {name: values * radius_m ** _POWERS.get(name, 0) for name, values in columns.items()}
+    velocity = table.drive_velocity_mps
+    return moved, table if velocity is None else table.model_copy(update={"drive_velocity_mps": velocity * radius_m})
+
+
+def _at(name: str, value: float, radius_m: float) -> float:
+    return value * radius_m ** _POWERS[name]
+
+
+def told(rig: RigTable) -> list[Finding]:
+    """What a person must know who reads numbers of such a rig."""
+    if rig.drive != "torsion":
+        return []
+    text = f"turns: told in N, m and kg at a radius of {rig.radius_m or 1.0:g} m" + (
+        ", where they have the digits of N m, rad and kg m2" if (rig.radius_m or 1.0) == 1.0 else ""
+    )
+    return [Finding("rotary", f"{MANIFEST}: rig.drive", text)]

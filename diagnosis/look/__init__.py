@@ -1,0 +1,11 @@
+"""Stick-slip of one measured record at a glance: slips, friction numbers, stiffness, each with an interval.
+
+guess        which column is time, force, load, position
+record       an even record, its noise, its parts of one direction
+slips        breakaways and re-sticks, on the record's own scale of time
+slip_shape   sliding friction and the swing's frequency from all falls laid over each other
+numbers      numbers with intervals of 90 %
+speeds       friction over speed, and over the dwell before a slip
+look         all of it, for one record
+words        a sentence for each number
+"""

@@ -1,0 +1,138 @@
+"""Which column of a table is the time, the force, the load, the drive's position: by names, units, and their course."""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from bridge.faults import Fault
+from bridge.tables.table import Table
+from bridge.tables.unit_words import bare_name, known_unit
+
+_NAMES = {
+    "time": r"^(t|ts|time|zeit|x_value|timestamp|elapsed.*|.*\btime\b.*|.*zeit.*|__time|%time|.*stamp.*|sekunden|seconds)$",
+    "coefficient": r"(^|[^a-z])(mu|µ|cof|c\.o\.f)([^a-z]|$)|coeff.*fric|fric.*coeff|reib(bei)?wert|reibungskoeff|reibzahl",
+    "load": r"normal|(^|[^a-z])(fz|fn|f_n|f_z|load|last)([^a-z]|$)|auflast|anpress",
+    "force": r"friction|reib|tangent|drag|(^|[^a-z])(ff|fx|f_x|f_t|ft|f_d|f)([^a-z]|$)|force|kraft|last?zelle|load ?cell"
+    r"|torque|moment|effort",
+    "speed": r"speed|veloc|geschw|(^|[^a-z])(v|v_d)([^a-z]|$)",
+    "position": r"drive.*pos|stroke|hub|verfahrweg|stage|(^|[^a-z])(s_d|x_d)([^a-z]|$)|position|displacement|weg|travel|distance"
+    r"|(^|[^a-z])(x|s)([^a-z]|$)",
+}  # fmt: skip
+_QUANTITIES = {
+    "time": ("time",),
+    "load": ("force",),
+    "force": ("force", "torque"),
+    "position": ("length", "angle"),
+    "speed": ("velocity", "angular velocity"),
+    "coefficient": ("share",),
+}
+# what none of these is, whatever else its name says
+_OTHER = re.compile(r"acc|beschl|temp|humid|feucht|count|zyklus|cycle|voltage|current", re.IGNORECASE)
+
+
+class Guess(NamedTuple):
+    """Columns by what they are; empty where there is none. `reasons` say why, in words."""
+
+    time: str
+    force: str
+    load: str
+    position: str
+    speed: str
+    coefficient: str
+    reasons: list[str]
+
+
+def guess(table: Table, given: dict[str, str]) -> Guess:
+    """The columns of a record; `given` names those that a person has named, by time, force, load or position.
+
+    Raises Fault CONFIG with a line to copy where the force cannot be known.
+    """
+    numeric = _numeric(table)
+    found: dict[str, str] = {what: table.find(column) for what, column in given.items() if column}
+    reasons: list[str] = []
+    for what in ("coefficient", "time", "load", "force", "speed", "position"):
+        if what in found:
+            continue
+        left = [name for name in (list(table.columns) if what == "time" else numeric) if name not in found.values()]
+        column = _named(table, what, left)
+        if column:
+            found[what] = column
+            reasons.append(f"{what} = {column!r} by its name")
+    if "time" not in found and not table.clocks:
+        rising = next((name for name in numeric if name not in found.values() and _is_clock(table, name)), "")
+        if rising:
+            found["time"] = rising
+            reasons.append(f"time = {rising!r}, which rises in even steps")
+    left = [name for name in numeric if name not in found.values()]
+    if "force" not in found and "coefficient" not in found:
+        by_unit = [name for name in left if (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES["force"]]
+        only = (
+            by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _is_clock(table, one))]
+        )
+        if len(only) != 1:
+            raise Fault("CONFIG", _ask(table, numeric))
+        found["force"] = only[0]
+        reasons.append(f"force = {only[0]!r}, the only one left")
+    if "position" in found and _flat(table, found["position"]):
+        del found["position"]
+    kinds = ("time", "force", "load", "position", "speed", "coefficient")
+    time, force, load, position, speed, coefficient = (found.get(what, "") for what in kinds)
+    return Guess(time, force, load, position, speed, coefficient, reasons)
+
+
+def _ask(table: Table, numeric: list[str]) -> str:
+    columns = ", ".join(f'"{name}"' for name in numeric) or "none of numbers"
+    return f'{table.path.name}: which column is the force? add --force "NAME"; columns here: {columns}'
+
+
+def _numeric(table: Table) -> list[str]:
+    names: list[str] = []
+    rows = max((len(values) for values in table.columns.values()), default=0)
+    for name, values in table.columns.items():
+        if len(values) < max(rows // 50, 4):  # a parameter, no course
+            continue
+        try:
+            if np.isfinite(table.column(name)).sum() >= 4:
+                names.append(name)
+        except Fault:
+            continue
+    return _one_each(table, names)
+
+
+def _one_each(table: Table, names: list[str]) -> list[str]:
+    """Without the long names of what a short name stands for too."""
+    seen: dict[int, str] = {}
+    for name in names:
+        key = id(table.columns[name])
+        if key not in seen or len(name) < len(seen[key]):
+            seen[key] = name
+    return [name for name in names if seen[id(table.columns[name])] == name]
+
+
+def _named(table: Table, what: str, names: list[str]) -> str:
+    pattern = re.compile(_NAMES[what], re.IGNORECASE)
+    for name in names:
+        if what not in ("time", "coefficient") and _OTHER.search(name):
+            continue
+        if what in ("force", "position") and _flat(table, name):
+            continue
+        unit = table.unit(name)
+        quantity = (known_unit(unit) or ("",))[0]
+        if quantity and quantity not in _QUANTITIES[what]:
+            continue
+        if pattern.search(bare_name(name).lstrip("/").split("/")[-1]) or pattern.search(bare_name(name)):
+            return name
+    return ""
+
+
+def _is_clock(table: Table, name: str) -> bool:
+    """Whether a column rises from row to row, in even steps."""
+    values = table.column(name)
+    steps = np.diff(values[np.isfinite(values)])
+    return len(steps) > 8 and bool((steps > 0.0).all()) and float(np.ptp(steps)) < 0.2 * float(np.median(steps)) + 1e-12
+
+
+def _flat(table: Table, name: str) -> bool:
+    values = table.column(name)
+    return not np.isfinite(values).any() or float(np.nanmax(values) - np.nanmin(values)) == 0.0

@@ -1,0 +1,224 @@
+"""One measured record at a glance."""
+
+import math
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.look.numbers import Number, groups_of, jackknifed, mean_of
+from diagnosis.look.record import Part, noise_of, parts_of
+from diagnosis.look.slip_shape import Falls, Shape, falls_of, fit_shape
+from diagnosis.look.slips import Slips, find_slips
+from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
+from diagnosis.look.sticks import Cycle, cycles_of
+
+Floats = npt.NDArray[np.float64]
+_FEWEST_FOR_SCATTER = 3
+_SURE = 1.2  # half intervals of 90 % from which a decay is there
+_LARGEST_DECAY = 2.5  # over a fall: a decay at the end of what is tried is none
+# names of numbers of a force, where a coefficient is looked at
+_MU = {
+    "static_force_N": "mu_s",
+    "kinetic_force_N": "mu_k",
+    "restick_force_N": "mu_min",
+    "swing_N": "mu_swing",
+    "slope_N_per_s": "mu_slope_per_s",
+    "dwell_N_per_decade": "mu_dwell_per_decade",
+}
+
+
+class Known(NamedTuple):
+    """What is known beside the force, SI units."""
+
+    speed_mps: float | None = None  # of the drive, where its position was not measured
+    load_N: float | None = None  # normal load
+    mass_kg: float | None = None  # of the slide
+    coefficient: bool = False  # what is looked at is the force over an unknown load
+
+
+class Look(NamedTuple):
+    """What is in a record. Numbers that it does not show are missing from `numbers`."""
+
+    seconds: float
+    rate_Hz: float
+    noise_N: float
+    cycles: list[Cycle]
+    sticks: bool  # False: what swings here has no straight climbs, or nothing swings
+    numbers: dict[str, Number]
+    at_speeds: list[AtSpeed]
+    parts: list[Part]
+    known: Known
+    mean_force_N: float
+
+    @property
+    def slips(self) -> int:
+        """How many slips began."""
+        return len(self.cycles) if self.sticks else 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, without the samples."""
+        return {
+            "seconds": self.seconds,
+            "rate_Hz": self.rate_Hz,
+            "noise_N": self.noise_N,
+            "slips": self.slips,
+            "swings_without_stick": len(self.cycles) if not self.sticks else 0,
+            "mean_force_N": self.mean_force_N,
+            "numbers": {name: number.as_dict() for name, number in self.numbers.items()},
+            "at_speeds": [
+                {
+                    "speed_mps": one.speed_mps,
+                    "times": one.times,
+                    "mean_N": one.mean_N.as_dict(),
+                    "breakaway_N": None if one.breakaway_N is None else one.breakaway_N.as_dict(),
+                }
+                for one in self.at_speeds
+            ],
+        }
+
+
+def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: Known | None = None) -> Look | None:
+    """Look at a record: time, force and drive position, [samples] each, SI units. None where it is too short."""
+    known = known or Known()
+    parts = parts_of(t_s, force_N, position_m)
+    if not parts:
+        return None
+    found = [slips for slips in (find_slips(part) for part in parts) if slips is not None]
+    cycles = [cycle for slips in found for cycle in cycles_of(slips, known.speed_mps)]
+    weights = [len(slips.tops) for slips in found]
+    straight = float(np.average([slips.straight for slips in found], weights=weights)) if found else 0.0
+    sticks = bool(found) and straight >= 0.5
+    seconds = sum(float(part.t_s[-1] - part.t_s[0]) for part in parts)
+    step_s = float(np.median([part.step_s for part in parts]))
+    numbers: dict[str, Number] = {}
+    if sticks:
+        numbers |= _of_cycles(found, cycles, step_s)
+        numbers |= _of_falls(found, numbers)
+        numbers |= _between_samples(numbers, step_s)
+        if (dwell := over_dwell(cycles)) is not None:
+            numbers["dwell_N_per_decade"] = dwell
+    if known.load_N:
+        numbers |= {
+            f"mu_{name}": numbers[f"{key}_force_N"].times(1.0 / known.load_N, "1")
+            for name, key in (("s", "static"), ("k", "kinetic"))
+            if f"{key}_force_N" in numbers
+        }
+    mean_N = float(np.average([part.force_N.mean() for part in parts], weights=[len(part.t_s) for part in parts]))
+    if known.coefficient:
+        numbers = _of_coefficient(numbers)
+    if known.load_N:
+        numbers["mu_mean"] = Number(mean_N / known.load_N, math.nan, math.nan, "1")
+    return Look(
+        seconds,
+        1.0 / step_s,
+        float(np.median([noise_of(part.force_N) for part in parts])),
+        cycles,
+        sticks,
+        numbers,
+        over_speed(parts, cycles if sticks else [], "1" if known.coefficient else "N"),
+        parts,
+        known,
+        mean_N,
+    )
+
+
+def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
+    """Numbers of a friction coefficient: dimensionless, and without those of the drive's spring."""
+    left = {name: number for name, number in numbers.items() if name not in ("stiffness_N_per_m", "mass_kg")}
+    return {
+        _MU.get(name, name): number._replace(unit=re.sub(r"^N\b", "1", number.unit)) for name, number in left.items()
+    }
+
+
+def _of_cycles(found: list[Slips], cycles: list[Cycle], step_s: float) -> dict[str, Number]:
+    """Means over the slips."""
+    periods = np.concatenate([np.diff(slips.part.t_s[slips.tops]) for slips in found])
+    stuck = [cycle for cycle in cycles if math.isfinite(cycle.dwell_s)] or cycles
+    drops = [cycle.breakaway_force_N - cycle.restick_force_N for cycle in stuck]
+    durations = [cycle.restick_t_s - cycle.breakaway_t_s for cycle in cycles]
+    tops = [cycle.breakaway_force_N for cycle in stuck]
+    numbers = {
+        "static_force_N": mean_of(tops, "N"),
+        "restick_force_N": mean_of([cycle.restick_force_N for cycle in stuck], "N"),
+        "swing_N": mean_of(drops, "N"),
+        # a breakaway lies between two samples
+        "period_s": mean_of(periods, "s", step_s / math.sqrt(6.0) / max(len(periods), 1)),
+        "dwell_s": mean_of([cycle.dwell_s for cycle in stuck], "s", 0.3 * step_s),
+        "slip_s": mean_of(durations, "s", 0.3 * step_s),
+        "slope_N_per_s": mean_of([cycle.slope_N_per_s for cycle in stuck], "N/s"),
+        "stiffness_N_per_m": mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m"),
+    }
+    return {name: number for name, number in numbers.items() if number is not None}
+
+
+def _of_falls(found: list[Slips], numbers: dict[str, Number]) -> dict[str, Number]:
+    """Sliding friction, mass and the force at which the slide breaks away, from the falls laid over each other."""
+    if "restick_force_N" not in numbers:
+        return {}
+    top, bottom = numbers["static_force_N"], numbers["restick_force_N"]
+    stacks = [falls for falls in (falls_of(slips, top.value, bottom.value) for slips in found) if falls is not None]
+    midway = 0.5 * (top.value + bottom.value)
+    # undamped it is the middle; heavily damped it is at the re-stick
+    guess = Number(midway, midway - 0.5 * (top.value - bottom.value), midway + 0.25 * (top.value - bottom.value), "N")
+    if not stacks:
+        return {"kinetic_force_N": guess}
+    falls = max(stacks, key=lambda stack: stack.slips)
+    shape, others = _shape(falls)
+    if shape is None:
+        return {"kinetic_force_N": guess}
+    kinetic = jackknifed(shape.force_N, [one.force_N for one in others], "N")
+    omega = jackknifed(shape.omega_rad_per_s, [one.omega_rad_per_s for one in others], "rad/s")
+    result = {"kinetic_force_N": kinetic, "omega_rad_per_s": omega, "static_force_N": _breakaway(shape, numbers)}
+    if "stiffness_N_per_m" in numbers:
+        stiffness = numbers["stiffness_N_per_m"]
+        mass_kg = stiffness.value / omega.value**2
+        share = math.hypot(
+            (stiffness.high - stiffness.value) / stiffness.value, 2.0 * (omega.high - omega.value) / omega.value
+        )
+        result["mass_kg"] = Number(mass_kg, mass_kg * (1.0 - share), mass_kg * (1.0 + share), "kg")
+    return result
+
+
+def _breakaway(shape: Shape, numbers: dict[str, Number]) -> Number:
+    """The mean force at breakaway; the interval reaches down to what static friction may be below it.
+
+    The force rises on until the slide is as fast as its drive. For friction that falls at once
+    (top - F_k)^2 = (F_s - F_k)^2 + (slope / w)^2; for one that falls slowly F_s is lower.
+    """
+    top = numbers["static_force_N"]
+    above = top.value - shape.force_N
+    rise = numbers["slope_N_per_s"].value / shape.omega_rad_per_s if "slope_N_per_s" in numbers else 0.0
+    least = shape.force_N + math.sqrt(max(above**2 - rise**2, 0.0))
+    return top._replace(low=min(top.low, least - (top.value - top.low)))
+
+
+def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Number]:
+    """F_s and F_k with what the force climbs in one sample time in their intervals: all breakaways lie between samples."""
+    if "slope_N_per_s" not in numbers:
+        return {}
+    more = abs(numbers["slope_N_per_s"].value) * step_s
+    wanted = (name for name in ("static_force_N", "kinetic_force_N") if name in numbers)
+    return {
+        name: numbers[name]._replace(low=numbers[name].low - more, high=numbers[name].high + more) for name in wanted
+    }
+
+
+def _shape(falls: Falls) -> tuple[Shape | None, list[Shape]]:
+    """The swing, and those without one group of falls each; with a decay where the falls surely show one.
+
+    Level and decay of a single fall are hardly told apart, so a decay that is not there would spoil the level.
+    """
+    groups = groups_of(falls.slips) if falls.slips >= _FEWEST_FOR_SCATTER else []
+    found: list[tuple[Shape | None, list[Shape]]] = []
+    for damped in (True, False):
+        whole = fit_shape(falls, damped)
+        without = [fit_shape(falls.without(group), damped, whole) for group in groups] if whole is not None else []
+        found.append((whole, [one for one in without if one is not None]))
+    (with_it, others), plain = found
+    if with_it is not None and len(others) == len(groups) >= _FEWEST_FOR_SCATTER:
+        decay = jackknifed(with_it.decay_per_s, [one.decay_per_s for one in others], "1/s")
+        if decay.value > _SURE * (decay.high - decay.value) and with_it.decay_per_s * falls.length_s < _LARGEST_DECAY:
+            return with_it, others
+    return plain

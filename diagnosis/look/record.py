@@ -1,0 +1,91 @@
+"""A measured force as even parts of one direction, and the noise of it."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+
+Floats = npt.NDArray[np.float64]
+_GAP_STEPS = 10.0  # usual steps, beyond which the record is cut: nobody knows what happened
+_FEWEST = 16  # samples of a part
+_UNEVEN = 0.01  # of a step; beyond it the record is interpolated to an even clock
+_BOTH_WAYS = 0.3  # share of the force's largest size that it reaches with either sign on a rig that goes both ways
+_TURN = 0.1  # of that size: a force that changes sign by less has not turned
+
+
+class Part(NamedTuple):
+    """An even stretch in which the drive goes one way. Arrays are [samples]; the force is positive along the motion."""
+
+    t_s: Floats
+    force_N: Floats
+    position_m: Floats | None  # of the drive, positive along the motion
+    sign: float  # of the force as measured
+
+    @property
+    def step_s(self) -> float:
+        """Seconds between samples."""
+        return float(self.t_s[-1] - self.t_s[0]) / (len(self.t_s) - 1)
+
+
+def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> list[Part]:
+    """The even parts of a record, [samples] each; samples that are no number or go back in time are left out."""
+    good = np.isfinite(t_s) & np.isfinite(force_N)
+    if position_m is not None:
+        good &= np.isfinite(position_m)
+    t_s, force_N = t_s[good], force_N[good]
+    position_m = None if position_m is None else position_m[good]
+    forward = np.concatenate([[True], t_s[1:] > np.maximum.accumulate(t_s)[:-1]]) if len(t_s) else np.zeros(0, np.bool_)
+    t_s, force_N = t_s[forward], force_N[forward]
+    position_m = None if position_m is None else position_m[forward]
+    if len(t_s) < _FEWEST:
+        return []
+    step_s = float(np.median(np.diff(t_s)))
+    gaps = np.flatnonzero(np.diff(t_s) > _GAP_STEPS * step_s) + 1
+    edges = np.unique(np.concatenate([[0], gaps, [len(t_s)]]))
+    edges = np.unique(np.concatenate([edges, _turns(force_N)]))
+    parts: list[Part] = []
+    for first, last in pairwise(edges.tolist()):
+        if last - first < _FEWEST:
+            continue
+        own = slice(first, last)
+        sign = -1.0 if float(np.median(force_N[own])) < 0.0 else 1.0
+        place = None if position_m is None else position_m[own]
+        if place is not None and place[-1] < place[0]:
+            place = -place
+        parts.append(_even(t_s[own], sign * force_N[own], place, sign))
+    return parts
+
+
+def _turns(force_N: Floats) -> npt.NDArray[np.int64]:
+    """Where the force changes its sign for good, on a rig that goes both ways; else nothing."""
+    size = float(np.quantile(np.abs(force_N), 0.99))
+    if min(np.quantile(force_N, 0.95), -np.quantile(force_N, 0.05)) < _BOTH_WAYS * size:
+        return np.zeros(0, np.int64)
+    side = np.where(force_N > _TURN * size, 1, np.where(force_N < -_TURN * size, -1, 0))
+    known = np.flatnonzero(side)
+    turned = np.flatnonzero(np.diff(side[known])) + 1
+    return known[turned]
+
+
+def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) -> Part:
+    step_s = float(t_s[-1] - t_s[0]) / (len(t_s) - 1)
+    even_s = t_s[0] + step_s * np.arange(len(t_s))
+    if np.abs(t_s - even_s).max() > _UNEVEN * step_s:
+        force_N = np.interp(even_s, t_s, force_N)
+        position_m = None if position_m is None else np.interp(even_s, t_s, position_m)
+    return Part(even_s, force_N, position_m, sign)
+
+
+def noise_of(force_N: Floats) -> float:
+    """Standard deviation of the noise from sample to sample: second differences remove climbs, their median the slips."""
+    if len(force_N) < _FEWEST:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(force_N, 2)))) / 6.0**0.5
+
+
+def smoothed(values: Floats, width: int) -> Floats:
+    """Means over `width` samples around each, [samples]; an even width is made odd."""
+    width = width | 1
+    return values if width <= 1 else np.asarray(uniform_filter1d(values, width, mode="mirror"), np.float64)

@@ -1,0 +1,130 @@
+"""Slips of a part of a record, on its own scale of time: falls of 10 ms and of 10 s are found alike.
+
+A fall that begins at a straight climb is a slip; a swing without a straight climb is none. How long the fall lasts against the
+climb does not count, so a slip may take longer than the stick before it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.features.turns import turns
+from diagnosis.look.record import Part, noise_of, smoothed
+
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+# Smallest fall, in standard deviations of the smoothed noise: white noise spans 8 to 9 of them in 10^5 samples.
+_NOISE_SPANS = 10.0
+# Smallest fall as a share of the range between the 1st and the 99th percentile. Smaller: ripple counts; larger: small slips of a
+# record with large ones are lost.
+_SHARE = 0.04
+_SMOOTH = 10  # samples of a smoothing in a fall: it cuts a round peak by 0.2 % of the fall
+_WIDEST = 0.02  # of the part, of a smoothing
+_NOISE_OF_MANY = 3.0  # standard deviations that some of many samples reach
+# Distance of the inner 80 % of a climb from its chord, as a share of the climb, up to which it is straight. A stiff contact that
+# creeps gives 0.07, a sine 0.056: what falls as it climbs must be straighter.
+_STRAIGHT, _STRAIGHTER = 0.08, 0.04
+_QUICK = 3.0  # times that the climb lasts as long as the fall, from which it is a stick, bent by creep or not
+_ALIKE = 1.15  # factor between the times of climb and fall, up to which they are alike
+_AS_QUICK = 3.0  # times that a fall lasts as long as the climb, from which nothing is said of it
+_FEWEST_OF_FALL = 8  # samples of a fall whose course is seen
+_POINTS = 41  # of a fall, in which the falls are averaged
+_LEAST_STRAIGHT = 0.5  # share of the climbs that are straight, from which it is stick-slip and no swing
+
+
+class Slips(NamedTuple):
+    """Slips of a part, indices of samples, [slips] each, but for `bottoms`, which may be one shorter."""
+
+    part: Part
+    tops: Indices  # breakaways
+    bottoms: Indices  # re-sticks
+    width: int  # samples of the smoothing
+    straight: float  # share of climbs that are straight; 0 without a climb
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the climbs are those of a spring on a slide that stands."""
+        return self.straight >= _LEAST_STRAIGHT
+
+
+def find_slips(part: Part) -> Slips | None:
+    """The slips of a part; None where nothing falls by more than noise does."""
+    width = 1
+    widest = max(1, int(_WIDEST * len(part.force_N)))
+    found: tuple[Indices, Indices] | None = None
+    while width <= widest:
+        tops, bottoms = _turning(part.force_N, width)
+        if len(tops):
+            found = tops, bottoms
+            falls = bottoms - tops[: len(bottoms)]
+            wanted = min(max(1, int(np.median(falls)) // _SMOOTH), widest) if len(falls) else width
+            if wanted <= width:
+                break
+            width = min(wanted, 4 * width)
+            continue
+        width *= 2
+    if found is None:
+        return None
+    width = min(width, widest)
+    tops, bottoms = found
+    return Slips(part, tops, bottoms, width, _straight(part, tops, bottoms, width))
+
+
+def _turning(force_N: Floats, width: int) -> tuple[Indices, Indices]:
+    """Maxima and minima that alternate and differ by more than noise does, of the smoothed force."""
+    smooth = smoothed(force_N, width)
+    low, high = np.quantile(smooth, (0.01, 0.99))
+    drop_N = max(_NOISE_SPANS * noise_of(force_N) / (width | 1) ** 0.5, _SHARE * float(high - low))
+    if drop_N <= 0.0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    at = [0] * len(smooth)
+    count = turns(smooth.tolist(), drop_N, at)
+    return np.array(at[:count:2], np.int64), np.array(at[1:count:2], np.int64)
+
+
+def _straight(part: Part, tops: Indices, bottoms: Indices, width: int) -> float:
+    """Share of the climbs between a re-stick and the next breakaway that are straight; of the first climb where it is alone."""
+    smooth = smoothed(part.force_N, width)
+    noise_N = _NOISE_OF_MANY * noise_of(part.force_N) / (width | 1) ** 0.5
+    begins = bottoms[: len(tops) - 1]
+    limit = _STRAIGHT
+    if len(begins):
+        ratio = float(np.median(tops[1 : len(begins) + 1] - begins)) / float(np.median(begins - tops[: len(begins)]))
+        if ratio > _QUICK:
+            return 1.0
+        if ratio > 1.0 / _AS_QUICK and _falls_straight(smooth, tops, begins):
+            return 0.0
+        limit = _STRAIGHTER if 1.0 / _ALIKE < ratio < _ALIKE else _STRAIGHT
+    elif not len(bottoms):  # the fall goes on to the end, where the drive turned: no re-stick
+        return 0.0
+    climbs = list(zip(begins.tolist(), tops[1 : len(begins) + 1].tolist(), strict=True))
+    if not climbs:
+        climbs = [(0, int(tops[0]))]
+    straight = 0
+    for first, last in climbs:
+        rise = smooth[first : last + 1]
+        height = float(rise[-1] - rise[0])
+        if len(rise) < 4 or height <= 0.0:
+            continue
+        # the ends are rounded by the smoothing and by the ring of a re-stick
+        cut = max(1, len(rise) // 10)
+        inner = rise[cut:-cut] if len(rise) > 3 * cut else rise
+        chord = np.linspace(inner[0], inner[-1], len(inner))
+        straight += bool(np.abs(inner - chord).max() < limit * height + noise_N)
+    return straight / len(climbs)
+
+
+def _falls_straight(smooth: Floats, tops: Indices, bottoms: Indices) -> bool:
+    """Whether the mean fall is a straight line: a slide that is free swings, so its fall is bent; a triangle is no slip."""
+    falls = [smooth[top : bottom + 1] for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=False)]
+    falls = [fall for fall in falls if len(fall) >= _FEWEST_OF_FALL and fall[0] > fall[-1]]
+    if not falls:
+        return False
+    at = np.linspace(0.1, 0.9, _POINTS)
+    shares = [
+        (np.interp(at * (len(fall) - 1), np.arange(len(fall)), fall) - fall[-1]) / (fall[0] - fall[-1])
+        for fall in falls
+    ]
+    mean = np.mean(shares, axis=0)
+    return float(np.abs(mean - np.linspace(mean[0], mean[-1], _POINTS)).max()) < _STRAIGHTER

@@ -1,0 +1,89 @@
+"""Friction over the speed of the drive, and over the dwell before a slip."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.look.numbers import Number, mean_of, slope_of
+from diagnosis.look.record import Part, smoothed
+from diagnosis.look.sticks import Cycle
+
+Floats = npt.NDArray[np.float64]
+_VARIES = 1.3  # largest speed over smallest, from which friction is told over speed
+_BINS_A_DECADE = 8.0
+_WINDOWS = 200  # of a record without slips, in which speed and force are averaged
+_FEWEST_IN_BIN = 3
+_DWELLS = 1.25  # largest dwell over smallest (of nine in ten slips), from which breakaway is told over dwell
+
+
+class AtSpeed(NamedTuple):
+    """Friction at one speed of the drive."""
+
+    speed_mps: float
+    times: int  # slips, or windows without slips
+    mean_N: Number
+    breakaway_N: Number | None  # None: it slides evenly
+    sliding: bool
+
+
+def over_speed(parts: list[Part], cycles: list[Cycle], unit: str = "N") -> list[AtSpeed]:
+    """Friction at each speed, from the lowest on; empty where the speed is not known or stays the same."""
+    speeds = np.array([cycle.speed_mps for cycle in cycles])
+    means = np.array([cycle.mean_force_N for cycle in cycles])
+    tops = np.array([cycle.breakaway_force_N for cycle in cycles])
+    slipping = np.ones(len(cycles), np.bool_)
+    for part in parts:
+        own = [cycle for cycle in cycles if part.t_s[0] <= cycle.breakaway_t_s <= part.t_s[-1]]
+        more_speed, more_mean = _windows(part, own)
+        speeds, means = np.concatenate([speeds, more_speed]), np.concatenate([means, more_mean])
+        tops = np.concatenate([tops, np.full(len(more_speed), np.nan)])
+        slipping = np.concatenate([slipping, np.zeros(len(more_speed), np.bool_)])
+    good = np.isfinite(speeds) & np.isfinite(means) & (speeds > 0.0)
+    speeds, means, tops, slipping = speeds[good], means[good], tops[good], slipping[good]
+    if len(speeds) < 2 * _FEWEST_IN_BIN or speeds.max() < _VARIES * speeds.min():
+        return []
+    found: list[AtSpeed] = []
+    bins = np.round(np.log10(speeds) * _BINS_A_DECADE).astype(int)
+    for number in np.unique(bins):
+        own_bin = bins == number
+        mean = mean_of(means[own_bin], unit)
+        if own_bin.sum() < _FEWEST_IN_BIN or mean is None:
+            continue
+        top = mean_of(tops[own_bin & slipping], unit)
+        found.append(AtSpeed(float(np.exp(np.log(speeds[own_bin]).mean())), int(own_bin.sum()), mean, top, top is None))
+    return found if len(found) > 1 else []
+
+
+def _windows(part: Part, cycles: list[Cycle]) -> tuple[Floats, Floats]:
+    """Speed and mean force in windows without a slip, [windows] each; nothing where the drive's position is not known."""
+    if part.position_m is None:
+        return np.zeros(0), np.zeros(0)
+    width = max(len(part.t_s) // _WINDOWS, 8)
+    windows = len(part.t_s) // width
+    edges_s = part.t_s[: windows * width : width]
+    length_s = width * part.step_s
+    place = smoothed(part.position_m, max(width // 4, 1))[: windows * width].reshape(-1, width)
+    speed = (place[:, -1] - place[:, 0]) / (length_s - part.step_s)
+    mean = part.force_N[: windows * width].reshape(-1, width).mean(axis=1)
+    free = np.ones(windows, np.bool_)
+    for cycle in cycles:
+        dwell = cycle.dwell_s if np.isfinite(cycle.dwell_s) else cycle.breakaway_t_s - part.t_s[0]
+        end = cycle.restick_t_s if np.isfinite(cycle.restick_t_s) else part.t_s[-1]
+        free &= (edges_s + length_s < cycle.breakaway_t_s - dwell) | (edges_s > end)
+    if cycles:  # the climb after the last slip is a stick that has not ended
+        free &= edges_s < max(cycle.breakaway_t_s for cycle in cycles)
+    return speed[free], mean[free]
+
+
+def over_dwell(cycles: list[Cycle]) -> Number | None:
+    """Rise of the breakaway force per decade of dwell [N]; None where dwells are all alike."""
+    rows = np.array([(cycle.dwell_s, cycle.breakaway_force_N) for cycle in cycles if cycle.dwell_s > 0.0]).reshape(
+        -1, 2
+    )
+    if len(rows) < 5:
+        return None
+    low, high = np.quantile(rows[:, 0], (0.05, 0.95))
+    if high < _DWELLS * low:
+        return None
+    return slope_of(np.log10(rows[:, 0]), rows[:, 1], "N per decade")

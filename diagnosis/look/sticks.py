@@ -1,0 +1,105 @@
+"""Values of each slip and of each stick before it: breakaway force, re-stick force, dwell, slope, speed of the drive."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.look.record import Part, noise_of, smoothed
+from diagnosis.look.slips import Slips
+
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+_FROM, _TO = (
+    0.25,
+    0.9,
+)  # share of a stick in which its slope is read: a re-stick rings, and before a breakaway it creeps
+_FEWEST = 5  # samples of that
+_HALVES = 4  # samples of a smoothing from which every other one finds a peak and the others measure it
+
+
+class Cycle(NamedTuple):
+    """One slip and the stick before it; NaN where the record does not show it."""
+
+    breakaway_t_s: float
+    breakaway_force_N: float
+    restick_t_s: float
+    restick_force_N: float
+    dwell_s: float  # of the stick before
+    slope_N_per_s: float  # of that stick
+    speed_mps: float  # of the drive in that stick
+    stiffness_N_per_m: float  # of that stick, over the way of the drive
+    mean_force_N: float  # from this breakaway to the next
+    sign: float  # of the force as measured
+
+
+def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
+    """Every slip of a part. `speed_mps` is that of the drive where its position was not measured."""
+    part = slips.part
+    top_N, bottom_N = _peaks(slips)
+    found: list[Cycle] = []
+    for i, top in enumerate(slips.tops.tolist()):
+        bottom = int(slips.bottoms[i]) if i < len(slips.bottoms) else -1
+        began = int(slips.bottoms[i - 1]) if i else -1
+        following = int(slips.tops[i + 1]) if i + 1 < len(slips.tops) else -1
+        slope, speed, stiffness = _stick(part, began if i else 0, top, speed_mps) if i else (np.nan, np.nan, np.nan)
+        found.append(
+            Cycle(
+                float(part.t_s[top]),
+                float(top_N[i]),
+                float(part.t_s[bottom]) if bottom >= 0 else np.nan,
+                float(bottom_N[i]) if bottom >= 0 else np.nan,
+                float(part.t_s[top] - part.t_s[began]) if began >= 0 else np.nan,
+                slope,
+                speed,
+                stiffness,
+                float(part.force_N[top:following].mean()) if following >= 0 else np.nan,
+                part.sign,
+            )
+        )
+    return found
+
+
+def _peaks(slips: Slips) -> tuple[Floats, Floats]:
+    """Forces at breakaways and at re-sticks, [slips] each.
+
+    The largest of several noisy samples is too large. So one half of the samples finds the peak, and the other half measures it.
+    """
+    force_N, width = slips.part.force_N, slips.width | 1
+    if width < _HALVES or noise_of(force_N) == 0.0:
+        smooth = smoothed(force_N, min(width, 3) if noise_of(force_N) > 0.0 else 1)
+        reach = max(width // 2, 1)
+        return _extremes(smooth, slips.tops, reach, 1.0), _extremes(smooth, slips.bottoms, reach, -1.0)
+    halves = force_N[: len(force_N) // 2 * 2].reshape(-1, 2)
+    one, other = (smoothed(np.ascontiguousarray(halves[:, i]), width // 2) for i in (0, 1))
+    result: list[Floats] = []
+    for at, sign in ((slips.tops // 2, 1.0), (slips.bottoms // 2, -1.0)):
+        values = np.empty(len(at))
+        for i, middle in enumerate(np.minimum(at, len(one) - 1)):
+            near = slice(max(middle - width, 0), middle + width + 1)
+            first, second = one[near], other[near]
+            values[i] = 0.5 * (second[np.argmax(sign * first)] + first[np.argmax(sign * second)])
+        result.append(values)
+    return result[0], result[1]
+
+
+def _extremes(smooth: Floats, at: Indices, reach: int, sign: float) -> Floats:
+    return np.array([sign * (sign * smooth[max(i - reach, 0) : i + reach + 1]).max() for i in at.tolist()])
+
+
+def _stick(part: Part, began: int, top: int, speed_mps: float | None) -> tuple[float, float, float]:
+    """Slope of the force, speed of the drive, and stiffness, in the middle of a stick; NaN where it is too short."""
+    first, last = began + int(_FROM * (top - began)), began + int(_TO * (top - began))
+    if last - first < _FEWEST:
+        return np.nan, np.nan, np.nan
+    t_s, force_N = part.t_s[first:last], part.force_N[first:last]
+    slope = _slope(t_s, force_N)
+    if part.position_m is None:
+        return slope, speed_mps if speed_mps is not None else np.nan, slope / speed_mps if speed_mps else np.nan
+    speed = _slope(t_s, part.position_m[first:last])
+    return slope, speed, slope / speed if speed > 0.0 else np.nan
+
+
+def _slope(x: Floats, y: Floats) -> float:
+    centred = x - x.mean()
+    return float(centred @ (y - y.mean())) / float(centred @ centred)

@@ -1,0 +1,99 @@
+"""What is in a record, in sentences."""
+
+import math
+
+from bridge.units import counted, fixed_digits, prefixed
+from diagnosis.look.look import Look
+from diagnosis.look.numbers import Number
+
+# in the order in which they are told
+TITLES = {
+    "static_force_N": ("F_s", "force at breakaway"),
+    "kinetic_force_N": ("F_k", "force while it slides in a slip"),
+    "restick_force_N": ("F_min", "force at re-stick"),
+    "mu_s": ("mu_s", "static friction coefficient"),
+    "mu_k": ("mu_k", "kinetic friction coefficient"),
+    "mu_mean": ("mu", "mean friction coefficient of the record"),
+    "mu_min": ("mu_min", "coefficient at re-stick"),
+    "mu_swing": ("swing", "fall of the coefficient in a slip"),
+    "mu_slope_per_s": ("climb", "rise of the coefficient in a stick"),
+    "mu_dwell_per_decade": ("ageing", "rise of the coefficient at breakaway per decade of stick time"),
+    "swing_N": ("swing", "fall of the force in a slip"),
+    "period_s": ("period", "from breakaway to breakaway"),
+    "dwell_s": ("stick", "from re-stick to breakaway"),
+    "slip_s": ("slip", "from breakaway to re-stick"),
+    "slope_N_per_s": ("climb", "rise of the force in a stick"),
+    "stiffness_N_per_m": ("stiffness", "rise of the force over the way of the drive: drive and contact in series"),
+    "mass_kg": ("mass", "from the swing in a slip, on that stiffness"),
+    "dwell_N_per_decade": ("ageing", "rise of the breakaway force per decade of stick time"),
+}
+
+
+def with_interval(number: Number) -> str:
+    """A number with its unit and its interval of 90 %."""
+    factor, unit = (1.0, "") if number.unit == "1" else prefixed(abs(number.value), number.unit)
+    value, low, high = number.value * factor, number.low * factor, number.high * factor
+    digits = _digits(value, high - low)
+    if not math.isfinite(low):
+        return f"{fixed_digits(value, None)} {unit}".rstrip() + " (one value alone: no interval)"
+    return f"{value:.{digits}f} {unit}".rstrip() + f" ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def _digits(value: float, width: float) -> int:
+    """Decimals: two digits of the interval, and at most six digits of the number."""
+    most = 5 - math.floor(math.log10(abs(value))) if value else 3
+    if not math.isfinite(width) or width <= 0.0:
+        return min(max(most - 1, 0), 6)
+    return min(max(1 - math.floor(math.log10(width)), 0), max(most, 0), 6)
+
+
+def headline(seen: Look) -> str:
+    """The answer in one line."""
+    if not seen.cycles:
+        if seen.known.coefficient:
+            level = f"the friction coefficient is {seen.mean_force_N:.4g} on average, with {seen.noise_N:.2g} of noise"
+            return f"no slip in {seen.seconds:.3g} s: {level}"
+        level = f"the force is {seen.mean_force_N:.4g} N on average, with {seen.noise_N:.2g} N of noise"
+        return f"no slip in {seen.seconds:.3g} s: {level}"
+    if not seen.sticks:
+        swings = f"{counted(len(seen.cycles), 'swing')} in {seen.seconds:.3g} s"
+        return f"{swings} without a straight climb: it swings, and no stick is seen"
+    rate = 60.0 * seen.slips / seen.seconds
+    text = f"{counted(seen.slips, 'slip')} in {seen.seconds:.3g} s, {rate:.3g} per minute"
+    period = seen.numbers.get("period_s")
+    return text + (f", every {with_interval(period)}" if period is not None else "")
+
+
+def sentences(seen: Look) -> list[str]:
+    """A line for each number, and one for what the record cannot tell."""
+    lines: list[str] = []
+    for name, (symbol, meaning) in TITLES.items():
+        if name in seen.numbers:
+            lines.append(f"{symbol:<10} {with_interval(seen.numbers[name])}: {meaning}")
+    lines += [f"{'':<10} {text}" for text in cannot_tell(seen)]
+    for one in seen.at_speeds:
+        top = "" if one.breakaway_N is None else f", breakaway {with_interval(one.breakaway_N)}"
+        lines.append(f"{'at ' + f'{1e3 * one.speed_mps:.3g} mm/s':<14} mean {with_interval(one.mean_N)}{top}")
+    return lines
+
+
+def cannot_tell(seen: Look) -> list[str]:
+    """What is missing and why, with what to add."""
+    lines: list[str] = []
+    if not seen.sticks:
+        return lines
+    names = ("mu_s", "mu_k") if seen.known.coefficient else ("static_force_N", "kinetic_force_N")
+    if "stiffness_N_per_m" not in seen.numbers and "slope_N_per_s" in seen.numbers:
+        lines.append("no stiffness and no mass: the drive's speed is not known; add --speed 0.5mm/s")
+    if seen.known.coefficient:
+        lines.append("no force: the normal load is not known; add --load 94.5N")
+    elif seen.known.load_N is None:
+        lines.append("no friction coefficient: the normal load is not known; add --load 94.5N")
+    if seen.slips >= 2 and not {"dwell_N_per_decade", "mu_dwell_per_decade"} & seen.numbers.keys():
+        lines.append("no dependence on the stick time: all sticks last alike; measure at several speeds")
+    static = seen.numbers[names[0]]
+    if names[1] in seen.numbers and static.value - static.low > 0.1 * (static.value - seen.numbers[names[1]].value):
+        lines.append(
+            "F_s may be lower than the force at breakaway: a slide that moves off slowly lets the force rise on"
+        )
+    return lines

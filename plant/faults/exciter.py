@@ -1,0 +1,43 @@
+"""Faults of the exciter: what the base truly does of what the guard let through. They change the rig's own numbers."""
+
+import math
+from typing import Any
+
+from plant.faults.table import FaultTable
+
+FIELDS = ("delivered_ratio", "mount_resonance_Hz", "mount_damping_ratio", "amplitude_max_m", "amplitude_slew_m_per_s")
+_WARMING_S = 1.0
+_LOOSE_DAMPING = 0.05
+
+
+class Exciter:
+    """Sets the exciter's numbers in `plant.records.PARAMS` from those of the healthy rig and the faults that act.
+
+    Args:
+        params: record of the rig.
+
+    """
+
+    def __init__(self, params: Any) -> None:
+        self._params = params
+        self._healthy = {name: float(params[name]) for name in FIELDS}
+
+    def set(self, faults: list[tuple[FaultTable, float]]) -> None:
+        """`faults`: those that act, each with the time since its begin [s]."""
+        now = dict(self._healthy)
+        for table, since_s in faults:
+            size = table.size
+            if table.kind == "weak":
+                now["delivered_ratio"] *= size
+            elif table.kind == "hot":
+                now["delivered_ratio"] *= size + (1.0 - size) * math.exp(-since_s / _WARMING_S)
+            elif table.kind == "dead":
+                now["delivered_ratio"] = 0.0
+            elif table.kind == "resonant":
+                now["mount_resonance_Hz"], now["mount_damping_ratio"] = size, _LOOSE_DAMPING
+            elif table.kind == "clipping":
+                now["amplitude_max_m"] = min(now["amplitude_max_m"], size)
+            else:
+                now["amplitude_slew_m_per_s"] = size
+        for name, value in now.items():
+            self._params[name] = value

@@ -1,0 +1,60 @@
+"""A person's order to a running rig: a fault from now on, as a message of the topic `fault`."""
+
+import collections
+import json
+
+from bridge.config import validate
+from bridge.faults import Fault
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.payloads import parsed
+from bridge.wire.topics import FAULT
+from plant.faults.kinds import PROCESS
+from plant.faults.schedule import Faults
+from plant.faults.table import FaultTable
+
+_LONGEST = 10_000  # bytes of a table; one of any kind has fewer than 500
+
+
+_REMEMBERED = 64  # orders; who says one again does so within a second
+
+
+class Orders:
+    """The orders that a rig takes.
+
+    Args:
+        faults: of the rig.
+
+    """
+
+    def __init__(self, faults: Faults) -> None:
+        self._faults = faults
+        self._taken: collections.deque[str] = collections.deque(maxlen=_REMEMBERED)
+
+    def take(self, payload: bytes, block: int) -> None:
+        """Add the fault of a message to those of the rig, from block `block` on; one that was taken already is ignored.
+
+        Raises Fault BAD_MESSAGE for bytes that are no order, CONFIG for a table that is no fault of a rig.
+        """
+        order = parsed(wire.Inject, payload, FAULT.name)
+        if order.id and order.id in self._taken:
+            return
+        self._taken.append(order.id)
+        table = _table(order.fault) if order.fault else None
+        if order.clear:
+            self._faults.clear(block)
+        if table is not None:
+            self._faults.add(table, block)
+
+
+def _table(text: str) -> FaultTable:
+    try:
+        table = json.loads(text) if len(text) < _LONGEST else None
+    except (ValueError, RecursionError):
+        table = None
+    if not isinstance(table, dict):
+        raise Fault("BAD_MESSAGE", f"{FAULT.name}: fault: is no JSON object; send a table [[fault]]")
+    made = validate(FaultTable, table, FAULT.name)
+    if made.group == PROCESS:
+        line = f"{FAULT.name}: target = {made.target}: a rig ends no process; must be of sensors, exciter, clock or bus"
+        raise Fault("CONFIG", f"{line}; end the process by its pid")
+    return made

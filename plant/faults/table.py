@@ -1,0 +1,70 @@
+"""One table `[[fault]]` of a scenario: what goes wrong, where, from when and for how long."""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from bridge.config import Strict
+from bridge.wire.messages import CHANNELS
+from plant.faults.kinds import BUS, KINDS, PROCESS, TARGETS, group_of
+
+
+class FaultTable(Strict):
+    """A fault that a run has on purpose. The rig must be simulated."""
+
+    name: str = Field(default="", description="In events and verdicts; KIND TARGET if not given.")
+    kind: str = Field(description="What goes wrong: `stickslip fault --list` has all kinds.")
+    target: str = Field(description="A channel, sensors, exciter, clock, blocks, commands, link, or a process.")
+    from_s: Annotated[float, Field(ge=0)] = Field(default=0.0, description="Time of the run at which it begins.")
+    for_s: Annotated[float, Field(ge=0)] = Field(default=0.0, description="How long; 0: to the end.")
+    value: float | None = Field(default=None, description="Its size, by kind.")
+    other: str = Field(default="", description="Of `swapped`: the other channel.")
+
+    @model_validator(mode="after")
+    def _is_a_fault(self) -> "FaultTable":
+        group = group_of(self.target)
+        if group is None:
+            known = ", ".join(target for targets in TARGETS.values() for target in targets)
+            raise ValueError(f"target = {self.target}: no such target; known: {known}")
+        kinds = [kind for of, kind in KINDS if of == group]
+        if self.kind not in kinds:
+            raise ValueError(f"kind = {self.kind}: must fit target = {self.target}; known there: {', '.join(kinds)}")
+        made = KINDS[(group, self.kind)]
+        if not made.value:
+            if self.value is not None:
+                raise ValueError(f"value = {self.value:g}: kind = {self.kind} has none; leave it out")
+        elif self.value is None and made.default is None:
+            raise ValueError(f"value: missing; add it for kind = {self.kind}: {made.value}")
+        elif not made.lowest <= self.size <= made.highest:
+            rule = f"must be {made.lowest:g} to {made.highest:g} for kind = {self.kind} ({made.value})"
+            raise ValueError(f"value = {self.size:g}: {rule}; change the value")
+        if (self.kind == "swapped") != bool(self.other):
+            raise ValueError(f"other = {self.other!r}: goes with kind = swapped alone; name the other channel")
+        if self.other and (self.other not in CHANNELS or self.target not in CHANNELS or self.other == self.target):
+            raise ValueError(f"other = {self.other}: must be another channel than target; known: {', '.join(CHANNELS)}")
+        if self.kind == "held" and not self.for_s:
+            raise ValueError("for_s = 0: messages that are held must come some time; give for_s")
+        if group == PROCESS and self.kind == "frozen" and not self.for_s:
+            raise ValueError("for_s = 0: a process that is frozen must go on some time; give for_s, or kind = killed")
+        return self
+
+    @property
+    def group(self) -> str:
+        """Of its target."""
+        return group_of(self.target) or ""
+
+    @property
+    def size(self) -> float:
+        """Its value, or the default of its kind; 0 where the kind has none."""
+        return self.value if self.value is not None else KINDS[(self.group, self.kind)].default or 0.0
+
+    @property
+    def needs_time(self) -> bool:
+        """Whether it means nothing in lockstep, where each block waits for its command."""
+        return self.group in {BUS, PROCESS}
+
+    def in_words(self) -> str:
+        """Name and what it is."""
+        size = f" {self.size:g}" if KINDS[(self.group, self.kind)].value else ""
+        what = f"{self.target} {self.kind}{size}{f' with {self.other}' if self.other else ''}"
+        return f"{self.name}: {what}" if self.name else what

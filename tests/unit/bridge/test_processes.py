@@ -1,0 +1,39 @@
+"""Which process somebody is."""
+
+import json
+import os
+
+import pytest
+
+from bridge.faults import Fault
+from bridge.processes import pid_here, this_process
+
+
+def test_a_process_is_known_by_what_it_said() -> None:
+    assert pid_here("plant", this_process()) == os.getpid()
+
+
+@pytest.mark.parametrize(
+    ("changed", "line"),
+    [
+        ({"host": "elsewhere"}, "must be on this machine"),
+        ({"started": 1}, "is gone"),
+        ({"started": None}, "is gone"),
+        ({"pid": 2**22 + 1}, "is gone"),
+    ],
+)
+def test_another_process_is_not_taken_for_it(changed: dict[str, object], line: str) -> None:
+    with pytest.raises(Fault, match=line):
+        pid_here("plant", json.dumps(json.loads(this_process()) | changed))
+
+
+@pytest.mark.parametrize("told", ["", "[]", "{}", '{"pid": "x"}'])
+def test_what_tells_nothing_is_no_process(told: str) -> None:
+    with pytest.raises(Fault, match="does not tell its process"):
+        pid_here("plant", told)
+
+
+def test_a_process_of_another_user_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "getuid", lambda: -7)
+    with pytest.raises(Fault, match="must be of user -7"):
+        pid_here("plant", this_process())

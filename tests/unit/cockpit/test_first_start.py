@@ -1,0 +1,78 @@
+"""A first start: who still compiles is told, and a run waits for it; the wait can be set."""
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridge.faults import Fault
+from bridge.plain import COMPILED, COMPILING
+from cockpit.run import processes
+
+
+class Child:
+    """As a process that was started: its role, and whether it compiles."""
+
+    def __init__(self, role: str, compiles: bool = False) -> None:
+        self.role, self.compiles = role, compiles
+
+
+def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.Beginning:
+    return processes.Beginning(list(children), log, wait_s)
+
+
+def test_who_still_compiles_is_told_now_and_then(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(processes, "_TOLD_S", 0.0)
+    start = beginning(tmp_path / "run.mcap", None, Child("plant", compiles=True), Child("controller"))
+    time.sleep(0.01)
+    start.look()
+    assert "waiting  the plant still compiles, since 0 s; Ctrl-C ends it" in capsys.readouterr().err
+
+
+def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(processes, "_TOLD_S", 0.0)
+    log = tmp_path / "run.mcap"
+    log.write_bytes(b"of the run before")
+    start = beginning(log, 0.001, Child("plant"))
+    time.sleep(0.01)
+    log.write_bytes(b"of this run, which has begun")
+    start.look()
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("compiles", "words"),
+    [(True, "the plant and the controller still compile after"), (False, "have not found each other after")],
+)
+def test_after_the_longest_wait_the_fault_says_who_is_not_ready(tmp_path, compiles, words):
+    start = beginning(tmp_path / "run.mcap", 0.001, Child("plant", compiles), Child("controller", compiles))
+    time.sleep(0.01)
+    with pytest.raises(Fault, match=rf"NO_PEER: .*{words} .*--wait S"):
+        start.look()
+
+
+def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys):
+    said = f"print('stickslip: {COMPILING}the plant, once', file=sys.stderr, flush=True)"
+    over = f"print('stickslip: {COMPILED}the plant', file=sys.stderr, flush=True)"
+    code = f"import sys, time; {said}; sys.stdin.readline(); {over}; print('other', file=sys.stderr)"
+    started = processes.subprocess.Popen
+
+    def instead(_words: list[str], **how: Any) -> Any:
+        return started([sys.executable, "-c", code], **(how | {"stdin": processes.subprocess.PIPE}))
+
+    monkeypatch.setattr(processes.subprocess, "Popen", instead)
+    child = processes.Child("plant", [])
+    until_s = time.monotonic() + 20.0
+    while not child.compiles and time.monotonic() < until_s:
+        time.sleep(0.01)
+    assert child.compiles
+    child.process.stdin.write("\n")
+    child.process.stdin.close()
+    assert child.process.wait(20) == 0
+    child._reader.join(5.0)
+    assert not child.compiles
+    told = capsys.readouterr().err
+    assert f"{COMPILING}the plant" in told
+    assert COMPILED not in told

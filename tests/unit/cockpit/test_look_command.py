@@ -1,0 +1,185 @@
+"""`stickslip look`: one file, one answer, and what it writes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from python_calamine import load_workbook
+from typer.testing import CliRunner
+
+from cockpit.cli import app
+
+
+def tribometer(folder: Path) -> Path:
+    """As a tribometer writes it: title lines, semicolons, decimal commas, latin-1; 5 slips of 3 N in 8 s at 0.5 mm/s."""
+    t_s = np.arange(0, 8, 2e-3)
+    phase = t_s % 1.5
+    fall = 13.0 + 1.5 * (1 + np.cos(np.pi * (phase - 1.46) / 0.04))
+    force_N = np.where(phase < 1.46, 13.0 + 3.0 * phase / 1.46, fall)
+    rows = "".join(f"{t:.3f};{f:.4f};{94.5:.1f}\n" for t, f in zip(t_s, force_N, strict=True)).replace(".", ",")
+    path = folder / "Prüfung.csv"
+    path.write_bytes(("Prüfung 7\nStahl\nZeit [s];Reibkraft [N];Normalkraft [N]\n" + rows).encode("latin-1"))
+    return path
+
+
+def test_a_file_at_a_glance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    source = tribometer(tmp_path)
+    outs = [tmp_path / f"out{suffix}" for suffix in (".html", ".csv", ".xlsx", ".svg", ".toml")]
+    arguments = ["look", str(source), "--speed", "0.5mm/s", "--mass", "700kg", "--json"]
+    result = CliRunner().invoke(app, [*arguments, *(word for out in outs for word in ("--out", str(out)))])
+    assert result.exit_code == 0, result.output
+    table = json.loads(result.stdout)
+    assert table["slips"] == 5
+    assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
+    assert table["numbers"]["mu_k"]["value"] == pytest.approx(14.5 / 94.5, rel=2e-3)
+    assert table["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(3.0 / 1.46 / 5e-4, rel=2e-3)
+    texts = " ".join(one["text"] for one in table["findings"])
+    assert "delimiter = ';', decimal = ',', encoding = 'cp1252', skip_rows = 2" in texts
+    assert "700 is" in texts
+    page = outs[0].read_text(encoding="utf-8")
+    assert page.count("<svg") == 3
+    assert "SHA-256" in page
+    assert "1970-01-01 00:00:00 UTC" in page
+    assert table["headline"].split(",")[0] in page
+    assert len(outs[1].read_text().splitlines()) == 6
+    assert load_workbook(str(outs[2])).get_sheet_by_name("slips").to_python()[0][0] == "breakaway_t_s"
+    assert outs[3].read_text().startswith("<?xml")
+    again = CliRunner().invoke(app, ["look", str(source), "--map", str(outs[4]), "--load", "94.5N", "--json"])
+    assert json.loads(again.stdout)["numbers"]["mu_k"] == table["numbers"]["mu_k"]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--speed", "0.5"], "--speed 0.5: has no unit, and may be in m/s or not; write for example --speed 0.5mm/s"),
+        (["--load", "3kg"], "--load 3kg: is no force above 0; write for example --load 94.5N"),
+        (["--out", "a.doc"], "--out a.doc: must end in .html"),
+    ],
+)
+def test_what_cannot_be_known_is_asked_for(tmp_path: Path, words: list[str], expected: str) -> None:
+    result = CliRunner().invoke(app, ["look", str(tribometer(tmp_path)), *words, "--json"])
+    assert result.exit_code == 2
+    assert expected in json.loads(result.stdout)["line"]
+
+
+def test_a_file_of_unnamed_columns_is_asked_about(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,p,q\n" + "".join(f"{i},{i % 7},{i % 5}\n" for i in range(100)))
+    result = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--json"])
+    assert (
+        'which column is the force? add --force "NAME"; columns here: "t", "p", "q"'
+        in json.loads(result.stdout)["line"]
+    )
+    result = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--force", "p", "--json"])
+    assert result.exit_code == 0
+
+
+def test_an_import_without_a_map_writes_the_one_it_assumed(tmp_path: Path) -> None:
+    source, out = tribometer(tmp_path), tmp_path / "evidence"
+    result = CliRunner().invoke(app, ["log", "import", str(source), "--out", str(out)])
+    assert result.exit_code == 2
+    result = CliRunner().invoke(app, ["log", "import", str(source), "--out", str(out), "--speed", "0.5mm/s"])
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in out.iterdir()) == ["Prüfung.map.toml", "Prüfung.parquet", "manifest.toml"]
+    assert "mass_kg = " in (out / "Prüfung.map.toml").read_text(encoding="utf-8")
+
+
+def seen_in(path: Path, *words: str) -> dict[str, Any]:
+    result = CliRunner().invoke(app, ["look", str(path), *words, "--json"])
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+def said(table: dict[str, Any]) -> str:
+    return "\n".join(f"{one['kind']}: {one['text']}" for one in table["findings"])
+
+
+def saw_teeth(seconds: float = 8.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, force in N, and drive position in mm at 0.5 mm/s: slips of 3 N, one in 1.5 s, at 500 Hz."""
+    t_s = np.arange(0, seconds, 2e-3)
+    phase = t_s % 1.5
+    fall = 13.0 + 1.5 * (1 + np.cos(np.pi * (phase - 1.46) / 0.04))
+    return t_s, np.where(phase < 1.46, 13.0 + 3.0 * phase / 1.46, fall), 0.5 * t_s
+
+
+def table_of(path: Path, head: str, *columns: np.ndarray) -> Path:
+    rows = (",".join(f"{cell:.6g}" for cell in row) for row in zip(*columns, strict=True))
+    path.write_text("\n".join([head, *rows]) + "\n")
+    return path
+
+
+def test_a_position_that_stands_still_in_the_sticks_is_the_slides(tmp_path: Path) -> None:
+    t_s, force_N, drive_mm = saw_teeth()
+    stiffness_N_per_mm = 3.0 / 1.46 / 0.5
+    slide_mm = drive_mm - force_N / stiffness_N_per_mm + 5e-4 * np.random.default_rng(5).standard_normal(len(t_s))
+    path = table_of(tmp_path / "a.csv", "Time (s),Force (N),Displacement (mm)", t_s, force_N, slide_mm)
+    table = seen_in(path)
+    assert "'Displacement (mm)' stands still in the sticks: it is the slide's" in said(table)
+    assert not {"stiffness_N_per_m", "mass_kg"} & table["numbers"].keys()
+    table = seen_in(path, "--speed", "0.5mm/s", "--out", str(tmp_path / "a.toml"))
+    assert table["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(1e3 * stiffness_N_per_mm, rel=2e-3)
+    assert "drive_position_m" not in (tmp_path / "a.toml").read_text()
+    path = table_of(tmp_path / "b.csv", "Time (s),Force (N),Displacement (mm)", t_s, force_N, drive_mm)
+    assert seen_in(path)["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(1e3 * stiffness_N_per_mm, rel=2e-3)
+
+
+def test_a_coefficient_is_a_force_only_with_a_load(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    load_N = np.full(len(t_s), 50.0)
+    table = seen_in(table_of(tmp_path / "a.csv", "Time (s),COF,Load (N)", t_s, force_N / 50.0, load_N))
+    assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
+    assert table["numbers"]["mu_s"]["value"] == pytest.approx(0.32, rel=2e-3)
+    path = table_of(tmp_path / "b.csv", "Time (s),COF", t_s, force_N / 50.0)
+    numbers = seen_in(path, "--speed", "0.5mm/s")["numbers"]
+    assert numbers["mu_s"]["value"] == pytest.approx(0.32, rel=2e-3)
+    assert {number["unit"] for number in numbers.values()} == {"1", "s", "1/s", "rad/s"}
+    assert seen_in(path, "--load", "100N")["numbers"]["static_force_N"]["value"] == pytest.approx(32.0, rel=2e-3)
+
+
+def test_one_unknown_unit_leaves_the_others_known(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    path = table_of(tmp_path / "a.csv", "Timestamp,Fx,Tx\nms,kN,furlong", 1e3 * t_s, 1e-3 * force_N, t_s)
+    table = seen_in(path)
+    assert table["seconds"] == pytest.approx(8.0, rel=1e-3)
+    assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
+    assert "no known unit: 'furlong' of column Tx; taken as it is" in said(table)
+
+
+def test_a_group_that_begins_with_0_has_a_decimal_comma(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    rows = [f"{t:.3f};{1e3 * f:,.0f}" for t, f in zip(t_s, force_N, strict=True)]
+    text = "\n".join(row.translate(str.maketrans(".,", ",.")) for row in rows)
+    (tmp_path / "a.csv").write_text("Zeit (s);Kraft (mN)\n" + text)
+    table = seen_in(tmp_path / "a.csv")
+    assert table["seconds"] == pytest.approx(8.0, rel=1e-3)
+    assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
+
+
+def test_slow_logging_widens_the_interval_of_the_static_force(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth(60.0)
+    path = table_of(tmp_path / "a.csv", "Time (s),Force (N)", t_s[::37], force_N[::37])
+    low, high = seen_in(path)["numbers"]["static_force_N"]["interval_90"]
+    assert low < 16.0 < high
+
+
+def test_what_is_no_measurement_is_left_out_and_told(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    for value in (1e308, -9999.0, 999.0, -1e6):
+        bad = force_N.copy()
+        bad[[500, 1700, 2600]] = value
+        table = seen_in(table_of(tmp_path / "a.csv", "Time (s),Force (N)", t_s, bad))
+        assert table["numbers"]["kinetic_force_N"]["value"] == pytest.approx(14.5, rel=2e-3)
+        assert "outlier: 3 outliers, first row 501 = " in said(table)
+
+
+def test_rows_that_go_back_and_gaps_are_told(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    order = np.concatenate([np.arange(1000), np.arange(900, 2000), np.arange(2500, 4000)])
+    table = seen_in(table_of(tmp_path / "a.csv", "Time (s),Force (N)", t_s[order], force_N[order]))
+    assert "100 rows not later than the rows before (1 of the same time), first row 1001; left out" in said(table)
+    assert "time-gap: 1 gap in time, first at 3.998 s, the longest 1 s" in said(table)
+    path = table_of(tmp_path / "b.csv", "Time (s),Force (N)", np.tile(t_s, 2), np.tile(force_N, 2))
+    result = CliRunner().invoke(app, ["look", str(path), "--json"])
+    assert "4000 rows not later than the rows before" in json.loads(result.stdout)["line"]

@@ -1,0 +1,69 @@
+"""Tables of other programs come in as they are, with a map that names the columns and nothing else."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from bridge.faults import Fault
+from diagnosis.evidence.import_table import import_file
+from tests.unit.diagnosis.evidence.foreign_tables import FORCE, KINDS, POSITION, Kind, T, write
+
+RIG = """
+[rig]
+drive = "spring"
+mass_kg = 1.5
+drive_stiffness_N_per_m = 11700.0
+coulomb_force_N = 8.0
+static_force_N = 14.0
+stribeck_velocity_mps = 0.0005
+[run]
+drive_velocity_mps = 0.001
+"""
+
+
+def channel_map(folder: Path, **columns: str) -> Path:
+    lines = ["[channels]", *(f"{name} = '{column}'" for name, column in columns.items() if column)]
+    path = folder / "map.toml"
+    path.write_text("\n".join(lines) + RIG, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.file)
+def test_a_foreign_table_comes_in(tmp_path: Path, kind: Kind) -> None:
+    source = write(kind, tmp_path)
+    time, force, position = kind.columns
+    given = channel_map(tmp_path, t_s=time, drive_force_N=force, drive_position_m=position)
+    if kind.force_too != 1.0:
+        given.write_text(
+            given.read_text().replace(f"'{force}'", f"{{ column = '{force}', scale = {1 / kind.force_too} }}")
+        )
+    done = import_file(source, given, tmp_path / "evidence")
+    table = pq.read_table(tmp_path / "evidence" / done.file)
+    t_s = table["t_s"].to_numpy()
+    assert t_s - t_s[0] == pytest.approx(T[kind.rows] - T[kind.rows][0], abs=2e-6)
+    got = table["drive_force_N"].to_numpy()
+    there = np.isfinite(got)
+    assert (~there).sum() <= 1
+    assert got[there] == pytest.approx(FORCE[kind.rows][there], abs=2e-5)
+    if position:
+        late = 0.05 if kind.file == "start-offset.tdms" else 0.0
+        assert table["drive_position_m"].to_numpy() == pytest.approx(POSITION[kind.rows] - 1e-3 * late, abs=2e-8)
+    assert kind.says in " ".join(finding.text for finding in done.findings)
+
+
+def test_a_unit_of_another_quantity_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t [s],Temp [°C],M [Nm]\n" + "".join(f"{t},20.5,{2 + t}\n" for t in T))
+    with pytest.raises(Fault, match=r"column Temp: is in °C, a temperature: must be a force, as drive_force_N"):
+        import_file(tmp_path / "a.csv", channel_map(tmp_path, t_s="t", drive_force_N="Temp"), tmp_path / "out")
+    with pytest.raises(Fault, match=r'is in Nm, a torque, and the rig slides; a rig that turns has drive = "torsion"'):
+        import_file(tmp_path / "a.csv", channel_map(tmp_path, t_s="t", drive_force_N="M"), tmp_path / "out")
+
+
+def test_without_a_time_one_line_asks_for_it(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("F\n" + "".join(f"{f}\n" for f in FORCE))
+    with pytest.raises(
+        Fault, match=r"a.csv: no time: .*add under \[source\] sample_rate_Hz = 1000.0 \(columns here: F\)"
+    ):
+        import_file(tmp_path / "a.csv", channel_map(tmp_path, drive_force_N="F"), tmp_path / "out")

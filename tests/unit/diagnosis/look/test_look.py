@@ -1,0 +1,143 @@
+"""A record at a glance: the numbers of rigs whose truth the plant knows, and of saw-teeth made by hand."""
+
+import numpy as np
+import pytest
+
+from diagnosis.look.look import Known, look
+from plant.config import RigConfig
+from plant.simulate import simulate
+from tests.unit.diagnosis.look.rival import eight_lines
+
+
+def saw(stiffness: float, fall_s: float, drop: float, speed_mps: float = 1.1e-3):
+    stick_s = drop / (stiffness * speed_mps)
+    period_s = stick_s + fall_s
+    t_s = np.arange(0, 6, 2e-4)
+    phase = t_s % period_s
+    falling = 0.5 * drop * (1 + np.cos(np.pi * (phase - stick_s) / fall_s))
+    return t_s, 5.0 * drop + np.where(phase < stick_s, drop * phase / stick_s, falling), period_s
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.04])
+@pytest.mark.parametrize(
+    ("stiffness", "fall_s", "drop"),
+    [
+        (168.0, 0.042, 0.019),
+        (1002.0, 0.0174, 0.019),
+        (2254.0, 0.0116, 0.022),
+        (2254.0, 0.0116, 0.012),
+        (11700.0, 0.036, 5.8),
+    ],
+)
+def test_slips_that_last_longer_than_their_sticks_are_counted(
+    noise: float, stiffness: float, fall_s: float, drop: float
+):
+    t_s, force_N, period_s = saw(stiffness, fall_s, drop)
+    seen = look(t_s, force_N + noise * drop * np.random.default_rng(2).standard_normal(len(t_s)), None, Known(1.1e-3))
+    assert seen is not None
+    assert abs(seen.slips - 6.0 / period_s) <= 1.0
+    numbers = seen.numbers
+    assert numbers["period_s"].value == pytest.approx(period_s, rel=2e-3)
+    assert numbers["static_force_N"].value == pytest.approx(6.0 * drop, rel=0.005)
+    assert numbers["kinetic_force_N"].value == pytest.approx(5.5 * drop, rel=0.005)
+    assert numbers["stiffness_N_per_m"].value == pytest.approx(stiffness, rel=0.01)
+
+
+@pytest.mark.parametrize("pair", ["C45-C45 @ 0.063", "C45-GGG40 @ 0.063"])
+@pytest.mark.parametrize(("every", "noise_N"), [(10, 0.0), (20, 0.02), (20, 0.2)])
+def test_the_numbers_of_a_tribometer_are_within_a_percent(pair: str, every: int, noise_N: float) -> None:
+    rig = RigConfig.model_validate({"contact": {"pair": pair}})
+    made = simulate(rig, 12.0)
+    t_s = made.t_s[::every]
+    force_N = made.drive_force_N[::every] + noise_N * np.random.default_rng(4).standard_normal(len(t_s))
+    speed_mps = rig.drive.profile[0][1]
+    seen = look(t_s, force_N, None, Known(speed_mps, load_N=94.5))
+    assert seen is not None
+    truth = {
+        "static_force_N": rig.contact.static_force_N,
+        "kinetic_force_N": rig.contact.coulomb_force_N,
+        "stiffness_N_per_m": rig.drive.stiffness_N_per_m,
+        "mu_s": rig.contact.static_force_N / 94.5,
+        "mu_k": rig.contact.coulomb_force_N / 94.5,
+    }
+    for name, value in truth.items():
+        assert seen.numbers[name].value == pytest.approx(value, rel=0.01), name
+    assert seen.numbers["mass_kg"].value == pytest.approx(rig.slide.mass_kg, rel=0.15)
+    rival = eight_lines(t_s, force_N, speed_mps)
+    assert seen.slips == rival.slips
+    if noise_N >= 0.2:  # where the largest of many samples is too large
+        assert abs(seen.numbers["static_force_N"].value - truth["static_force_N"]) < 0.3 * abs(
+            rival.static_force_N - truth["static_force_N"]
+        )
+
+
+def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
+    """Friction that scatters from slip to slip: the mean of all slips is what the interval is for."""
+    random = np.random.default_rng(7)
+    held = 0
+    for _ in range(16):
+        tops = 17.0 + 0.2 * random.standard_normal(25)
+        pieces = [np.concatenate([np.linspace(12.0, top, 400), np.linspace(top, 12.0, 20)[1:-1]]) for top in tops]
+        force_N = np.concatenate(pieces)
+        force_N = force_N + 0.01 * random.standard_normal(len(force_N))
+        seen = look(np.arange(len(force_N)) * 1e-3, force_N)
+        assert seen is not None
+        number = seen.numbers["swing_N"]
+        held += number.low <= 5.0 <= number.high
+    assert 11 <= held <= 16
+
+
+def test_a_swing_is_no_stick_slip_and_noise_is_nothing() -> None:
+    t_s = np.arange(0, 5, 1e-3)
+    swings = look(t_s, 10.0 + np.sin(40.0 * t_s))
+    assert swings is not None
+    assert (swings.sticks, swings.slips) == (False, 0)
+    even = look(t_s, 10.0 + 0.1 * np.random.default_rng(0).standard_normal(len(t_s)))
+    assert even is not None
+    assert even.slips == 0
+    assert look(t_s[:8], t_s[:8]) is None
+
+
+def test_both_directions_and_a_gap_count_as_parts() -> None:
+    t_s, force_N, period_s = saw(11700.0, 0.036, 5.8)
+    there_and_back = np.concatenate([force_N, -force_N])
+    times = np.concatenate([t_s, t_s + 6.0])
+    seen = look(times, there_and_back, None, Known(1.1e-3))
+    assert seen is not None
+    assert abs(seen.slips - 12.0 / period_s) <= 2.0
+    assert {cycle.sign for cycle in seen.cycles} == {1.0, -1.0}
+    gone = (t_s > 2.0) & (t_s < 4.0)
+    gap = look(t_s[~gone], force_N[~gone], None, Known(1.1e-3))
+    assert gap is not None
+    assert gap.seconds == pytest.approx(4.0, abs=0.01)
+    assert gap.numbers["period_s"].value == pytest.approx(period_s, rel=1e-3)
+
+
+def test_friction_over_speed_and_over_stick_time() -> None:
+    """Three speeds, and a breakaway force that rises by 1 N a decade of stick time."""
+    stiffness, pieces, way, place = 10000.0, [], [], 0.0
+    for speed_mps in (2e-4, 5e-4, 2e-3):
+        for _ in range(8):
+            stick_s = 2.0 / (stiffness * speed_mps)
+            top = 12.0 + np.log10(stick_s)
+            climb = np.arange(0, stick_s, 1e-3)
+            fall = np.linspace(0, np.pi, 31)
+            pieces += [np.linspace(10.0, top, len(climb)), 10.0 + 0.5 * (top - 10.0) * (1 + np.cos(fall))]
+            way.append(place + speed_mps * 1e-3 * np.arange(1, len(climb) + len(fall) + 1))
+            place = way[-1][-1]
+    force_N, position_m = np.concatenate(pieces), np.concatenate(way)
+    seen = look(1e-3 * np.arange(len(force_N)), force_N, position_m)
+    assert seen is not None
+    assert [round(1e3 * one.speed_mps, 1) for one in seen.at_speeds] == [0.2, 0.5, 2.0]
+    assert seen.numbers["dwell_N_per_decade"].value == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_triangle_and_a_reversal_are_no_slips() -> None:
+    t_s = np.arange(0, 20, 1e-3)
+    noise_N = 0.05 * np.random.default_rng(3).standard_normal(len(t_s))
+    triangle = look(t_s, 14.5 + np.abs(t_s % 2.0 - 1.0) + noise_N)
+    assert triangle is not None
+    assert (triangle.slips, len(triangle.cycles) > 5) == (0, True)
+    turning = look(t_s, 14.5 * np.tanh(20.0 * np.cos(np.pi * t_s)) + noise_N, 5e-3 * np.sin(np.pi * t_s))
+    assert turning is not None
+    assert turning.slips == 0

@@ -1,0 +1,67 @@
+"""A person's order to a running rig."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.faults import Fault
+from bridge.wire import stickslip_pb2 as wire
+from plant.faults.orders import Orders
+from plant.faults.schedule import Faults
+from plant.records import PARAMS
+
+
+def faults() -> Faults:
+    return Faults((), 1, 1e-3, 20, np.zeros(1, np.dtype((np.record, PARAMS))))
+
+
+def order(table: Any, **more: Any) -> bytes:
+    text = table if isinstance(table, str) else json.dumps(table)
+    return wire.Inject(fault=text, who="somebody", **more).SerializeToString()
+
+
+OFF = {"kind": "off", "target": "drive_force_N", "for_s": 0.002}
+
+
+def test_an_order_acts_from_its_block_on_and_is_taken_once() -> None:
+    made = faults()
+    orders = Orders(made)
+    for _ in range(3):
+        orders.take(order(OFF, id="a"), 5)
+    told: list[str] = []
+    for block in range(4, 9):
+        made.begin_block(block)
+        told += [f"{block} {code}" for code, _ in made.news()]
+    assert told == ["5 INJECTED", "7 INJECTION_ENDED"]
+
+
+def test_clear_ends_what_acts_and_what_is_to_come() -> None:
+    made = faults()
+    orders = Orders(made)
+    orders.take(order(OFF | {"for_s": 0.0}, id="a"), 1)
+    orders.take(order(OFF | {"from_s": 1.0}, id="b"), 1)
+    made.begin_block(1)
+    orders.take(wire.Inject(clear=True, id="c").SerializeToString(), 2)
+    made.begin_block(2)
+    assert [code for code, _ in made.news()] == ["INJECTED", "INJECTION_ENDED"]
+    assert not made.busy
+
+
+@pytest.mark.parametrize(
+    ("payload", "line"),
+    [
+        (b"\xff" * 12, "bytes are no Inject"),
+        (order("[1"), "is no JSON object"),
+        (order("[" * 9000), "is no JSON object"),
+        (order([1]), "is no JSON object"),
+        (order(OFF | {"kind": "x"}), "kind = x: must fit target"),
+        (order({"kind": "killed", "target": "controller"}), "a rig ends no process"),
+    ],
+)
+def test_what_is_no_order_is_refused(payload: bytes, line: str) -> None:
+    made = faults()
+    with pytest.raises(Fault, match=line):
+        Orders(made).take(payload, 1)
+    assert not made.busy
