@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from cockpit.commands.bench import bench_app
 from cockpit.commands.blind import blind_app
 from cockpit.commands.certs import certs
 from cockpit.commands.diagnose import diagnose
@@ -24,6 +23,7 @@ from cockpit.commands.replay import replay_command
 from cockpit.commands.run import run
 from cockpit.commands.scenarios import scenarios
 from cockpit.commands.schema import schema
+from cockpit.commands.stress.bench import bench_app
 from cockpit.commands.stress.fault import fault
 from cockpit.commands.stress.soak import soak
 from cockpit.run.child_process import guarded, prepare_stdout

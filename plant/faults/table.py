@@ -12,7 +12,9 @@ from plant.faults.kinds import BUS, KINDS, PROCESS, TARGETS, group_of
 class FaultTable(Strict):
     """A fault that a run has on purpose. The rig must be simulated."""
 
-    name: str = Field(default="", description="In events and verdicts; KIND TARGET if not given.")
+    name: str = Field(
+        default="", pattern=r"^[^\x00-\x1f\x7f]*$", description="In events and verdicts; KIND TARGET if not given."
+    )
     kind: str = Field(description="What goes wrong: `stickslip fault --list` has all kinds.")
     target: str = Field(description="A channel, sensors, exciter, clock, blocks, commands, link, or a process.")
     from_s: Annotated[float, Field(ge=0)] = Field(default=0.0, description="Time of the run at which it begins.")

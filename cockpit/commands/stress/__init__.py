@@ -1,1 +1,1 @@
-"""Commands that try a loop: `fault` injects a fault into one that runs, `soak` watches one for hours."""
+"""Commands that try what is built: `bench` controller and guard, `fault` and `soak` a loop that runs."""
