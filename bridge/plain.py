@@ -2,6 +2,7 @@
 
 import re
 import sys
+from collections.abc import Callable
 
 # C0 but for tab and the line's end, DEL, C1, and the marks that turn the direction of writing or cannot be seen: each can hide or
 # forge what a person reads, and an escape code can do more (rename the window, answer in the person's name)
@@ -21,3 +22,11 @@ def plain(text: str) -> str:
 def say(line: str) -> None:
     """Print a line on stderr, plain."""
     print(plain(line), file=sys.stderr, flush=True)
+
+
+# What a process tells a person of its life: what (waiting, joined, running, ended) and a text.
+Tell = Callable[[str, str], None]
+
+
+def untold(_what: str, _text: str) -> None:
+    """Nobody looks."""

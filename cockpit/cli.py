@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
+from cockpit.commands.as_json.option import JsonGroup
 from cockpit.commands.blind import blind_app
 from cockpit.commands.certs import certs
 from cockpit.commands.diagnose import diagnose
 from cockpit.commands.example import example
 from cockpit.commands.explain import explain
-from cockpit.commands.json_option import JsonGroup
+from cockpit.commands.live import serve, watch
 from cockpit.commands.log import log_app
 from cockpit.commands.look import look
 from cockpit.commands.person import arm, disarm, reset, status, stop
@@ -61,6 +62,17 @@ app.command("disarm")(disarm)
 app.command("stop")(stop)
 app.command("reset")(reset)
 app.command("status")(status)
+app.command(
+    "serve",
+    epilog=_examples(
+        "stickslip serve                           then open http://127.0.0.1:8447/",
+        "stickslip serve --port 9000 --endpoint tcp/127.0.0.1:7448",
+    ),
+)(serve)
+app.command(
+    "watch",
+    epilog=_examples("stickslip watch", "stickslip watch --json --every 0.5 | jq .velocity_ratio"),
+)(watch)
 app.command(
     "fault",
     epilog=_examples(

@@ -1,8 +1,9 @@
 """The commanded amplitude for a wanted v_a: by the exciter's gain, learnt from the delivered v_a.
 
-The gain, delivered over commanded v_a, is compared with what was commanded one loop delay before. So the command follows from the
-learnt gain and not from an integrator behind the delay: it is stable for any delay that was measured (a Smith predictor in
-logarithms). A gain that was never measured starts at a tenth of the rigid mount's stroke, as a mount may resonate tenfold.
+The measured v_a is compared with all that was commanded within the longest loop delay that the loop is made for. Only what none
+of these commands explains is the gain's doing and teaches it (set membership: the delay is unknown but bounded). So whatever the
+delay is, and however it changes, what is learnt never passes the true gain, and the command follows from it without an integrator
+behind the delay. A gain that was never measured starts at a tenth of the rigid mount's stroke, as a mount may resonate tenfold.
 """
 
 import math
@@ -19,7 +20,10 @@ FIRST_SHARE = 0.1  # of the model's stroke, for a gain never measured
 _GROWTH = 1.25  # a loop delay, while the gain is not known
 _UNKNOWN_DELAY_S = 0.05  # loop delay until it is measured: the longest that the loop is designed for
 SETTLE_S = 0.004  # of vibration until a first gain is believed
-LEARN_S = 0.01  # time constant of the learnt gain; beyond it the delay's error must stay
+LEARN_S = 0.01  # time constant of the learnt gain
+MOST_DELAY_S = 0.05  # loop delay that the loop is made for. Longer: a gain that changes while v_d does is learnt later
+TAIL = 3.0  # time constants of the demodulator's low-pass after which what was commanded before is gone
+SLOTS = 18  # in which the extremes of what was commanded are kept, so that a look at them takes as many steps at any block length
 _HEARD = 5.0  # sigmas of the silent accelerometer from which a vibration counts as heard
 _LEAST_HEARD_MPS = 1e-7  # below it no accelerometer hears a vibration of some kHz
 _MEAN_STEPS = 50  # silent blocks that the noise is a mean of
@@ -36,8 +40,39 @@ _ALARM_RATIO = 1.05  # v_a / v_d below which a vibration is too weak
 
 
 @kernel
-def listen(p: Record, s: Record) -> None:
-    """Learn loop delay and gain from the v_a of this block, and correct the gain where v_a is too large."""
+def note_sent(p: Record, s: Record) -> None:
+    """Remember what this step commands and wants [m/s]."""
+    s.sent_m[s.steps % REMEMBERED] = s.allowed_m
+    sent_mps, slot = TWO_PI * s.allowed_Hz * s.allowed_m, s.steps // p.slot_steps % p.slots
+    anew = s.steps % p.slot_steps == 0
+    s.least_sent_mps[slot] = sent_mps if anew else min(s.least_sent_mps[slot], sent_mps)
+    s.most_sent_mps[slot] = sent_mps if anew else max(s.most_sent_mps[slot], sent_mps)
+    wanted_mps = s.wanted_velocity_mps
+    s.most_wanted_mps[slot] = wanted_mps if anew else max(s.most_wanted_mps[slot], wanted_mps)
+
+
+@kernel
+def _largest(p: Record, slots: Record) -> float:
+    largest = 0.0
+    for i in range(p.slots):
+        largest = max(largest, slots[i])
+    return largest
+
+
+@kernel
+def _least(p: Record, slots: Record) -> float:
+    least = math.inf
+    for i in range(p.slots):
+        least = min(least, slots[i])
+    return least
+
+
+@kernel
+def listen(p: Record, s: Record, late: bool) -> None:
+    """Learn loop delay and gain from the v_a of this block, and correct the gain where v_a is too large.
+
+    A block that comes `late` shows a v_a that was commanded longer ago than is known: it teaches nothing.
+    """
     at = s.steps % REMEMBERED
     delay = s.loop_delay_steps if s.loop_delay_steps >= 0 else 0
     sent_m = s.sent_m[(at - 1 - delay) % REMEMBERED]
@@ -45,35 +80,48 @@ def listen(p: Record, s: Record) -> None:
     note_command(s, expected_mps)
     s.expected_mps += p.filter_share * (expected_mps - s.expected_mps)
     silent = s.allowed_m == 0.0 and s.guard_state != CHECKING  # the rig's own check vibrates
-    s.silent_steps = s.silent_steps + 1 if silent else 0
+    s.silent_steps = s.silent_steps + 1 if silent and not late else 0
     if s.silent_steps > p.silence_steps:
         _note_silence(s)
         s.onset_steps, s.listening = -1, 1
     unsure = 1.0 + _UNSURE_STEPS / max(s.noise_steps, 1)
     heard = s.fast_mps > max(_HEARD * unsure * s.noise_mps, _LEAST_HEARD_MPS)
-    if s.listening == 1 and s.allowed_m > 0.0:
+    if s.listening == 1 and s.allowed_m > 0.0 and not late:
         s.onset_steps += 1
         if heard:
             _note_delay(s)
         elif s.noise_steps < _FEW_STEPS:
             _note_silence(s)
     s.heard_steps = s.heard_steps + 1 if heard and s.listening == 0 else 0
-    # a command that came late once may come earlier or later the next time, by half of its delay and more
-    unsteady_steps = s.loop_delay_steps // 2
     doubted = s.doubted & ACCELEROMETER != 0
-    if s.heard_steps < max(p.settle_steps, unsteady_steps) or s.demodulated_Hz != s.allowed_Hz or doubted:
+    # a first gain waits longer: a command that came late once may come earlier or later the next time, by half of its delay
+    steps = p.settle_steps if s.gain_known[s.candidate] == 1 else max(p.settle_steps, s.loop_delay_steps // 2)
+    if s.heard_steps < steps or s.demodulated_Hz != s.allowed_Hz or doubted:
         s.loud_steps = 0
         return
-    i = s.candidate
-    if s.gain_known[i] == 0 and s.expected_mps > 0.0:
-        s.log_gain[i], s.gain_known[i] = _bounded(math.log(s.vibration_velocity_mps / s.expected_mps)), 1
-    elif s.expected_mps > 0.0 and s.vibration_velocity_mps > 0.02 * s.expected_mps * math.exp(s.log_gain[i]):
-        now = math.log(s.vibration_velocity_mps / s.expected_mps)
-        share = min(p.learn_share, 1.0 / (1.0 + unsteady_steps))
-        s.log_gain[i] += share * (_bounded(now) - s.log_gain[i])
-        if is_even(p, s) and not is_known(p, s, i):
-            note_known(p, s, i, math.exp(now))
-    _hold_down(p, s, i, expected_mps)
+    most_mps = _largest(p, s.most_sent_mps)
+    if not late:
+        _learn(p, s, s.candidate, most_mps)
+    _hold_down(p, s, s.candidate, most_mps)
+
+
+@kernel
+def _learn(p: Record, s: Record, i: int, most_mps: float) -> None:
+    """Learn the gain of a candidate from what no command of the last loop delays explains; `most_mps` is the largest of them."""
+    now_mps = s.vibration_velocity_mps
+    if s.expected_mps <= 0.0 or now_mps <= 0.0:
+        return
+    if s.gain_known[i] == 0:
+        s.log_gain[i], s.gain_known[i] = _bounded(math.log(now_mps / s.expected_mps)), 1
+        return
+    gain = math.exp(s.log_gain[i])
+    least_mps = _least(p, s.least_sent_mps)
+    if now_mps > gain * most_mps > 0.0:
+        s.log_gain[i] += p.learn_share * (_bounded(math.log(now_mps / most_mps)) - s.log_gain[i])
+    elif 0.02 * gain * least_mps < now_mps < gain * least_mps:
+        s.log_gain[i] += p.learn_share * (_bounded(math.log(now_mps / least_mps)) - s.log_gain[i])
+    if now_mps > 0.02 * gain * s.expected_mps and is_even(p, s) and not is_known(p, s, i):
+        note_known(p, s, i, now_mps / s.expected_mps)
 
 
 @kernel
@@ -101,14 +149,12 @@ def _note_delay(s: Record) -> None:
 
 
 @kernel
-def _hold_down(p: Record, s: Record, i: int, expected_mps: float) -> None:
-    wanted_mps = 0.0
-    for back in range(s.loop_delay_steps + p.settle_steps + 2):
-        wanted_mps = max(wanted_mps, s.was_wanted_mps[(s.steps - 1 - back) % REMEMBERED])
+def _hold_down(p: Record, s: Record, i: int, most_mps: float) -> None:
+    wanted_mps = _largest(p, s.most_wanted_mps)
     ratio = s.fast_mps / wanted_mps if wanted_mps > 0.0 else 0.0
     s.loud_steps = s.loud_steps + 1 if ratio > _LOUDER else 0
-    if s.loud_steps >= p.loud_steps and expected_mps > 0.0:
-        s.log_gain[i] = _bounded(math.log(s.fast_mps / expected_mps))
+    if s.loud_steps >= p.loud_steps and most_mps > 0.0:
+        s.log_gain[i] = max(s.log_gain[i], _bounded(math.log(s.fast_mps / most_mps)))
         s.loud_steps = -s.loop_delay_steps  # the correction is heard one delay later
         if ratio > _MUCH_LOUDER:
             s.cut_steps = s.loop_delay_steps + p.settle_steps
@@ -118,7 +164,6 @@ def _hold_down(p: Record, s: Record, i: int, expected_mps: float) -> None:
 def amplitude(p: Record, s: Record) -> None:
     """Set the wanted amplitude [m] for the wanted v_a, and say whether the piezo is too weak for it."""
     velocity_mps = s.wanted_velocity_mps
-    s.was_wanted_mps[s.steps % REMEMBERED] = velocity_mps
     s.cut_steps = max(s.cut_steps - 1, 0)
     if velocity_mps <= 0.0 or s.cut_steps > 0:
         s.wanted_m, s.growth = 0.0, FIRST_SHARE

@@ -4,10 +4,12 @@ import threading
 from collections.abc import Callable
 
 from bridge.faults import Fault
+from bridge.plain import Tell, untold
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.complaints import FOREIGN
+from bridge.wire.event_codes import is_told
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import (
     ANNOUNCE,
@@ -50,16 +52,20 @@ def run(
     header: wire.Header,
     lockstep: bool,
     stop: threading.Event,
+    tell: Tell = untold,
 ) -> int:
     """Answer every block on the bus until the plant ends its run or `stop` is set; how many steps.
 
+    `tell`: of the life of this process, for a person.
+
     Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG, ENDPOINT_BUSY.
     """
-    node = ControllerNode(config)
+    node = ControllerNode(config, lockstep)
     node.warm_up()
+    tell("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
     with Bus(bus_config, "controller", lockstep, stop) as bus:
         bus.serve_header(header)
-        process = ControllerProcess(config, node, bus, lockstep)
+        process = ControllerProcess(config, node, bus, lockstep, tell=tell)
         process.prepare()
         _refuse_a_second(bus, bus_config.endpoint)
         refuse_another_rig(bus.headers(["plant"], _HEADER_S, stop).get("plant"), config)
@@ -71,7 +77,9 @@ def run(
         else:
             granted = realtime.claim(realtime.core(1))  # before the announcement, as the rig may begin right after
         bus.announce()
+        tell("joined", f"the rig at {bus_config.endpoint}; waiting for its first block")
         process.loop(stop, granted)
+    tell("ended", "stopped" if stop.is_set() else "with the rig")
     return node.steps
 
 
@@ -101,12 +109,20 @@ class ControllerProcess:
         bus: its session.
         lockstep: whether each block waits for its command.
         inbox: where its messages wait, if it is not one of its own.
+        tell: of the life of this process, and of what is more than news, for a person.
 
     """
 
     def __init__(
-        self, config: ControllerConfig, node: ControllerNode, bus: Bus, lockstep: bool, inbox: Inbox | None = None
+        self,
+        config: ControllerConfig,
+        node: ControllerNode,
+        bus: Bus,
+        lockstep: bool,
+        inbox: Inbox | None = None,
+        tell: Tell = untold,
     ) -> None:
+        self._tell = tell
         self._node = node
         self._bus = bus
         self._lockstep = lockstep
@@ -115,7 +131,7 @@ class ControllerProcess:
         self._inbox = inbox or Inbox(INBOX_LIMIT)
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
-        self._doubts = Doubts(node, self._inbox, self.event, lockstep)
+        self._doubts = Doubts(node, self._inbox, self.event)
         self._said_s: dict[str, float] = {}  # what operators were answered within the last second, and when
         self._end_said_s: float | None = None
         self._restarts = 0
@@ -147,6 +163,8 @@ class ControllerProcess:
         event = wire.Event(sequence=self._events, t_ns=self._node.t_ns, source="controller", code=code, text=text)
         self._events += 1
         self._send[CONTROLLER_EVENT.name](event.SerializeToString())
+        if is_told(code):
+            self._tell(code, text)
 
     def loop(self, stop: threading.Event, granted: str) -> None:
         """Consume blocks in order and answer each block; the plant applies the newest answer that it has.
@@ -184,6 +202,7 @@ class ControllerProcess:
                     self._tell_fresh()
                 if received.topic is SENSORS and not started:
                     started = True
+                    self._tell("running", granted or "in lockstep")
                     if not self._lockstep:
                         # now, as the plant sends its first block only when the recorder listens
                         self.event("START", granted)
@@ -282,6 +301,9 @@ class ControllerProcess:
         self._tell_unreadable()
         for code, text in node.news():
             self.event(code, text)
+        if node.slide_accel_unread:
+            text = "a sample is no number; the controller goes on without this channel"
+            self._doubts.complaints.note("NOT_FINITE", f"{SENSORS.name} mass_accel_mps2", text)
         if node.slipped_unmoved:
             text = f"block {node.last_block}: a slip, while the drive position stands: {_UNSEEN}"
             self._doubts.complaints.note("DRIVE_UNSEEN", SENSORS.name, text)
@@ -291,6 +313,7 @@ class ControllerProcess:
             self._tell_later("RIG_RESTARTED", text)
             self._rig_again.begin()
         if self._rig_lost:  # why is said again, as nobody heard it while the link was down
+            self._tell("joined", "the rig again")
             self._tell_later("RIG_BACK", f"blocks come again, from block {node.last_block} on; {self._rig_lost}")
             self._rig_lost = ""
         if self._end_said_s is not None and time.monotonic() - self._end_said_s > _PLANT_LOST_S:
@@ -354,4 +377,5 @@ class ControllerProcess:
             raise Fault("PEER_DIED", f"{text}, {silent_s:.1f} s ago")
         if not self._rig_lost:
             self._rig_lost = f"{text} then"
+            self._tell("waiting", f"for the rig, at most {_GIVEN_UP_S:g} s: {text}")
             self.event("RIG_LOST", f"{text}; waiting for it for {_GIVEN_UP_S:g} s")

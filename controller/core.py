@@ -6,16 +6,16 @@ from typing import Any
 import numpy.typing as npt
 
 from bridge.kernel import Record, kernel
-from controller.amplitude import FIRST_SHARE, REMEMBERED, amplitude, listen
+from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
 from controller.codes import BLOCK, LATE
 from controller.estimate.contact import contact
 from controller.estimate.learning import begin, forces, spring, stiffness
 from controller.estimate.motion import drive_velocity
-from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, begin_anew, note_steps, push
+from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, begin_anew, note_steps, push
 from controller.limits import allow
 from controller.needs.need import way_of
 from controller.policy import decide
-from controller.trips.band import begin_known
+from controller.trips.band import begin_known, note_check
 from controller.trips.doubts import end_trips
 from controller.trips.watch import restrain, told_reason, watch
 from controller.vibration import measure, skip
@@ -57,6 +57,7 @@ def step(
         block: Record = sensors[0]
         s.block = block.sequence
         s.run, s.guard_state = block.run, block.guard_state
+        note_check(p, s, float(block.check_Hz), float(block.check_gain))
         usable = _is_usable(p, block)
         s.missing_blocks += gap_blocks if usable else gap_blocks + 1
         if usable:
@@ -65,7 +66,7 @@ def step(
                 skip(p, s, s.missing_blocks)
                 s.missing_blocks = 0
             measure(p, s, block.base_accel_mps2)
-            listen(p, s)
+            listen(p, s, events & LATE != 0)
             force_N = _look(p, s, block)
             if events & LATE:
                 s.even_steps = 0  # what was commanded lately is not what this block shows
@@ -74,7 +75,7 @@ def step(
             restrain(p, s)
             amplitude(p, s)
     allow(p, s, events, s.wanted_Hz, s.wanted_m if usable else math.nan)
-    s.sent_m[s.steps % REMEMBERED] = s.allowed_m
+    note_sent(p, s)
 
     c: Record = command[0]
     c.sequence = s.steps
@@ -128,7 +129,7 @@ def _begin(p: Record, s: Record) -> None:
     """What of the memory is not zero at the start."""
     begin(p, s)
     begin_known(p, s)
-    s.followed = -1
+    s.followed, s.confirmed, s.went_m[:] = -1, 1.0, -1.0
     s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
     s.silent_steps = p.silence_steps  # nothing was ever commanded
     s.level, s.swing_level = -1, -1
@@ -144,14 +145,22 @@ def _is_usable(p: Record, block: Record) -> bool:
 
     A channel that the configuration leaves out is not looked at.
     """
-    total = 0.0
-    for i in range(block.drive_force_N.shape[0]):
-        total += float(block.drive_position_m[i]) + float(block.base_accel_mps2[i])
-        if p.use_force == 1:
-            total += float(block.drive_force_N[i])
-        if p.use_slide_position == 1:
-            total += float(block.mass_position_m[i])
-    return math.isfinite(total)
+    bad = _not_finite(block.drive_position_m) + _not_finite(block.base_accel_mps2)
+    if p.use_force == 1:
+        bad += _not_finite(block.drive_force_N)
+    if p.use_slide_position == 1:
+        bad += _not_finite(block.mass_position_m)
+    return bad == 0
+
+
+@kernel
+def _not_finite(samples: Record) -> int:
+    """How many are no number; counted without a branch, as eight at once are."""
+    bad = 0
+    for i in range(samples.shape[0]):
+        value = float(samples[i])
+        bad += 1 if value - value != 0.0 else 0
+    return bad
 
 
 @kernel
@@ -188,10 +197,10 @@ def _bridge(p: Record, s: Record, block: Record) -> None:
     apart = bins + 0.5 * BINS + 0.5 * samples / p.bin_samples
     for i in range(bins):
         share = (i + 0.5 + 0.5 * BINS) / apart
-        push(
-            p, s, force_N + share * (next_N - force_N), slide_m + share * (next_slide_m - slide_m),
-            drive_m + share * (next_drive_m - drive_m), False,
-        )  # fmt: skip
+        s.fresh[FORCE, 0] = force_N + share * (next_N - force_N)
+        s.fresh[SLIDE, 0] = slide_m + share * (next_slide_m - slide_m)
+        s.fresh[DRIVE, 0] = drive_m + share * (next_drive_m - drive_m)
+        push(p, s, 1, False)
 
 
 @kernel
@@ -205,12 +214,16 @@ def _look(p: Record, s: Record, block: Record) -> float:
     total_N, at = 0.0, 0
     slip_began, stick_began = 0, 0
     for _ in range(p.ticks_per_block):
-        tick_N = 0.0
-        for _ in range(p.bins_per_tick):
+        tick_N, fresh = 0.0, 0
+        for i in range(p.bins_per_tick):
             force_N, slide_m, drive_m = _mean(p, s, block, at, p.bin_samples)
             at += p.bin_samples
-            push(p, s, force_N, slide_m, drive_m, True)
+            s.fresh[FORCE, fresh], s.fresh[SLIDE, fresh], s.fresh[DRIVE, fresh] = force_N, slide_m, drive_m
+            fresh += 1
             tick_N += force_N
+            if fresh == MOST_FRESH or i == p.bins_per_tick - 1:
+                push(p, s, fresh, True)
+                fresh = 0
         tick_N /= p.bins_per_tick
         total_N += tick_N
         drive_velocity(p, s, tick_s)

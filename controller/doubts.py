@@ -16,15 +16,13 @@ class Doubts:
         node: the controller.
         inbox: where its messages wait.
         tell: publishes an event with a code and a text.
-        lockstep: no block is late, as the rig waits for the controller.
 
     """
 
-    def __init__(self, node: ControllerNode, inbox: Inbox, tell: Callable[[str, str], None], lockstep: bool) -> None:
+    def __init__(self, node: ControllerNode, inbox: Inbox, tell: Callable[[str, str], None]) -> None:
         self.complaints = Complaints(tell)
         self._node = node
         self._inbox = inbox
-        self._lockstep = lockstep
         self._seen: dict[str, int] = {}
 
     def unreadable(self, topic: Topic, fault: Fault) -> None:
@@ -51,7 +49,7 @@ class Doubts:
             late = f"t_ns is {node.clock_jump_ns * 1e-6:g} ms from what the number says"
             note(CLOCK, SENSORS.name, f"block {node.last_block}: {late}; times in trace and log are the rig's own")
             node.clock_jump_ns = 0
-        if node.age.is_late and not self._lockstep:
+        if node.age.is_late:
             text = f"blocks come {node.age.late_ns * 1e-6:.0f} ms later than they did: v_a swings more than it should"
             note("LATE", SENSORS.name, text)
         self.complaints.tell_when_due()

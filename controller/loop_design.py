@@ -11,7 +11,10 @@ What is expected is what was commanded `assumed` blocks before, so with the true
 
     L(z) = a / (z - 1 + a) * F(z) * (z^-delay - z^-assumed)
 
-whose size is about the delay's error over the time constant of learning, 10 ms, whatever the delay itself.
+whose size is about the delay's error over the time constant of learning, 10 ms, whatever the delay itself. The controller
+learns less than that: nothing of what some delay up to 50 ms explains (`amplitude`). So these are margins from below, and where
+the delay is off by more than they allow the loop still does not swing.
+
 This is a design tool. The controller never imports python-control, which takes a second to load.
 """
 

@@ -33,9 +33,14 @@ class ControllerNode:
     """The controller, stepped frame by frame.
 
     Raises Fault BAD_MESSAGE for messages that cannot be read, CONFIG for blocks of another length.
+
+    Args:
+        config: the controller.
+        lockstep: whether the rig waits for each command: no block is late then, however long the machine paused.
+
     """
 
-    def __init__(self, config: ControllerConfig) -> None:
+    def __init__(self, config: ControllerConfig, lockstep: bool = False) -> None:
         self.duplicates = 0  # blocks that came again, or after they were given up
         self.restarts = 0  # times that the rig began anew
         self.clock_jump_ns = 0  # of the last block: its t_ns against what its number says
@@ -56,6 +61,8 @@ class ControllerNode:
         self._announced = 0  # the bit ANNOUNCED where announcements came since the last frame
         self._teller = TripTeller()
         self.age = Age()
+        self._lockstep = lockstep
+        self.slide_accel_unread = False  # the slide's accelerometer shows no numbers
         self.slipped_unmoved = False  # in the last step a slip began while the drive position stood
 
     @property
@@ -140,7 +147,8 @@ class ControllerNode:
                 self._check_clock(t_ns - self.block_t_ns, lost)
         if verdict is Verdict.ANEW or self.clock_jump_ns:
             self.age.forget()
-        self.age.note(arrival_ns, t_ns)
+        if not self._lockstep:
+            self.age.note(arrival_ns, t_ns)
         self.block_t_ns = self.t_ns = t_ns
         sensors = self._layout.record(payload)
         events = (
@@ -179,6 +187,7 @@ class ControllerNode:
         )  # fmt: skip
         self.steps += 1
         self.slipped_unmoved = state.slips > slips_before and state.moving == 0
+        self.slide_accel_unread = bool(state.slide_accel_unread)
         return Outgoing(COMMAND, self._command.tobytes())
 
     def news(self) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import record
-from controller.amplitude import LEARN_S, LOUD_S, REMEMBERED, SETTLE_S, SILENCE_S
+from controller.amplitude import LEARN_S, LOUD_S, MOST_DELAY_S, REMEMBERED, SETTLE_S, SILENCE_S, SLOTS, TAIL
 from controller.announced import MOST_ANNOUNCED
 from controller.config import (
     MODES,
@@ -18,8 +18,8 @@ from controller.config import (
     candidate_frequencies_Hz,
     forbidden_bands_Hz,
 )
-from controller.estimate.windows import BINS, LEVELS, ROWS
-from controller.trips import band, delivered, doubts, frozen, spring
+from controller.estimate.windows import BINS, LEVELS, MOST_FRESH, ROWS
+from controller.trips import band, confirmed, delivered, doubts, frozen, spring
 
 _BIN_S = 1e-4  # shortest bin: a window of four sees the slips of a drive of 50 N/um
 _TICK_S = 1e-3  # the contact is judged so often, whatever the length of a block
@@ -48,7 +48,7 @@ _PARAMS_INTS = (
         "levels",
     ),
     *("use_force", "use_slide_position", "mode", "enabled_from_ns", "candidates", "bands"),
-    *("silence_steps", "settle_steps", "loud_steps"),
+    *("silence_steps", "settle_steps", "loud_steps", "slot_steps", "slots"),
     *(
         "known_steps",
         "low_steps",
@@ -58,6 +58,8 @@ _PARAMS_INTS = (
         "spring_level",
         "broken_steps",
         "first_steps",
+        "confirm_level",
+        "grown_steps",
     ),
 )
 PARAMS = np.dtype(
@@ -72,7 +74,7 @@ STATE = np.dtype(
     [
         # windows: rows FORCE, SLIDE, DRIVE
         ("bins", "f8", (ROWS, LEVELS, BINS)),
-        ("carried", "f8", (ROWS, LEVELS)),  # the odd bin of a level, until its neighbour comes
+        ("fresh", "f8", (ROWS, MOST_FRESH)),  # bins that are being added
         ("slope", "f8", (ROWS, LEVELS)),
         ("slope_before", "f8", (ROWS, LEVELS, 2)),  # of the window just before, and of that before it
         ("sigma", "f8", (ROWS, LEVELS)),  # of a slope, measured
@@ -197,7 +199,9 @@ STATE = np.dtype(
         ("gain_known", "i8", (MOST_CANDIDATES,)),
         ("growth", "f8"),
         ("sent_m", "f8", (REMEMBERED,)),
-        ("was_wanted_mps", "f8", (REMEMBERED,)),
+        ("least_sent_mps", "f8", (SLOTS,)),  # v_a as commanded, over slot_steps each
+        ("most_sent_mps", "f8", (SLOTS,)),
+        ("most_wanted_mps", "f8", (SLOTS,)),
         ("expected_mps", "f8"),
         ("noise_mps", "f8"),  # of the base that stands still, mean
         ("noise_steps", "i8"),  # that it is known from
@@ -215,6 +219,10 @@ STATE = np.dtype(
         ("doubted", "i8"),  # bits of `controller.trips.doubts`
         ("known_gain", "f8", (MOST_CANDIDATES,)),  # delivered over commanded v_a, and the steps that it is a mean of
         ("known_steps", "i8", (MOST_CANDIDATES,)),
+        ("checked_blocks", "i8"),  # that told a tone of the loop check
+        ("tone_Hz", "f8", (MOST_CANDIDATES, 2)),  # of it below and above a candidate; 0: none
+        ("tone_gain", "f8", (MOST_CANDIDATES, 2)),  # delivered over commanded v_a there
+        ("gain_other_s", "f8"),  # for which it is told that the check measured another gain than is configured
         ("banded", "i8"),  # whether the band holds the amplitude back
         ("even_steps", "i8"),  # for which the command that is heard has been even
         ("followed", "i8"),  # candidate of the next
@@ -227,12 +235,26 @@ STATE = np.dtype(
         ("kept_N_per_m", "f8"),  # stiffness then
         ("broken_steps", "i8"),  # for which the law is broken
         ("broken_drive", "i8"),  # of them, those in which the drive is what changed, less the others
+        ("broken_slide", "i8"),  # and those in which the slide goes faster than the rest explains
+        ("shaken_s", "f8"),  # for which the drive has moved under vibration
+        ("confirmed", "f8"),  # share of v_d that slide and force confirm, with its margin
+        ("apart_s", "f8"),  # for which they do not
+        ("apart_by", "i8"),  # row of what changed then; below 0: not known
+        ("agreed_mps", "f8", (ROWS,)),  # along the drive's direction, when they last did
+        ("stiffest_N_per_m", "f8"),  # largest stiffness learnt
+        ("went_m", "f8", (2,)),  # by the drive's place in the last two blocks; below 0: unknown
+        ("jumps", "f8"),  # of it in the last second
+        ("jumped_s", "f8"),  # for which v_d is that before the last one
+        ("drops", "f8"),  # times that the base accelerometer dropped out in the last second
+        ("dropped", "i8"),  # whether it did in the last block
+        ("grown_steps", "i8"),  # for which there is somewhat too much v_a
         ("spring_level", "i8"),  # windows that show it
         ("bend_m", "f8"),  # of the drive's place from sample to sample, mean
         ("bent", "i8"),  # looks in a row with much more of it
         ("slip_count", "f8"),  # in the last second
         ("unbelieved_s", "f8"),  # for which slips count as noise
         ("noise_told_s", "f8"),  # for which it is told that noise became larger
+        ("slide_accel_unread", "i8"),  # whether the slide's accelerometer shows no numbers
         ("outside", "i8"),  # whether the drive is outside of its travel
         ("first_sample", "f8", (doubts.CHANNELS,)),
         ("seen_block", "i8"),  # that these are of
@@ -298,7 +320,11 @@ def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]
     p.filter_share = 1.0 - math.exp(-config.block_s / amplitude.filter_s)
     p.learn_share = config.block_s / (config.block_s + LEARN_S)
     p.silence_steps, p.settle_steps, p.loud_steps = steps(SILENCE_S), steps(SETTLE_S), steps(LOUD_S)
+    shown_steps = 1 + steps(MOST_DELAY_S + TAIL * amplitude.filter_s)
+    p.slot_steps = math.ceil(shown_steps / (SLOTS - 1))
+    p.slots = 1 + math.ceil(shown_steps / p.slot_steps)
     p.spring_level = max(math.ceil(math.log2(spring.SHORTEST_S / (BINS * p.bin_s))), 0)
+    p.confirm_level = max(math.ceil(math.log2(confirmed.WINDOW_S / (BINS * p.bin_s))), 0)
     p.travel_low_m, p.travel_high_m = limits.travel_m or (-math.inf, math.inf)
     p.broken_steps, p.first_steps = steps(spring.HOLD_S), max(steps(spring.FIRST_S), delivered.SOME)
     p.told_gain = amplitude.known_gain or 0.0
@@ -309,6 +335,7 @@ def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]
         steps(delivered.LOUD_HOLD_S),
     )
     p.passed_steps, p.frozen_steps = steps(delivered.PASSED_S), max(steps(frozen.HOLD_S), frozen.FEWEST)
+    p.grown_steps = steps(delivered.GROWN_HOLD_S)
     p.accel_range_mps2 = amplitude.accel_range_mps2
     p.accel_bandwidth_Hz = amplitude.accel_bandwidth_Hz
     for name in ("v_ratio", "amplitude_max_m", "velocity_max_mps", "frequency_min_Hz", "frequency_max_Hz"):

@@ -4,28 +4,40 @@ Search the relations between channels, fit the baseline, look for a gap, find th
 the relations, put the answer together.
 """
 
+import math
 import time
 from collections.abc import Sequence
+from typing import NamedTuple
 
+from bridge.log.finding import Finding
 from diagnosis.evidence.folder import Evidence, Run
 from diagnosis.fits.retuning import retuned_rig
-from diagnosis.gap.prepare import prepare
-from diagnosis.gap.problem import PIEZO_EFFECTS, Problem
-from diagnosis.hypotheses.trials import trials
+from diagnosis.gap.excerpt import excerpt
+from diagnosis.gap.prepare import Prepared, prepare
+from diagnosis.gap.problem import PIEZO_EFFECTS, OutOfTimeError, Problem
+from diagnosis.hypotheses.trials import cannot_show, trials
+from diagnosis.latent.answer import LatentSignal, latent_of
 from diagnosis.processes import one_thread
-from diagnosis.relations.answer import relations_of
-from diagnosis.relations.decide import decision_of
+from diagnosis.relations.answer import Relations, relations_of
+from diagnosis.relations.decide import Decision, decision_of
 from diagnosis.report.assemble import assembled
+from diagnosis.report.latent_block import latent_line
 from diagnosis.report.relations_block import in_a_line, with_relations
+from diagnosis.report.without_fits import HOLD, LONGER, comparable, unfitted, without_fits
 from diagnosis.result import Diagnosis
+from diagnosis.verdict.by_latent import with_latent
 from diagnosis.verdict.by_relations import Closed, in_view_of
 from diagnosis.verdict.confirmation import borne_out
 from diagnosis.verdict.judge import Verdict, although_outside
 from diagnosis.verdict.selection import Contest, Progress
 
+_FOR_FITS = 0.7  # share of the time that the fits may take; the held-out runs, the next experiment and the pictures take the rest
+_NO_FIT = Finding("budget", "fits", "none was made: names and shares are those of relations and friction alone")
+_CUT_SHORT = Finding("budget", "fits", "ended before every effect was tried: this is the best answer by then")
 
-def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis:
-    """Diagnose one evidence. The answer does not depend on `jobs`.
+
+def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1, budget_s: float | None = None) -> Diagnosis:
+    """Diagnose one evidence. Without a budget the answer does not depend on `jobs`.
 
     Raises Fault BAD_EVIDENCE when nothing can be compared.
 
@@ -33,35 +45,80 @@ def diagnose(evidence: Evidence, progress: Progress, jobs: int = 1) -> Diagnosis
         evidence: the rig as described and the measured runs.
         progress: called with a text on the state of the work, and the share that is done (0 to 1).
         jobs: processes.
+        budget_s: seconds after which the answer is what is known by then; None: all the time it takes.
 
     """
     with one_thread():
-        return _diagnosed(evidence, progress, jobs)
+        return _diagnosed(evidence, progress, jobs, math.inf if budget_s is None else budget_s)
 
 
-def _diagnosed(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
+class _Seen(NamedTuple):
+    """What is known before any fit."""
+
+    runs: list[Prepared]
+    relations: Relations
+    decision: Decision
+    latent: tuple[LatentSignal, ...]
+
+
+def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: float) -> Diagnosis:
     began = time.monotonic()
     runs = prepare(evidence)
     relations = relations_of(evidence.rig, runs)
-    decision = decision_of(relations)
-    if told := in_a_line(decision):
-        progress(told, 0.02)
+    seen = _Seen(runs, relations, decision_of(relations), latent_of(evidence.rig, runs))
+    for told in (in_a_line(seen.decision), latent_line(seen.latent)):
+        if told:
+            progress(told, 0.02)
+    done = None
+    if comparable(runs):
+        done = _by_fits(evidence, seen, progress, jobs, (began, began + _FOR_FITS * budget_s))
+    if done is None:
+        verdict = with_latent(in_view_of(unfitted(), seen.decision, [], Closed(None, None)), seen.latent)
+        verdict = with_vibration_findings(verdict, evidence.runs)
+        done = without_fits(verdict, runs, LONGER if comparable(runs) else HOLD, began)
+        done = done._replace(findings=(*evidence.findings, _NO_FIT))
+    done = done._replace(cannot_show=cannot_show(evidence.rig, runs, evidence.assumed))
+    done = with_relations(done, evidence.rig, runs, relations, seen.decision, seen.latent)
+    progress(f"verdict: {done.verdict}", 1.0)
+    return done
+
+
+def _by_fits(
+    whole: Evidence, seen: _Seen, progress: Progress, jobs: int, time_s: tuple[float, float]
+) -> Diagnosis | None:
+    """The diagnosis by simulated fits, begun at the first and ended by the second of `time_s`; None where no fit ends in time."""
+    began, until_s = time_s
+    evidence = excerpt(whole)
+    runs = seen.runs if evidence is whole else prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
-    tried = trials(problem)
-    contest = Contest(retuned_rig(evidence, problem, progress, jobs), tried, jobs)
-    contest.decide(progress)
+    problem.until_s = until_s
+    hidden = set(cannot_show(evidence.rig, runs, evidence.assumed))
+    tried = [trial for trial in trials(problem) if not hidden & set(trial.hypothesis.effects)]
+    try:
+        contest = Contest(retuned_rig(evidence, problem, progress, jobs), tried, jobs)
+    except OutOfTimeError:
+        return None
+    findings: tuple[Finding, ...] = ()
+    try:
+        contest.decide(progress)
+        problem.until_s = contest.rig.fitter.problem.until_s = math.inf
+    except OutOfTimeError:
+        problem.until_s = math.inf
+        contest.stop()
+        findings = (_CUT_SHORT,)
     held_out = [run for run in runs if run.holdout]
     outcome = borne_out(contest, Problem(evidence.rig, held_out) if held_out else None, jobs)
     nearest = outcome.gone or outcome.verdict.runner_up
     closes = (
         outcome.held_out.closed_by(nearest).shrinkage if outcome.held_out is not None and nearest is not None else None
     )
-    verdict = in_view_of(outcome.verdict, decision, [*contest.singles, *contest.pairs], Closed(nearest, closes))
+    verdict = in_view_of(outcome.verdict, seen.decision, [*contest.singles, *contest.pairs], Closed(nearest, closes))
+    verdict = with_latent(verdict, seen.latent)
     verdict = with_vibration_findings(verdict, evidence.runs)
     outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
     progress(f"verdict: {outcome.verdict.kind}", 0.8)
     done = assembled(evidence, runs, contest, outcome, tried, began, jobs)
-    return with_relations(done, evidence.rig, runs, relations, decision)
+    return done._replace(findings=(*done.findings, *findings))
 
 
 def with_vibration_findings(verdict: Verdict, runs: Sequence[Run]) -> Verdict:

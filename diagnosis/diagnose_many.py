@@ -61,11 +61,11 @@ def find_sources(folders: list[Path]) -> list[EvidenceFolder]:
     return [EvidenceFolder(shown(name), folder) for name, folder in zip(unique, found, strict=True)]
 
 
-def real_diagnose(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
+def real_diagnose(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
     """`diagnosis.diagnose.diagnose`; imported in the worker, as the import compiles kernels."""
     from diagnosis.diagnose import diagnose  # noqa: PLC0415
 
-    return diagnose(evidence, progress, jobs)
+    return diagnose(evidence, progress, jobs, budget_s)
 
 
 def diagnose_many(

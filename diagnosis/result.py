@@ -176,6 +176,7 @@ class Diagnosis(NamedTuple):
     relations: tuple[RelationRow, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     numbers: tuple[RelationNumber, ...] = ()
+    cannot_show: tuple[str, ...] = ()  # effects that this kind of drive, or these runs, cannot show
 
 
 def _name(run: str) -> str:
@@ -213,6 +214,7 @@ def to_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "remainder": None if diagnosis.remainder is None else diagnosis.remainder._asdict(),
         "relations": [{**one._asdict(), "causes": list(one.causes)} for one in diagnosis.relations],
         "left_out": [one._asdict() for one in diagnosis.left_out],
+        "cannot_show": list(diagnosis.cannot_show),
         "numbers": [{**one._asdict(), "interval_90": list(one.interval_90)} for one in diagnosis.numbers],
     }
 

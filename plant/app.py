@@ -11,11 +11,12 @@ from bridge.guard.config import wider
 from bridge.guard.latch import StopLatch
 from bridge.guard.received import Commands
 from bridge.guard.tell import Teller
-from bridge.plain import say
+from bridge.plain import Tell, say, untold
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
+from bridge.wire.event_codes import is_told
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, FAULT, OPERATOR, PLANT_EVENT, SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
@@ -47,6 +48,7 @@ def run(
     arm: bool,
     latch: StopLatch | None,
     faults: Sequence[FaultTable] = (),
+    tell: Tell = untold,
 ) -> int:
     """Serve the rig on the bus until `duration_s` is over (0: for ever) or `stop` is set; how many blocks.
 
@@ -54,6 +56,7 @@ def run(
         arm: start ARMED, as a simulated rig may whose scenario says so.
         latch: where a person's stop is kept over restarts; None: nowhere, as in a run of `stickslip run`.
         faults: that the rig and its bus have on purpose.
+        tell: of the life of this process, and of what is more than news, for a person.
 
     Raises Fault ENDPOINT_BUSY, NO_PEER, NOT_SECURE, PEER_DIED, LOCKSTEP_STALLED.
 
@@ -65,7 +68,7 @@ def run(
     blocks = round(duration_s / rig.solver.block_s) if duration_s > 0 else 2**62
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
-        process = PlantProcess(node, bus, latch)
+        process = PlantProcess(node, bus, latch, tell)
         # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -73,8 +76,14 @@ def run(
         else:
             granted = realtime.claim(realtime.core(0))
         bus.announce()
+        if wait_for and bus.wait_for(wait_for, 0.0):
+            tell("waiting", f"for {' and '.join(wait_for)} at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
         wait_for_peers(bus, bus_config, wait_for, stop)
+        if wait_for and not stop.is_set():
+            tell("joined", " and ".join(wait_for))
         process.event("START", granted)
+        how_long = f"for {duration_s:g} s" if duration_s > 0 else "until Ctrl-C"
+        tell("running", f"rig {rig.name} at {bus_config.endpoint}, {how_long}; {granted}")
         if why_not:
             process.event(
                 "STATE_FOLDER", f"{why_not}: a stop cannot be kept over a restart, so nothing is armed by itself"
@@ -84,6 +93,7 @@ def run(
         advance = process.lockstep if lockstep else process.realtime
         advance(blocks, stop)
         process.end()
+        tell("ended", f"{'stopped' if stop.is_set() else 'at its end'}, after {node.block * rig.solver.block_s:.1f} s")
         bus.wait_until_alone(_GOODBYE_S)  # this process relays the messages of the others, so it leaves last
     return node.block
 
@@ -106,11 +116,13 @@ class PlantProcess:
         node: the rig.
         bus: its session.
         latch: where a person's stop is kept; None: nowhere.
+        say: of what is more than news, for a person.
 
     """
 
-    def __init__(self, node: PlantNode, bus: Bus, latch: StopLatch | None) -> None:
+    def __init__(self, node: PlantNode, bus: Bus, latch: StopLatch | None, say: Tell = untold) -> None:
         self._node = node
+        self._say = say
         self._latch = latch
         self._teller = Teller()
         self._words, self._orders = Inbox(16), Inbox(16)
@@ -142,6 +154,8 @@ class PlantProcess:
         event = wire.Event(sequence=self._events, t_ns=t_ns, source="plant", code=code, text=text)
         self._events += 1
         self._send_event(event.SerializeToString())
+        if is_told(code):
+            self._say(code, text)
 
     def end(self) -> None:
         """Say that the run is over, and leave the bus as a rig: only both together end the other processes."""

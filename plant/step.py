@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from bridge.guard.check import tell_gain
 from bridge.guard.core import allow, look
 from bridge.kernel import Record, kernel
 from plant.core import advance, advance_disturbed
@@ -66,6 +67,7 @@ def report(
     look(gp, g, block)
     block.run = gp.run
     block.guard_state = g.state
+    tell_gain(gp, g, block)
     a: Record = applied[0]
     a.sequence = s.block
     a.t_ns = (s.block + 1) * p.block_ns

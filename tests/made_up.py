@@ -158,7 +158,7 @@ def diagnosis() -> Diagnosis:
     )
 
 
-def quick(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
+def quick(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
     """At once; the folder's name decides what happens."""
     name = evidence.folder.name
     progress("the drive force is off by 6 noise floors", 0.1)
@@ -169,7 +169,7 @@ def quick(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     return diagnosis()._replace(elapsed_s=float(jobs), pictures=())
 
 
-def dies(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
+def dies(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
     """Like `quick`, but whoever works on `killer`, or on `deadly` for the first time, is killed."""
     mark = evidence.folder / "killed"
     if evidence.folder.name == "killer" or (evidence.folder.name == "deadly" and not mark.exists()):
@@ -179,7 +179,7 @@ def dies(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
     return quick(evidence, progress, jobs)
 
 
-def endless(evidence: Evidence, progress: Progress, jobs: int) -> Diagnosis:
+def endless(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
     """Says who works, and does so for a minute."""
     (evidence.folder / "worker").write_text(str(os.getpid()))
     progress("this takes long", 0.1)

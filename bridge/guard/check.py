@@ -91,6 +91,14 @@ def _judge(p: Record, s: Record, at: int) -> None:
 
 
 @kernel
+def tell_gain(p: Record, s: Record, block: Record) -> None:
+    """Write one tone of the last check, and the gain there, into a block, each block the next; zeros where none was passed."""
+    at = s.block % p.tones
+    block.check_Hz = p.tone_Hz[at] if s.verified == 1 else 0.0
+    block.check_gain = s.gain[at] if s.verified == 1 else 0.0
+
+
+@kernel
 def _note(s: Record, channel: int, samples: Record) -> bool:
     for i in range(samples.shape[0]):
         value = float(samples[i])

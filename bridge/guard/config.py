@@ -48,7 +48,7 @@ class GuardConfig(Strict):
         default=None, description="Of the commanded v_a. Not given: what the stroke gives at the highest frequency."
     )
     velocity_ratio: Level = Field(
-        default=Level(alarm=3.0, abort=4.0),
+        default=Level(alarm=3.0, abort=4.0, hold_s=0.1),
         description="Commanded v_a, by the checked gain, over the drive's velocity.",
     )
     loud_ratio: Level = Field(

@@ -8,6 +8,7 @@ from bridge.guard.states import trip
 from bridge.kernel import Record, kernel
 
 _TWO_PI = 2.0 * math.pi
+_TOLD_PARTS = 10  # of the time until it trips, after one of which a loud vibration is told
 
 
 @kernel
@@ -74,4 +75,10 @@ def watch(p: Record, s: Record) -> None:
     passes(p, s, HEAT, s.heat)
     passes(p, s, DUTY, s.duty)
     loud = s.vibration_mps / max(s.drive_mps, 1e-12) if s.amplitude_m > 0.0 else 0.0
-    passes(p, s, LOUD, loud)
+    told = s.limit
+    if passes(p, s, LOUD, loud):
+        s.loud_blocks = 0
+        return
+    s.loud_blocks += 1
+    if _TOLD_PARTS * s.loud_blocks <= p.hold_blocks[LOUD - FIRST]:
+        s.limit = told  # a machine that stops shakes its base for a moment

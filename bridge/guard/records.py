@@ -56,6 +56,7 @@ STATE = np.dtype(
         for name in (
             *("block", "state", "cause", "limit", "fresh", "heard", "last_sequence", "refused"),
             *("seen_blocks", "lost_blocks", "check_blocks", "verified", "frozen_channel"),
+            "loud_blocks",
         )
     ]
     + [

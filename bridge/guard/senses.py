@@ -6,11 +6,15 @@ from bridge.guard.records import RING
 from bridge.kernel import Record, kernel
 
 _TWO_PI = 2.0 * math.pi
+_PARTS = 5  # of the window of the drive's velocity
 
 
 @kernel
 def see_drive(p: Record, s: Record, block: Record) -> None:
-    """Largest velocity of the drive in the last moments [m/s]: over 50 ms of its positions, forgotten slowly."""
+    """Largest velocity of the drive in the last moments [m/s]: over 50 ms of its positions, forgotten slowly.
+
+    A place that jumps has a velocity in two of five parts of the 50 ms at most, so the velocity is at most their median.
+    """
     samples = block.drive_position_m.shape[0]
     mean_m = 0.0
     for i in range(samples):
@@ -22,8 +26,29 @@ def see_drive(p: Record, s: Record, block: Record) -> None:
     back = min(p.window_blocks, s.seen_blocks)
     if back > 0:
         was_m = s.drive_m[(s.seen_blocks - back) % RING]
-        s.drive_mps = max(s.drive_mps, math.fabs(mean_m - was_m) / (back * p.block_s))
+        velocity_mps = math.fabs(mean_m - was_m) / (back * p.block_s)
+        s.drive_mps = max(s.drive_mps, min(velocity_mps, _median(p, s, back)))
     s.seen_blocks += 1
+
+
+@kernel
+def _median(p: Record, s: Record, blocks: int) -> float:
+    """Median velocity of the drive over the parts of its last blocks [m/s]."""
+    fastest_mps, second_mps, third_mps = 0.0, 0.0, 0.0
+    newer = s.seen_blocks
+    for part in range(1, _PARTS + 1):
+        older = s.seen_blocks - blocks * part // _PARTS
+        if older == newer:
+            continue
+        velocity_mps = math.fabs(s.drive_m[newer % RING] - s.drive_m[older % RING]) / ((newer - older) * p.block_s)
+        if velocity_mps > fastest_mps:
+            fastest_mps, second_mps, third_mps = velocity_mps, fastest_mps, second_mps
+        elif velocity_mps > second_mps:
+            second_mps, third_mps = velocity_mps, second_mps
+        else:
+            third_mps = max(third_mps, velocity_mps)
+        newer = older
+    return third_mps
 
 
 @kernel

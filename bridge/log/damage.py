@@ -18,6 +18,7 @@ class Damage(NamedTuple):
     bad_records: int = 0  # number of definitions, tables, messages or stretches of bytes that cannot be read
     nameless: int = 0  # messages of a channel whose definition is lost: their topic cannot be known
     missing: int = 0  # messages that the file's own count has and that were not found
+    before: str = ""  # what had been lost of the log that this one was saved from, in words
 
     @property
     def whole(self) -> bool:
@@ -28,6 +29,27 @@ class Damage(NamedTuple):
     def and_also(self, **more: int) -> "Damage":
         """With more of it: the names of fields and what to add to each."""
         return self._replace(**{name: getattr(self, name) + count for name, count in more.items()})
+
+
+def also_before(damage: Damage, lost: str) -> Damage:
+    """With what had been lost before, in the words of the file."""
+    known = damage.before.split("; ") if damage.before else []
+    return damage if not lost or lost in known else damage._replace(before="; ".join([*known, lost]))
+
+
+def lost_in_words(damage: Damage) -> str:
+    """What could not be read, in words; empty when all could."""
+    parts = [f"{counted(damage.cut_bytes, 'byte')} of an open chunk at the end"] if damage.cut_bytes else []
+    parts += [counted(damage.bad_chunks, "damaged chunk")] if damage.bad_chunks else []
+    if damage.bad_records:
+        names = "damaged definition, message or stretch", "damaged definitions, messages or stretches"
+        parts.append(counted(damage.bad_records, *names))
+    if damage.nameless:
+        parts.append(f"{counted(damage.nameless, 'message')} whose topic is lost with its definition")
+    if damage.missing:
+        parts.append(f"{counted(damage.missing, 'message')} by the log's own count")
+    parts += ["its end"] if not (parts or damage.whole) else []
+    return ", ".join(parts)
 
 
 def damage_findings(damage: Damage, path: Path) -> list[Finding]:
@@ -56,6 +78,9 @@ def damage_findings(damage: Damage, path: Path) -> list[Finding]:
     if damage.missing:
         text = f"the file's own count has {counted(damage.missing, 'message')} more than are in it"
         found.append(Finding("damaged", path.name, text, damage.missing))
+    if damage.before:
+        text = f"was saved from a log that was not whole; how many messages are missing is not known: {damage.before}"
+        found.append(Finding("recovered", path.name, text))
     return found
 
 

@@ -16,11 +16,11 @@ from mcap.records import Channel, Chunk, Header, Metadata, Schema, Statistics
 
 from bridge.faults import Fault
 from bridge.log.chunk_messages import Chunked, Messages, messages_of
-from bridge.log.damage import Damage
+from bridge.log.damage import Damage, also_before
 from bridge.log.library import HEAD, MAGIC, READABLE, refuse_other_version
 from bridge.log.reading.chunk_bytes import LARGEST_CHUNK_BYTES, UNREADABLE, next_chunk, next_record, opened, unpacked
 from bridge.log.reading.definitions import Definitions
-from bridge.log.storage.parts import OF_FILES, parts_of
+from bridge.log.storage.parts import LOST, OF_FILES, parts_of
 
 # Uncompressed bytes of all chunks for a byte of the log, and what any log may have besides. Data that compress to nothing, as
 # zeros, still cost 16 bytes of index a message, so that not even a block of 200 samples of zeros reaches 200.
@@ -285,7 +285,9 @@ class LogReader:
                 self._definitions.learn(opcode, content)
             elif opcode == Opcode.METADATA:
                 metadata = Metadata.read(stream)
-                if metadata.name not in OF_FILES:
+                if metadata.name == LOST:
+                    self.damage = also_before(self.damage, metadata.metadata.get("what", ""))
+                elif metadata.name not in OF_FILES:
                     self.metadata[metadata.name] = dict(metadata.metadata)
             elif opcode == Opcode.STATISTICS:
                 self._stated = Statistics.read(stream).message_count

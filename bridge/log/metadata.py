@@ -20,9 +20,8 @@ def table_of(metadata: Metadata, name: str, key: str, path: Path) -> dict[str, A
         )
         if "import" in metadata:
             line = f"{path}: is measured data of another program, imported, without a {name}: there is no run to judge"
-        remedy = (
-            "`stickslip log info`, `log check`, `log export` and `plot` read it, and `diagnose` in an evidence folder"
-        )
+        reads = "`log info`, `log check`, `log export`, `plot`" if "import" in metadata else "`log check`, `log export`"
+        remedy = f"{reads} and `look` read it, and `diagnose` in an evidence folder"
         raise Fault("BAD_LOG", f"{line}; {remedy}")
     table = _parsed(text, f"{path}: the {key} of the {name}")
     if not isinstance(table, dict):

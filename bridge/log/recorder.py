@@ -12,6 +12,7 @@ from bridge.faults import Fault
 from bridge.log.pause_writer import PauseWriter
 from bridge.log.runlog import NO_ROTATION, Rotation, RunLog
 from bridge.log.screen import Screen
+from bridge.plain import Tell, untold
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import Complaints
@@ -44,6 +45,7 @@ def run(
     stop: threading.Event,
     ready: Callable[[], None] = lambda: None,
     rotation: Rotation = NO_ROTATION,
+    say: Tell = untold,
 ) -> None:
     """Record until the plant and the controller have ended, or `stop` is set.
 
@@ -56,18 +58,22 @@ def run(
         stop: ends the recording.
         ready: called when the roles have answered, before the log is begun.
         rotation: when the log goes on in a new file.
+        say: tells of the life of this process, for a person.
 
     Raises Fault NO_PEER, NOT_SECURE, PEER_DIED, BAD_MESSAGE for a header of a schema version that is not known, LOG_WRITE,
     LOG_LOST; the last two at the end, in real time, as the run goes on meanwhile.
 
     """
     sys.setswitchinterval(_SWITCH_S)
+    say("waiting", f"for a rig at {bus_config.endpoint}, at most {bus_config.wait_s:g} s")
     with Bus(bus_config, "recorder", lockstep, stop) as bus:
         inbox = Inbox(_INBOX_LIMIT, patient=lockstep)
         for topic in TOPICS:
             if topic.logged and topic.sender != "recorder":
                 bus.listen(topic, inbox.push)
+        say("waiting", f"for what {' and '.join(roles)} say of themselves, at most {bus_config.wait_s:g} s")
         headers = bus.headers(roles, bus_config.wait_s, stop)
+        say("joined", " and ".join(headers) or "nobody said anything of itself")
         for header in headers.values():
             refuse_other_schema(header)
         ready()
@@ -93,12 +99,16 @@ def run(
                 watch = ending.enter_context(contextlib.closing(PauseWatch()))
                 pauses = PauseWriter(log, watch)
             bus.announce()
+            say("running", f"all that is said from now on goes into {path}")
             complaints = Complaints(log.add_event)
             lost_plant = _record(log, bus, inbox, stop, pauses, complaints)
             complaints.tell_when_due(all_of_it=True)
             if pauses is not None:
                 pauses.finish()
         log.close()
+        say(
+            "ended", "stopped" if stop.is_set() else "with the rig" if not lost_plant else "the rig left without an END"
+        )
     if lost_plant:
         raise Fault("PEER_DIED", f"the plant went away before its end; {path} was closed with all that came")
 

@@ -7,12 +7,12 @@ from typing import NamedTuple
 from bridge.faults import Fault
 from bridge.files import LOG, Replacement, check_file, refuse_to_replace
 from bridge.log.chunk_messages import Messages
-from bridge.log.damage import Damage
+from bridge.log.damage import Damage, also_before, lost_in_words
 from bridge.log.library import LIBRARY
 from bridge.log.live import refuse_a_live_log
 from bridge.log.log_reader import LogReader
 from bridge.log.mcap_chunks import ChunkWriter
-from bridge.log.storage.parts import PART, RECOVERED, part_of, parts_of
+from bridge.log.storage.parts import LOST, PART, RECOVERED, part_of, parts_of
 
 
 class Recovered(NamedTuple):
@@ -86,6 +86,14 @@ class _Copy:
                 self.messages += 1
         self.writer.flush()
 
+    def tell_lost(self) -> None:
+        """Write what is lost into the new log: it looks whole, and nobody could know later."""
+        damage = self.damage()
+        if words := lost_in_words(damage):
+            damage = also_before(damage, f"{self.reader.path.name}: {words}")
+        if damage.before:
+            self.writer.add_metadata(LOST, {"what": damage.before})
+
     def damage(self) -> Damage:
         """What is not in the new log."""
         return self.reader.damage.and_also(nameless=self.nameless)
@@ -114,6 +122,7 @@ def recover(path: Path, out: Path) -> Recovered:
         sum(one.damage.bad_records for one in saved),
         sum(one.damage.nameless for one in saved),
         sum(one.damage.missing for one in saved),
+        "; ".join(one.damage.before for one in saved if one.damage.before),
     )
     return Recovered(sum(one.messages for one in saved), damage, sum(one.attachments for one in saved))
 
@@ -128,6 +137,7 @@ def _saved(reader: LogReader, out: Path, merged: bool, only_damaged: bool = Fals
             for chunk in reader.messages():
                 copy.take(chunk)
             copy.take_metadata()
+            copy.tell_lost()
             copy.writer.finish()
             if not copy.messages and not only_damaged:
                 line = f"{reader.path}: holds no message that can be read, so nothing can be saved; the file stays as it is"

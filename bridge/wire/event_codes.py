@@ -19,6 +19,7 @@ WEAK_REASONS = ("PIEZO_WEAK", "CANNOT_HELP", "HARMFUL")
 TRIPS = (
     *("OPEN_LOOP", "CLIPPED", "SWAPPED", "FROZEN", "RESONANCE"),
     *("FORCE_DOUBTED", "DRIVE_DOUBTED", "TRAVEL_END", "NOISE"),
+    *("SLIDE_DOUBTED", "POSITIONS_APART", "JUMPED", "LOOSE", "GAIN_OTHER"),
 )
 
 
@@ -144,8 +145,8 @@ EVENTS = {
             "FORCE_DOUBTED",
             "controller",
             FAILURE,
-            "the force does not follow the spring between drive and slide: dead, clipped, of another gain or sign. It vibrates "
-            "whenever the drive moves until `stickslip reset`",
+            "the force does not follow the spring between drive and slide: dead, clipped, of another gain or sign, or it is the "
+            "place of the slide that is off. It vibrates whenever the drive moves until `stickslip reset`",
         ),
         EventCode(
             "DRIVE_DOUBTED",
@@ -153,6 +154,41 @@ EVENTS = {
             FAILURE,
             "the place of the drive does not follow slide and force: it jumped, or has another unit. Nothing vibrates until "
             "`stickslip reset`",
+        ),
+        EventCode(
+            "SLIDE_DOUBTED",
+            "controller",
+            FAILURE,
+            "the place of the slide goes faster than its drive: another unit, or another channel. It vibrates whenever the drive "
+            "moves until `stickslip reset`",
+        ),
+        EventCode(
+            "POSITIONS_APART",
+            "controller",
+            FAILURE,
+            "drive and slide go at different speeds, and the force says that no spring winds up by it: one of the two has "
+            "another unit, or drifts. v_a is for the slower one until `stickslip reset`",
+        ),
+        EventCode(
+            "JUMPED",
+            "controller",
+            OUTSIDE,
+            "the place of the drive jumped, and went on as before: look at the encoder and its cable. Three jumps within a "
+            "second are DRIVE_DOUBTED",
+        ),
+        EventCode(
+            "LOOSE",
+            "controller",
+            FAILURE,
+            "the base accelerometer drops out again and again: look at its plug. It vibrates open loop, at the known gain, until "
+            "`stickslip reset`",
+        ),
+        EventCode(
+            "GAIN_OTHER",
+            "controller",
+            OUTSIDE,
+            "the loop check measured another gain than amplitude.known_gain: compare the sensitivity of the base accelerometer "
+            "with its data sheet, look at its place, or correct known_gain. The gain that the check measured counts",
         ),
         EventCode(
             "TRAVEL_END", "controller", OUTSIDE, "the drive is outside of limits.travel_m, where nothing is vibrated"

@@ -56,7 +56,7 @@ def make(endpoint: str) -> Path:
     for path in _files(endpoint):
         with contextlib.suppress(OSError):
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if not _is_private(path.parent, stat.S_ISDIR):
+            if not is_private_folder(path.parent):
                 continue
             if not _is_whole(path):
                 _write(path)
@@ -71,6 +71,11 @@ def make(endpoint: str) -> Path:
 
 def _files(endpoint: str) -> list[Path]:
     return [folder / file_name(endpoint) for folder in folders()]
+
+
+def is_private_folder(path: Path) -> bool:
+    """Whether a folder is this user's, no link, and closed to everybody else."""
+    return _is_private(path, stat.S_ISDIR)
 
 
 def _is_private(path: Path, kind: object) -> bool:

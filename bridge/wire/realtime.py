@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import functools
 import gc
 import os
 import resource
@@ -22,6 +23,7 @@ LOOP_PRIORITY = 50
 # priority of its own it took half as long again (docs/method/bridge.md).
 LOCKSTEP_PRIORITY = 1
 RECORDER_PRIORITY = 10  # below the loop, above every process without SCHED_FIFO: a starved recorder loses blocks
+VIEWER_PRIORITY = 1  # of who only looks on: below the loop and the recorder, above every process without SCHED_FIFO
 
 # A wait that ends so much later was a pause of this process. Shorter: a busy core looks like one. Longer: a peer is given up.
 _PAUSE_S = 0.25
@@ -87,6 +89,28 @@ def claim(to_core: int | None, priority: int = LOOP_PRIORITY) -> str:
     if fifo:
         return f"SCHED_FIFO {priority}, {where}, {memory}"
     return f"{NORMAL}, {where}, {memory}: {NOT_GUARANTEED}"
+
+
+@functools.cache  # before this process is moved to them
+def _beside_the_loop() -> frozenset[int]:
+    """The cores of this process but for those of the loop's two processes; none on a computer with two."""
+    if not hasattr(os, "sched_getaffinity"):
+        return frozenset()
+    return frozenset(os.sched_getaffinity(0)) - {core(0), core(1)}
+
+
+def hasten() -> None:
+    """Let this process go before all without SCHED_FIFO, where it may: for one who only looks on, and keeps no time.
+
+    Where all cores are busy it is otherwise held up for more than the lease of 100 ms: its link lapses, what is said until it
+    stands again is lost, and a person's STOP on a page waits. Call it after the bus is open.
+    """
+    beside = _beside_the_loop()
+    for thread in _threads():
+        with contextlib.suppress(OSError):
+            if beside:
+                os.sched_setaffinity(thread, beside)
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(VIEWER_PRIORITY))
 
 
 def _lock_memory() -> bool:

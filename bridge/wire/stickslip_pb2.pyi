@@ -105,6 +105,11 @@ class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     DRIVE_DOUBTED: _ClassVar[Reason]
     TRAVEL_END: _ClassVar[Reason]
     NOISE: _ClassVar[Reason]
+    SLIDE_DOUBTED: _ClassVar[Reason]
+    POSITIONS_APART: _ClassVar[Reason]
+    JUMPED: _ClassVar[Reason]
+    LOOSE: _ClassVar[Reason]
+    GAIN_OTHER: _ClassVar[Reason]
 DISABLED: Mode
 WATCH: Mode
 EXCITE: Mode
@@ -186,9 +191,14 @@ FORCE_DOUBTED: Reason
 DRIVE_DOUBTED: Reason
 TRAVEL_END: Reason
 NOISE: Reason
+SLIDE_DOUBTED: Reason
+POSITIONS_APART: Reason
+JUMPED: Reason
+LOOSE: Reason
+GAIN_OTHER: Reason
 
 class SensorBlock(_message.Message):
-    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state")
+    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state", "check_Hz", "check_gain")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     DRIVE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
@@ -198,6 +208,8 @@ class SensorBlock(_message.Message):
     DRIVE_POSITION_M_FIELD_NUMBER: _ClassVar[int]
     RUN_FIELD_NUMBER: _ClassVar[int]
     GUARD_STATE_FIELD_NUMBER: _ClassVar[int]
+    CHECK_HZ_FIELD_NUMBER: _ClassVar[int]
+    CHECK_GAIN_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     drive_force_N: _containers.RepeatedScalarFieldContainer[float]
@@ -207,7 +219,9 @@ class SensorBlock(_message.Message):
     drive_position_m: _containers.RepeatedScalarFieldContainer[float]
     run: int
     guard_state: int
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ..., run: _Optional[int] = ..., guard_state: _Optional[int] = ...) -> None: ...
+    check_Hz: float
+    check_gain: float
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ..., run: _Optional[int] = ..., guard_state: _Optional[int] = ..., check_Hz: _Optional[float] = ..., check_gain: _Optional[float] = ...) -> None: ...
 
 class Command(_message.Message):
     __slots__ = ("sequence", "t_ns", "block", "frequency_Hz", "amplitude_m", "mode", "limit", "reason", "run")

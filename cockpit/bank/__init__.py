@@ -10,9 +10,11 @@ watch.py      a stretch of a run judged with both
 run.py        one scenario with one subject, to its end
 figures.py    what a run comes to, and whether it is as the scenario expects
 least.py      the least constant v_a / v_d that leaves no slip
+oracle.py     the best that any controller can do, where ours slips
 suite.py      all scenarios and subjects, in processes
 cost.py       what a step of the controller costs
 bars.py       the figures of all runs against their bars
 result.py     the whole bench: as a result, as JSON, in words
+axes_map.py   for which axes it works: stiffness, feed, noise and delay in a picture
 page.py       one page: the table first, then what failed
 """

@@ -16,6 +16,7 @@ _START_S, _FIRST_LOOP_DELAYS = 0.15, 12.0  # in which v_a may still come up to v
 _ABOVE, _TWICE = 1.3, 2.0
 _EXACT = 1.0 - 1e-6  # v_d is a difference of places, with their rounding
 _STIFF_GRACE_S = 0.1  # in which a stick of a stiff axis may be announced by its slip
+_FOLLOWS = 0.5  # of v_d: a slide as fast as this has ended its stick at a change of sign
 _CLAIM_GRACE_S = 0.02  # after drag, in which a claim is late, not false
 
 
@@ -95,6 +96,44 @@ def _add_moving(p: Record, s: Record, t: Record, v_a_mps: float, v_d: float) -> 
         s.settled_s += dt
         s.settled_energy += v_a_mps * v_a_mps * dt
         s.settled_drive_energy += v_d * v_d * dt
+
+
+@kernel
+def follow_turn(p: Record, s: Record, error_m: float) -> None:
+    """After a change of sign of the drive: how long the slide stands, and its largest following error over that of the stroke.
+
+    Args:
+        error_m: how far the slide is behind the drive.
+
+    """
+    if s.moving == 0:
+        return
+    if s.dir != s.turn_dir:
+        if s.turn_dir != 0.0:
+            end_stroke(s)
+            s.turns += 1.0
+            s.turn_s, s.follows_s = s.began_s, 0.0
+            s.turn_peak_m, s.stroke_error, s.stroke_s = -math.inf, 0.0, 0.0
+        s.turn_dir = s.dir
+    if s.turns == 0.0:
+        return
+    stood_s = s.now_s - s.turn_s
+    if s.follows_s == 0.0:
+        s.turn_stick_s = max(s.turn_stick_s, stood_s)
+        if s.v_mps > _FOLLOWS * s.speed_mps:
+            s.follows_s = stood_s
+    else:
+        s.stroke_error += s.dir * error_m * p.block_s
+        s.stroke_s += p.block_s
+    if s.follows_s == 0.0 or stood_s <= 2.0 * s.follows_s:
+        s.turn_peak_m = max(s.turn_peak_m, s.dir * error_m)
+
+
+@kernel
+def end_stroke(s: Record) -> None:
+    """Take the quadrant error of the stroke since the last change of sign."""
+    if s.stroke_s > 0.0:
+        s.quadrant_m = max(s.quadrant_m, s.turn_peak_m - s.stroke_error / s.stroke_s)
 
 
 @kernel

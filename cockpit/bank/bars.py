@@ -5,8 +5,9 @@ import statistics
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from cockpit.bank.figures import LIMIT, SILENT, Figures
+from cockpit.bank.figures import SILENT, Figures
 from cockpit.bank.least import Least
+from cockpit.bank.oracle import LIMIT, TOO_LATE
 from cockpit.bank.rules import MOVING, NAMES
 
 
@@ -41,7 +42,7 @@ def bars(found: Sequence[Figures], least: Mapping[str, Least], cost: float, own:
         _energy(runs, own),
         _over_least(runs, least, own),
         _not_needed(runs, own),
-        _covered(mine, own),
+        _covered(runs, own),
         _probing(mine, own),
         _above(mine, own),
         _words(mine, own),
@@ -90,8 +91,9 @@ def _clean(runs: dict[str, list[Figures]], own: str) -> Bar:
         return sum(_is_clean(one) for one in counted), len(counted)
 
     values = {name: f"{clean(name)[0]} of {clean(name)[1]}" for name in runs}
-    limits = sum(any(line.startswith(LIMIT) for line in one.failures) for one in _counted(runs[own]))
-    values[own] += f"; {limits} of the others by {LIMIT}" if limits else ""
+    failed = [one for one in _counted(runs[own]) if not _is_clean(one)]
+    beyond = [one for one in failed if one.oracle is not None and one.oracle.verdict in {LIMIT, TOO_LATE}]
+    values[own] += f"; of the others no controller could hold {len(beyond)}" if beyond else ""
     good, all_of = clean(own)
     return Bar("runs without slip and surge", ">= 97 %", values, good >= 0.97 * all_of if all_of else None)
 
@@ -174,15 +176,14 @@ def _not_needed(runs: dict[str, list[Figures]], own: str) -> Bar:
     return Bar("excited where nothing needs it, worst", "<= 2 %", values, max(of(own)) <= 0.02 if of(own) else None)
 
 
-def _covered(mine: list[Figures], own: str) -> Bar:
-    blocks, short = sum(one.covered for one in mine), sum(one.uncovered for one in mine)
-    share = 1.0 - short / blocks if blocks else 1.0
-    return Bar(
-        "v_a >= v_d while exciting",
-        ">= 99.95 % of blocks",
-        {own: f"{100 * share:.3f} %"},
-        share >= 0.9995 if blocks else None,
-    )
+def _covered(runs: dict[str, list[Figures]], own: str) -> Bar:
+    def share(name: str) -> float:
+        blocks, short = sum(one.covered for one in runs[name]), sum(one.uncovered for one in runs[name])
+        return 1.0 - short / blocks if blocks else math.nan
+
+    values = {name: f"{100 * share(name):.3f} %" for name in runs if not math.isnan(share(name))}
+    held = share(own) >= 0.9995 if own in values else None
+    return Bar("v_a >= v_d while exciting", ">= 99.95 % of blocks", values, held)
 
 
 def _probing(mine: list[Figures], own: str) -> Bar:

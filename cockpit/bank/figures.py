@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridge.wire import stickslip_pb2 as wire
 from cockpit.bank import record
+from cockpit.bank.oracle import Oracle
 from cockpit.bank.run import Judged, wrong_from
 from cockpit.bank.scenario import BankScenario
 
@@ -18,7 +20,6 @@ _ABOVE_S = 0.005
 
 _SAYS_SO = {"BLIND", "CANNOT_HELP", "HARMFUL"}
 _LEFT_ALONE = 0.1  # share of the slips without control
-LIMIT = "a limit of physics"  # begin of the line that says so
 SILENT = "neither helps nor says so"
 
 
@@ -52,9 +53,13 @@ class Figures(NamedTuple):
     moving_s: float
     error_rms_m: float
     error_peak_m: float
+    turns: int  # changes of sign of the drive
+    turn_stick_s: float  # the longest stick of the slide after one
+    quadrant_m: float  # the largest following error after one, over its mean over the rest of the stroke
     words: dict[str, float]  # reason, and the moving time until it was given
     counted_from_s: float  # from when on slips and surges are counted
     failures: list[str]
+    oracle: Oracle | None  # of a run of the controller with slips or surges, also with such that count as no failure
 
 
 def refused(scenario: BankScenario, subject: str, why: str) -> Figures:
@@ -62,7 +67,8 @@ def refused(scenario: BankScenario, subject: str, why: str) -> Figures:
     empty = dict.fromkeys(Figures._fields, 0)
     given = {"family": scenario.family, "scenario": scenario.name, "subject": subject, "expect": scenario.bank.expect}
     lists = {"delays_s": [], "late_ratios": [], "words": {}, "failures": [f"refused: {why}"]}
-    return Figures(**(empty | given | lists | {"settled_ratio": -1.0}))  # pyright: ignore[reportArgumentType]
+    none = {"settled_ratio": -1.0, "oracle": None}
+    return Figures(**(empty | given | lists | none))  # pyright: ignore[reportArgumentType]
 
 
 def figures(scenario: BankScenario, subject: str, judged: Judged, own: bool) -> Figures:
@@ -119,9 +125,13 @@ def figures(scenario: BankScenario, subject: str, judged: Judged, own: bool) -> 
         moving_s=sums["enabled_moving_s"],
         error_rms_m=math.sqrt(sums["error_square"] / max(sums["moving_s"], 1e-9)),
         error_peak_m=sums["error_peak_m"],
+        turns=round(sums["turns"]),
+        turn_stick_s=sums["turn_stick_s"],
+        quadrant_m=sums["quadrant_m"],
         words={name: moving for name, (_, moving, _) in judged.reasons.items()},
         counted_from_s=able_s,
         failures=[],
+        oracle=None,
     )
     return found._replace(failures=_failures(scenario, found, judged) if own else _broken(judged))
 
@@ -140,7 +150,7 @@ def _failures(scenario: BankScenario, found: Figures, judged: Judged) -> list[st
         kind = "slip" if first[0] == record.SLIPPED else "surge"
         lines.append(
             f"{found.slips} slips and {found.surges} surges; the first, a {kind}, at {first[1]:.3f} s, "
-            f"{first[3]:.1f} v_d, with v_a at {first[4]:.2f} v_d"
+            f"{first[3]:.1f} v_d, with v_a at {first[4]:.2f} v_d in mode {wire.Mode.Name(round(first[5]))}"
         )
     if found.sticks and found.recalled < found.sticks:
         lost = events[(events[:, 0] == record.STUCK) & (events[:, 5] < 0.0) & (events[:, 6] == 0.0)]

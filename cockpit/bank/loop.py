@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from bridge.guard.config import Level
 from bridge.guard.core import accept
@@ -17,7 +18,6 @@ from controller.codes import ANNOUNCED, BLOCK
 from controller.core import step as controller_step
 from plant.config import RigConfig
 from plant.inputs import RigInputs
-from plant.loop_delay import whole_blocks
 from plant.piezo import base_velocity_mps, delivered_share
 from plant.records import TRUTH, guard_records
 from plant.records import build as plant_records
@@ -44,7 +44,7 @@ def advance_with_truth(
     delay_blocks: npt.NDArray[np.int64],
     announcements: npt.NDArray[np.int64],
     announce: npt.NDArray[Any],
-    ahead_blocks: int,
+    known_mps: npt.NDArray[np.float64],
     answered: int,
     analogue: npt.NDArray[np.float64],
     sensors: npt.NDArray[Any],
@@ -60,12 +60,12 @@ def advance_with_truth(
 
     Args:
         plant_params, plant_state, guard_params, guard_state, params, state, rule_params, rule_state: one record each.
-        velocity_mps: of the drive, [blocks + ahead_blocks]: `CONSTANT` looks ahead.
+        velocity_mps: of the drive, [blocks].
         noise: standard normal numbers, [blocks, 5, samples].
         by_rule: whether a rule of `cockpit.bank.rules` stands in for the controller.
         delay_blocks: that the command takes to the exciter besides, [blocks].
         announcements, announce: how many the rig makes before it sends its samples, [blocks], and these in order.
-        ahead_blocks: from a block to the one in which its command acts.
+        known_mps: speed of the drive that the rules which know the truth vibrate for, [blocks].
         answered: 1 where `commands[0]` answers the block before the first, 0 at the start of a run.
         analogue, sensors, applied: [5, samples] and one record each, overwritten by every block.
         commands: message records [blocks + 1]; the first is what the rig hears first, the others are filled.
@@ -98,8 +98,9 @@ def advance_with_truth(
             gain[i] = v_a_mps[i] / s.amplitude_m
         answer = commands[i + 1 : i + 2]
         if by_rule:
-            next_mps = velocity_mps[i + ahead_blocks]
-            rule_step(rule_params, rule_state, sensors, sensors[0].t_ns, next_mps, gain[i], answer, traces[i : i + 1])
+            rule_step(
+                rule_params, rule_state, sensors, sensors[0].t_ns, known_mps[i], gain[i], answer, traces[i : i + 1]
+            )
         else:
             events = BLOCK
             for row in range(first, said):
@@ -137,10 +138,20 @@ class JudgedLoop:
         rule: parameters and memory of a rule.
         by_rule: which of the two controls.
         hum: on the sensors; the noise must not be 0 where it has a size.
+        sees_blocks: first and last block from the present one on of which a rule that knows the truth knows v_d.
 
     """
 
-    def __init__(self, rig: RigConfig, seed: int, subject: Pair, rule: Pair, by_rule: bool, hum: Hum) -> None:
+    def __init__(
+        self,
+        rig: RigConfig,
+        seed: int,
+        subject: Pair,
+        rule: Pair,
+        by_rule: bool,
+        hum: Hum,
+        sees_blocks: tuple[int, int] = (0, 0),
+    ) -> None:
         self.block = 0
         self._rig, self._hum, self._by_rule = rig, hum, by_rule
         self._inputs, self._velocity_mps = RigInputs(rig, seed), held_velocity(rig)
@@ -150,7 +161,7 @@ class JudgedLoop:
         guard = rig.guard.model_copy(update={"loud_ratio": free}) if by_rule else rig.guard
         self._guard = guard_records(rig.model_copy(update={"guard": guard}), 1, arm=True)
         samples = rig.solver.samples_per_block
-        self._ahead_blocks = 1 + whole_blocks(rig.loop.delay_s, rig.solver.block_s)
+        self._sees_blocks = sees_blocks
         self._analogue = np.empty((len(CHANNELS), samples))
         self._sensors, self._applied = sensor_block(samples).blank(), APPLIED.blank()
         self._last_command = COMMAND.blank()
@@ -171,14 +182,16 @@ class JudgedLoop:
         _, noise, delay_blocks, announcements, announce = self._inputs.draw(blocks)
         self._add_hum(noise)
         samples, block_s = self._rig.solver.samples_per_block, self._rig.solver.block_s
-        velocity_mps = self._velocity_mps((self.block + np.arange(blocks + self._ahead_blocks)) * block_s)
+        first, last = self._sees_blocks
+        velocity_mps = self._velocity_mps((self.block + np.arange(blocks + last)) * block_s)
+        known_mps = sliding_window_view(np.abs(velocity_mps[first:]), last - first + 1).max(axis=1)
         commands = COMMAND.blank(blocks + 1)
         commands[:1] = self._last_command
         traces, truth = TRACE.blank(blocks), np.empty((len(TRUTH), blocks * samples))
         v_a_mps, frequency_Hz, gain = (np.empty(blocks) for _ in range(3))
         done = advance_with_truth(
-            *self._plant, *self._guard, velocity_mps, noise, self._by_rule, *self._subject, *self._rule,
-            delay_blocks, announcements, announce, self._ahead_blocks, min(self.block, 1), self._analogue, self._sensors,
+            *self._plant, *self._guard, velocity_mps[:blocks], noise, self._by_rule, *self._subject, *self._rule,
+            delay_blocks, announcements, announce, known_mps, min(self.block, 1), self._analogue, self._sensors,
             self._applied, commands, traces, truth, v_a_mps, frequency_Hz, gain,
         )  # fmt: skip
         self.block += done

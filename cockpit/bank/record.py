@@ -35,6 +35,7 @@ SUMS: Final = (
     *("covered", "uncovered"),  # blocks in EXCITE in which v_a can reach v_d, and those of them in which it does not
     *("above_s", "above_at_s"),  # longest time of v_a above 1.3 times the wanted, and its begin
     *("first_s", "error_square", "error_peak_m"),
+    *("turns", "turn_stick_s", "quadrant_m"),  # reversals; the longest stick at one, the largest quadrant error
 )
 PARAMS = np.dtype(
     [
@@ -69,6 +70,7 @@ STATE = np.dtype(
             ),
             *("event_s", "event_ratio", "event_mode", "peak_ratio", "peak_mps", "quiet_s", "late_mps"),
             *("excite_begin_s", "reach_m", "allowed_mps", "above_now_s"),
+            *("turn_dir", "turn_s", "follows_s", "turn_peak_m", "stroke_error", "stroke_s"),
             *SUMS,
         )
     ]

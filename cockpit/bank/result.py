@@ -1,9 +1,11 @@
 """`stickslip bench control`: the bank run and judged, as a result, as JSON and in words."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from bridge.units import counted
 from cockpit.bank import rules
 from cockpit.bank.bars import Bar, bars
 from cockpit.bank.cost import step_cost_ratio
@@ -36,6 +38,11 @@ class BankResult(NamedTuple):
         """The runs of the controller that miss a bar."""
         return [one for one in self.done if one.figures.failures]
 
+    @property
+    def explained(self) -> list[Done]:
+        """Its runs with slips or surges that miss no bar: before the exciter can have come, or with one that is too weak."""
+        return [one for one in self.done if one.figures.oracle is not None and not one.figures.failures]
+
     def as_json(self) -> dict[str, Any]:
         """The result as plain dictionaries."""
         runs: list[Figures] = [one.figures for one in self.done]
@@ -67,10 +74,14 @@ def in_words(result: BankResult) -> list[str]:
     lines: list[str] = []
     for bar in result.bars:
         mark = {True: "holds", False: "MISSED", None: "-"}[bar.holds]
-        lines.append(f"{mark:<7}{bar.name:<38}{bar.bar}")
+        lines.append(f"{mark:<7}{bar.name:<54}{bar.bar}")
         lines.extend(f"{'':<9}{name:<{_WIDTH}}{value}" for name, value in bar.values.items())
     for one in result.failed:
         lines.extend(f"{one.figures.scenario:<32}{line}" for line in one.figures.failures)
+    if explained := result.explained:
+        verdicts = Counter(one.figures.oracle.verdict for one in explained if one.figures.oracle is not None)
+        words = "; ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
+        lines.append(f"{counted(len(explained), 'run')} with slips that count as no failure: {words}")
     missed = sum(bar.holds is False for bar in result.bars)
     simulated_s = sum(one.figures.duration_s for one in result.done)
     lines.append(

@@ -1,8 +1,9 @@
 """The rivals of the controller: rules of a few lines that a machine builder would try first.
 
 They have the controller's interface and none of its estimator. v_d is the plain slope of the drive position, in both directions;
-where a rule needs the exciter's gain it takes the model's, which is 1. `CONSTANT` alone knows the truth: it holds a ratio of
-the true v_d with the true gain, so that the least ratio without slips can be searched.
+where a rule needs the exciter's gain it takes the model's, which is 1. `CONSTANT` and `ORACLE` alone know the truth: they hold a
+ratio of the true v_d with the true gain, one so that the least ratio without slips can be searched, one to show what no
+controller can do (`cockpit.bank.oracle`).
 """
 
 import math
@@ -17,7 +18,7 @@ from plant.config import RigConfig
 from plant.piezo import delivered_share
 from plant.records import build as plant_records
 
-CONTROLLER, NONE, MOVING, ALWAYS, FIXED, BURST, CONSTANT = range(7)
+CONTROLLER, NONE, MOVING, ALWAYS, FIXED, BURST, CONSTANT, ORACLE = range(8)
 NAMES: Final = {
     CONTROLLER: "controller",
     NONE: "no control",
@@ -26,6 +27,7 @@ NAMES: Final = {
     FIXED: "fixed 4 kHz, as in the paper",
     BURST: "acceleration threshold",
     CONSTANT: "constant v_a / v_d",
+    ORACLE: "oracle",
 }
 RIVALS: Final = (NONE, MOVING, ALWAYS, FIXED, BURST)
 
@@ -71,13 +73,18 @@ def frequencies_Hz(rig: RigConfig, forbidden_Hz: list[tuple[float, float]]) -> l
     return (above_Hz or free_Hz[-1:])[:_CANDIDATES]
 
 
-def frequency_Hz(rig: RigConfig, candidates_Hz: list[float]) -> float:
-    """The lowest candidate at which the stroke truly suffices at the highest speed of the profile; else the strongest."""
+def frequency_Hz(rig: RigConfig, candidates_Hz: list[float], ratio: float = _RATIO) -> float:
+    """The lowest candidate at which the stroke truly suffices at the highest speed of the profile; else the strongest.
+
+    Args:
+        ratio: of v_a over v_d that the stroke must suffice for.
+
+    """
     p: Any = plant_records(rig)[0][0]
     fastest_mps = max(rig.drive.speeds_mps(), default=0.0)
     stroke_m = _STROKE_SHARE * rig.piezo.amplitude_max_m
     top_mps = {f_Hz: float(delivered_share(p, f_Hz)) * TWO_PI * f_Hz * stroke_m for f_Hz in candidates_Hz}
-    enough_Hz = [f_Hz for f_Hz in candidates_Hz if top_mps[f_Hz] >= _RATIO * fastest_mps]
+    enough_Hz = [f_Hz for f_Hz in candidates_Hz if top_mps[f_Hz] >= ratio * fastest_mps]
     return enough_Hz[0] if enough_Hz else max(candidates_Hz, key=lambda f_Hz: top_mps[f_Hz])
 
 
@@ -146,7 +153,7 @@ def step(
     state: npt.NDArray[Any],
     sensors: npt.NDArray[Any],
     t_ns: int,
-    next_mps: float,
+    known_mps: float,
     gain: float,
     command: npt.NDArray[Any],
     trace: npt.NDArray[Any],
@@ -156,8 +163,8 @@ def step(
     Args:
         params, state: one record each of `PARAMS` and `STATE`, the state is advanced.
         sensors, command, trace: one message record each; the last two are filled.
-        next_mps: true velocity of the drive when the command acts, read by `CONSTANT` alone.
-        gain: v_a for one metre of commanded amplitude, true, read by `CONSTANT` alone.
+        known_mps: true speed of the drive that the command is for, read by `CONSTANT` and `ORACLE` alone.
+        gain: v_a for one metre of commanded amplitude, true, read by these two alone.
 
     """
     p: Record = params[0]
@@ -173,8 +180,8 @@ def step(
     if t_ns >= p.enabled_from_ns:
         if p.rule == MOVING:
             wanted_mps = p.ratio * v_d
-        elif p.rule == CONSTANT:
-            v_d = math.fabs(next_mps)
+        elif p.rule >= CONSTANT:
+            v_d = known_mps
             wanted_mps = p.ratio * v_d
         elif p.rule == ALWAYS:
             s.frequency_Hz = p.candidate_Hz[0]
@@ -189,12 +196,12 @@ def step(
                 s.hold = p.hold_steps
             wanted_mps = p.ratio * v_d if s.hold > 0 else 0.0
     if amplitude_m < 0.0 and wanted_mps > 0.0:
-        if s.amplitude_m == 0.0 or p.rule == CONSTANT:
+        if s.amplitude_m == 0.0 or p.rule >= CONSTANT:
             s.frequency_Hz = p.candidate_Hz[p.candidates - 1]
             for i in range(p.candidates - 1, -1, -1):
                 if wanted_mps / (TWO_PI * p.candidate_Hz[i]) <= _STROKE_SHARE * p.amplitude_max_m:
                     s.frequency_Hz = p.candidate_Hz[i]
-        amplitude_m = wanted_mps / (gain if p.rule == CONSTANT else TWO_PI * s.frequency_Hz)
+        amplitude_m = wanted_mps / (gain if p.rule >= CONSTANT else TWO_PI * s.frequency_Hz)
         largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.frequency_Hz))
         amplitude_m = min(amplitude_m, largest_m)
     s.amplitude_m = max(amplitude_m, 0.0)

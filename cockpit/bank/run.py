@@ -8,11 +8,14 @@ import numpy.typing as npt
 
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.bank import record, rules
+from cockpit.bank.answer import end_stroke
 from cockpit.bank.loop import Hum, JudgedLoop, Pair
 from cockpit.bank.scenario import BankScenario
 from cockpit.bank.watch import watch
 from controller.config import ControllerConfig
 from controller.records import build as controller_records
+from plant.config import RigConfig
+from plant.loop_delay import whole_blocks
 
 _STRETCH_S = 1.0
 _MOST_EVENTS = 20_000  # of a stretch
@@ -26,6 +29,7 @@ class Subject(NamedTuple):
 
     rule: int
     ratio: float = 1.2
+    ahead_s: float = 0.0  # how long before its command acts an oracle knows v_d; below 0: it sees the present v_d alone
 
     @property
     def name(self) -> str:
@@ -54,11 +58,14 @@ class Judged(NamedTuple):
     broken: bool  # the rig's state became NaN or infinite
 
 
-def judge(scenario: BankScenario, subject: Subject, ends_at_slip_from_s: float = math.inf) -> Judged:
+def judge(
+    scenario: BankScenario, subject: Subject, ends_at_slip_from_s: float = math.inf, keep_at_s: float = -1.0
+) -> Judged:
     """Run and judge. Raises Fault CONFIG where the controller refuses the scenario.
 
     Args:
         ends_at_slip_from_s: the run ends at the first slip or surge after this time.
+        keep_at_s: a time whose curves are kept, whatever happens then.
 
     """
     rig, bank = scenario.rig, scenario.bank
@@ -71,15 +78,27 @@ def judge(scenario: BankScenario, subject: Subject, ends_at_slip_from_s: float =
     candidates_Hz = rules.frequencies_Hz(rig, forbidden)
     if subject.rule == rules.CONSTANT:
         candidates_Hz = [rules.frequency_Hz(rig, candidates_Hz)]
+    if subject.rule == rules.ORACLE:
+        candidates_Hz = [rules.frequency_Hz(rig, candidates_Hz, subject.ratio)]
     rule = rules.build(subject.rule, rig, enabled_from_s, velocity_max_mps, candidates_Hz, subject.ratio)
     hum = Hum(bank.hum.frequency_Hz, bank.hum.force_N, bank.hum.position_m)
-    loop = JudgedLoop(rig, scenario.seed, own, rule, config is None, hum)
+    loop = JudgedLoop(rig, scenario.seed, own, rule, config is None, hum, _sees_blocks(rig, subject))
     blind = dict(wire.Reason.items()).get("BLIND", -1)
     of_judge = record.build(rig, scenario.slowest_mps, enabled_from_s, velocity_max_mps, blind)
-    return _to_the_end(scenario, loop, of_judge, ends_at_slip_from_s)
+    return _to_the_end(scenario, loop, of_judge, ends_at_slip_from_s, keep_at_s)
 
 
-def _to_the_end(scenario: BankScenario, loop: JudgedLoop, of_judge: Pair, ends_at_slip_from_s: float) -> Judged:
+def _sees_blocks(rig: RigConfig, subject: Subject) -> tuple[int, int]:
+    """First and last block, from the present one on, whose largest |v_d| a rule that knows the truth vibrates for."""
+    acts = 1 + whole_blocks(rig.loop.delay_s, rig.solver.block_s)
+    if subject.rule != rules.ORACLE:
+        return acts, acts
+    return 0, 0 if subject.ahead_s < 0.0 else acts + math.ceil(subject.ahead_s / rig.solver.block_s)
+
+
+def _to_the_end(
+    scenario: BankScenario, loop: JudgedLoop, of_judge: Pair, ends_at_slip_from_s: float, keep_at_s: float
+) -> Judged:
     block_s = scenario.rig.solver.block_s
     blocks = round(scenario.duration_s / block_s)
     stretch = max(round(_STRETCH_S / block_s), 1)
@@ -101,9 +120,11 @@ def _to_the_end(scenario: BankScenario, loop: JudgedLoop, of_judge: Pair, ends_a
         events.append(new)
         slipped = bool(np.any(wrong_from(new, ends_at_slip_from_s)))
         coarse.append(rows[: done - done % every : every].copy())
-        if len(kept) < _KEPT_STRETCHES and _worth_keeping(new, of_judge):
+        asked = begin <= keep_at_s / block_s < begin + done
+        if asked or (len(kept) < _KEPT_STRETCHES and _worth_keeping(new, of_judge)):
             kept.append(Curves(begin * block_s, block_s, rows[:done].copy()))
     state: Any = of_judge[1][0]
+    end_stroke(state)
     reasons = {
         wire.Reason.Name(number): tuple(
             float(state[name][number]) for name in ("reason_s", "reason_moving_s", "reason_excited_s")
@@ -130,9 +151,8 @@ def wrong_from(events: npt.NDArray[np.float64], from_s: float) -> npt.NDArray[np
 
 
 def _worth_keeping(events: npt.NDArray[np.float64], of_judge: Pair) -> bool:
-    """Whether a slip or a surge came after the first announcement, a stick was missed, or one that is none was claimed."""
-    first_s = float(of_judge[1]["first_s"][0])
+    """Whether a slip or a surge came once the controller was enabled, a stick was missed, or one that is none was claimed."""
     kinds = events[:, 0]
     missed = (kinds == record.STUCK) & (events[:, 5] < 0.0) & (events[:, 6] == 0.0)
-    late = wrong_from(events, first_s) if first_s >= 0.0 else missed
-    return bool(np.any((kinds == record.CLAIMED) | missed | late))
+    wrong = wrong_from(events, float(of_judge[0]["enabled_from_s"][0]))
+    return bool(np.any((kinds == record.CLAIMED) | missed | wrong))

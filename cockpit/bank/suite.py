@@ -8,20 +8,23 @@ from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableTyp
 from bridge.faults import Fault
 from bridge.kernel_cache import compile_once
 from cockpit.bank import rules
-from cockpit.bank.figures import LIMIT, Figures, figures, refused
+from cockpit.bank.figures import Figures, figures, refused
 from cockpit.bank.least import Least, least
-from cockpit.bank.run import Judged, Subject, judge, wrong_from
+from cockpit.bank.oracle import ask
+from cockpit.bank.run import Curves, Judged, Subject, judge, wrong_from
 from cockpit.bank.scenario import BankScenario
 
 R = TypeVar("R")
-_KNOWN_RATIOS = (1.2, 2.4)
+_ASKED = {"helped", "cannot-help"}  # of which the oracle says whether any controller could do better
 
 
 class Done(NamedTuple):
     """One run of the bank."""
 
     figures: Figures
-    judged: Judged | None  # with curves, of a run of the controller that fails
+    judged: Judged | None  # with curves, of a run of the controller that fails or slips
+    oracle: Curves | None = None  # of the oracle when the run first slips; None where it never does
+    first_s: tuple[float, float] | None = None  # when that slip or surge begins, and how long it lasts
 
 
 def warm_up(scenario: BankScenario) -> None:
@@ -41,18 +44,21 @@ def run_one(scenario: BankScenario, rule: int) -> Done:
             raise
         return Done(refused(scenario, subject.name, fault.line), None)
     found = figures(scenario, subject.name, judged, own)
-    if own and found.expect == "helped" and found.slips + found.surges:
-        found.failures.append(_what_would_help(scenario, found))
+    if own and found.expect in _ASKED and found.slips_from_enabling:
+        return _beside_oracle(scenario, found, judged)
     return Done(found, judged if found.failures else None)
 
 
-def _what_would_help(scenario: BankScenario, found: Figures) -> str:
-    """Whether physics allows better: the same scenario with a constant ratio that is known beforehand."""
-    runs = {ratio: judge(scenario, Subject(rules.CONSTANT, ratio)).events for ratio in _KNOWN_RATIOS}
-    counts = {ratio: int(wrong_from(events, scenario.enabled_from_s).sum()) for ratio, events in runs.items()}
-    told = " and ".join(f"{count} with {ratio}" for ratio, count in counts.items())
-    limit = f"{LIMIT}: " if found.slips_from_enabling <= min(counts.values()) else ""
-    return f"{limit}a constant v_a / v_d that is known beforehand has from enabling on {told}, here {found.slips_from_enabling}"
+def _beside_oracle(scenario: BankScenario, found: Figures, judged: Judged) -> Done:
+    """A run with slips or surges, and whether any controller could be without: those that count, else all from enabling on."""
+    fails = found.expect == "helped" and found.slips + found.surges > 0
+    from_s = found.counted_from_s if fails else scenario.enabled_from_s
+    wrong = judged.events[wrong_from(judged.events, from_s)]
+    first_s = float(wrong[0, 1]), float(wrong[0, 2] - wrong[0, 1])
+    oracle, curves = ask(scenario, len(wrong), from_s, first_s[0])
+    told = [oracle.in_words(len(wrong))] if fails else []
+    failures = [*found.failures[:1], *told, *found.failures[1:]]  # the first tells of the slips
+    return Done(found._replace(failures=failures, oracle=oracle), judged, curves, first_s)
 
 
 def run_bank(

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import Record, unlocked_kernel
-from cockpit.bank.answer import add_up, announce, follow_vibration
+from cockpit.bank.answer import add_up, announce, follow_turn, follow_vibration
 from cockpit.bank.motion import follow
 from cockpit.bank.record import RING
 from plant.records import TRUTH
@@ -58,6 +58,7 @@ def watch(
         newest = (s.at - 1) % RING
         found = announce(p, s, t, shaking, events, found)
         add_up(p, s, t, v_a_mps[i], s.drive_m[newest] - s.x_m[newest])
+        follow_turn(p, s, s.drive_m[newest] - s.x_m[newest])
         follow_vibration(p, s, t, v_a_mps[i], frequency_Hz[i], gain[i])
         rows[i, 0] = force_N / p.samples
         rows[i, 1] = s.dir * s.v_mps

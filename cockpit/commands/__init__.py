@@ -12,7 +12,7 @@ example                     evidence of a made-up rig
 diagnose, diagnose_output   evidence to a diagnosis; its progress and its words on a terminal
 explain, scenarios          what there is to know without a run
 certs                       certificates for a bus beyond one computer
-schema, schemas, json_types the JSON Schema of every format; from the types of the results
-json_option                 `--json` of every command
+schema                      prints the JSON Schema of a format
+as_json/                    `--json` of every command, and the JSON Schema of every format, from the types of the results
 options                     what several commands have
 """

@@ -9,7 +9,7 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import refuse_to_lose
-from cockpit.commands.json_option import Json, JsonGroup, carry_out, tell
+from cockpit.commands.as_json.option import Json, JsonGroup, carry_out, tell
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import PAGE, check_output, writing
 

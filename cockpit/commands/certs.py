@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.run.writable import check_output_folder
 
 

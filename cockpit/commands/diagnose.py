@@ -14,7 +14,7 @@ import typer
 from bridge.faults import FAULTS, Fault
 from bridge.files import write_json
 from bridge.plain import plain
-from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
+from cockpit.commands.as_json.option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import Certs
 from cockpit.run.child_process import end_like_ctrl_c, report
 from cockpit.run.writable import JSON, PAGE, RIG, check_output, check_output_folder, writing
@@ -36,6 +36,14 @@ class _Wishes(NamedTuple):
     jobs: int
     cluster: str
     certs: str
+    budget_s: float | None
+
+    @property
+    def way(self) -> Callable[["Evidence", Callable[[str, float], None], int], "Diagnosis"]:
+        """How a folder is diagnosed; it can be sent to a worker."""
+        from diagnosis.diagnose_many import real_diagnose
+
+        return partial(real_diagnose, budget_s=self.budget_s)
 
     @property
     def json_file(self) -> Path | None:
@@ -69,6 +77,9 @@ def diagnose(
         ),
     ] = "",
     certs: Certs = None,
+    budget: Annotated[
+        str, typer.Option(help="Time for a folder, e.g. 30s; then the best answer so far. No limit if not given.")
+    ] = "",
     speed: Annotated[str, typer.Option(help="Of a file: speed of its drive, e.g. 0.5mm/s.")] = "",
     mass: Annotated[
         str, typer.Option(help="Of a file: mass of the slide, e.g. 1.5kg; seen in the slips if not given.")
@@ -81,11 +92,13 @@ def diagnose(
     def work() -> int:
         from joblib import cpu_count
 
+        from cockpit.look.quantity import quantity
         from diagnosis.diagnose_many import find_sources
         from diagnosis.evidence.manifest import check_folder
 
         end_like_ctrl_c()
-        wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""))
+        budget_s = quantity("--budget", budget, "time")
+        wishes = _Wishes(as_json, report, apply, jobs or cpu_count(), cluster, str(certs or ""), budget_s)
         if len(evidence) == 1 and evidence[0].is_file():
             return _diagnose_file(evidence[0], wishes, speed, mass, channel_map)
         sources = find_sources(evidence)
@@ -221,8 +234,8 @@ def _result(
     from diagnosis import diagnose_many as many
 
     if not wishes.cluster:
-        return many.real_diagnose(evidence, progress, wishes.jobs)
-    with closing(many.diagnose_many([source], 1, wishes.cluster, many.real_diagnose, wishes.certs)) as outcomes:
+        return wishes.way(evidence, progress, wishes.jobs)
+    with closing(many.diagnose_many([source], 1, wishes.cluster, wishes.way, wishes.certs)) as outcomes:
         outcome = next(outcomes)
     if outcome.diagnosis is None:
         raise Fault(*(outcome.fault or ("PEER_DIED", "")))
@@ -234,7 +247,8 @@ def _write_report(source: "EvidenceFolder", diagnosis: "Diagnosis", path: Path) 
     from diagnosis.evidence.manifest import MANIFEST, read_manifest
     from diagnosis.report.page import write_report
 
-    files = [source.folder / MANIFEST, *(source.folder / run.file for run in read_manifest(source.folder).run)]
+    runs = dict.fromkeys(run.file for run in read_manifest(source.folder).run)  # several may be parts of one file
+    files = [source.folder / MANIFEST, *(source.folder / file for file in runs)]
     write_report(diagnosis, source.name, path, files)
 
 
@@ -247,7 +261,7 @@ def _diagnose_many(sources: list["EvidenceFolder"], wishes: _Wishes) -> int:
     reports = _report_names([source.name for source in sources])
     with (
         watched() as progress,
-        closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, many.real_diagnose, wishes.certs)) as outcomes,
+        closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, wishes.way, wishes.certs)) as outcomes,
     ):
         for outcome in outcomes:
             name = outcome.source.name

@@ -35,6 +35,8 @@ def in_words(diagnosis: "Diagnosis") -> list[str]:
     for label, block in (("relations", relation_lines(diagnosis)), ("numbers", number_lines(diagnosis))):
         lines += [f"{'' if i else label:<10} {line}" for i, line in enumerate(block)]
     lines.append(f"next       {after.what} {after.why}")
+    if diagnosis.cannot_show:
+        lines.append(f"not shown  {', '.join(diagnosis.cannot_show)}: not with this drive, these runs or these numbers")
     files: dict[tuple[str, str], list[str]] = {}
     for finding in diagnosis.findings:
         file, _, column = finding.where.partition(": ")

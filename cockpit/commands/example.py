@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
+from cockpit.commands.as_json.option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import watched_share
 from cockpit.run.child_process import end_like_ctrl_c
 from cockpit.run.writable import check_output_folder, writing

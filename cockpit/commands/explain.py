@@ -7,7 +7,7 @@ import typer
 from bridge.faults import FAULTS, Fault
 from bridge.wire.event_codes import EVENTS, LETTERS, EventCode
 from bridge.wire.words import Word, words
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 
 _NO_FAULTS = {
     0: "all is well; a diagnosis that was made is, whatever it says",

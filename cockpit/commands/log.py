@@ -8,12 +8,11 @@ import typer
 
 from bridge.faults import Fault
 from bridge.units import counted
-from cockpit.commands.json_option import STDOUT, Json, JsonGroup, carry_out, tell
+from cockpit.commands.as_json.option import STDOUT, Json, JsonGroup, carry_out, tell
 from cockpit.commands.options import watched_share
 from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
 
 if TYPE_CHECKING:
-    from bridge.log.damage import Damage
     from diagnosis.evidence.import_table import Imported
 
 log_app = typer.Typer(
@@ -48,6 +47,7 @@ def log_recover(
 
     def work() -> None:
         from bridge.files import check_file
+        from bridge.log.damage import lost_in_words
         from bridge.log.recover import recover
 
         if out is not None and in_place:
@@ -65,7 +65,7 @@ def log_recover(
             (
                 f"{new}: {counted(saved.messages, 'message')}, {'in place' if in_place else 'in a new file'} with an index",
                 *(left_out or ()),
-                _lost(saved.damage) or "every message of the log is in it",
+                f"lost: {lost}" if (lost := lost_in_words(saved.damage)) else "every message of the log is in it",
             )
         )
         tell(
@@ -75,21 +75,6 @@ def log_recover(
         )
 
     carry_out(work, as_json)
-
-
-def _lost(damage: "Damage") -> str:
-    """What could not be read, in words; empty when all could."""
-    parts = [f"{counted(damage.cut_bytes, 'byte')} of an open chunk at the end"] if damage.cut_bytes else []
-    parts += [counted(damage.bad_chunks, "damaged chunk")] if damage.bad_chunks else []
-    if damage.bad_records:
-        names = "damaged definition, message or stretch", "damaged definitions, messages or stretches"
-        parts.append(counted(damage.bad_records, *names))
-    if damage.nameless:
-        parts.append(f"{counted(damage.nameless, 'message')} whose topic is lost with its definition")
-    if damage.missing:
-        parts.append(f"{counted(damage.missing, 'message')} by the log's own count")
-    parts += ["its end"] if not (parts or damage.whole) else []
-    return "lost: " + ", ".join(parts) if parts else ""
 
 
 @log_app.command("export")
@@ -110,6 +95,7 @@ def log_export(
     """Write a log as tables, sensors one row a sample, others one row a message; exit status 1: no row, or a damaged log."""
 
     def work() -> int:
+        from bridge.log.damage import lost_in_words
         from bridge.log.logfile import STREAMING
         from bridge.tables.export import export
         from cockpit.run.replay import time_s
@@ -123,8 +109,11 @@ def log_export(
         words = [f"{name:<8} {counted(rows, 'row')}" for name, rows in written.rows.items()]
         nothing = "nothing to write: no message of these topics in this time; a table that is there stays as it is"
         words += [str(file) for file in written.files] or [nothing]
-        lost = _lost(written.damage)
-        tell(as_json, written, [*words, f"warning  the log is damaged; {lost}"] if lost else words)
+        lost = lost_in_words(written.damage)
+        words += [f"warning  the log is damaged; lost: {lost}"] if lost else []
+        before = written.damage.before
+        words += [f"warning  the log was saved from one that was not whole: {before}"] if before else []
+        tell(as_json, written, words)
         return 0 if written.files and not lost else 1
 
     carry_out(work, as_json)

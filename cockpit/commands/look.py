@@ -7,7 +7,7 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.look.quantity import quantity
 from cockpit.run.writable import PAGE, PICTURE, RIG, check_output, writing
 

@@ -10,7 +10,7 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO
 from cockpit.run.writable import CSV, PAGE, PICTURE, check_output, writing
 

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.commands.options import (
     DEFAULT_SCENARIO,
     Certs,
@@ -22,6 +22,7 @@ from cockpit.commands.options import (
     as_settings,
 )
 from cockpit.run.child_process import stop_event, warn_without_priority
+from cockpit.run.telling import telling
 from cockpit.run.writable import LOG, check_output
 
 
@@ -87,19 +88,21 @@ def plant(
         described = header(made, "plant", lockstep)
         # a run of `stickslip run` is over with its processes, and so is a stop in it
         latch = None if child or lockstep else StopLatch(made.rig.name)
-        blocks = serve(
-            made.rig,
-            made.seed,
-            made.duration_s,
-            made.bus,
-            described,
-            roles,
-            lockstep,
-            stop_event(child),
-            made.arm,
-            latch,
-            made.fault,
-        )
+        with telling(quiet=bool(child)) as say:
+            blocks = serve(
+                made.rig,
+                made.seed,
+                made.duration_s,
+                made.bus,
+                described,
+                roles,
+                lockstep,
+                stop_event(child),
+                made.arm,
+                latch,
+                made.fault,
+                say,
+            )
         served = Served("plant", made.bus.endpoint, lockstep, blocks)
         tell(as_json, served, [served.in_words()])
 
@@ -129,7 +132,9 @@ def controller(
             refuse_what_takes_no_clock(made)
         if not (lockstep or child):
             warn_without_priority()
-        steps = control(made.controller, made.bus, header(made, "controller", lockstep), lockstep, stop_event(child))
+        described = header(made, "controller", lockstep)
+        with telling(quiet=bool(child)) as say:
+            steps = control(made.controller, made.bus, described, lockstep, stop_event(child), say)
         served = Served("controller", made.bus.endpoint, lockstep, steps)
         tell(as_json, served, [served.in_words()])
 
@@ -165,8 +170,11 @@ def record(
             if not child:
                 keep_aside(path)
 
-        about, stop = about_run(made, lockstep), stop_event(child)
-        record_all(path, made.bus, ["plant", "controller"], about, lockstep, stop, ready, made.log.rotation)
+        if not (lockstep or child):
+            warn_without_priority()
+        about, stop, roles = about_run(made, lockstep), stop_event(child), ["plant", "controller"]
+        with telling(quiet=bool(child)) as say:
+            record_all(path, made.bus, roles, about, lockstep, stop, ready, made.log.rotation, say)
         tell(as_json, Recorded(str(path)), [f"log      {path}"])
 
     carry_out(work, as_json)

@@ -9,7 +9,7 @@ from bridge.faults import Fault
 from bridge.files import refuse_to_lose
 from bridge.plain import plain
 from bridge.units import counted
-from cockpit.commands.json_option import STDOUT, Json, carry_out, tell
+from cockpit.commands.as_json.option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO, Certs, Endpoint, Insecure, Prefix, as_settings
 from cockpit.run.child_process import stop_event
 from cockpit.run.writable import LOG, check_output

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.commands.options import (
     DEFAULT_SCENARIO,
     Certs,
@@ -40,6 +40,9 @@ def run(
     ] = False,
     log: LogFile = None,
     wait: Wait = None,
+    without: Annotated[
+        bool, typer.Option("--without", help="Simulate the same run without the controller, too, to compare with.")
+    ] = False,
     as_json: Json = None,
 ) -> None:
     """Run plant, controller and recorder to the end of a scenario and say what came of it."""
@@ -51,7 +54,7 @@ def run(
         other = [rig_setting(rig)] if rig is not None else []
         changed = [*other, *as_settings(settings, seed, endpoint, prefix, certs, insecure)]
         with stopped_once():
-            came = run_scenario(scenario, changed, lockstep, in_process, log, wait)
+            came = run_scenario(scenario, changed, lockstep, in_process, log, wait, without)
             tell(as_json, came.as_dict(), came.in_words())
         return 0 if came.verdict.good else 1
 

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 
 
 class Known(NamedTuple):

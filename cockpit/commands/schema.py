@@ -8,7 +8,7 @@ import typer
 
 from bridge.faults import Fault
 from bridge.files import write_json
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.run.writable import check_output_folder, writing
 
 
@@ -31,7 +31,7 @@ def schema(
     """Print the JSON Schema of a file or of a result of --json. A TOML file names its own by `#:schema PATH` in line 1."""
 
     def work() -> None:
-        from cockpit.commands.schemas import FORMATS
+        from cockpit.commands.as_json.schemas import FORMATS
 
         key = name.replace("/", "-")
         if key and key not in FORMATS:

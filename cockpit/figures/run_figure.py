@@ -1,5 +1,6 @@
 """A log as a figure, or two laid over each other: for a screen with the answer above it, or for a paper without."""
 
+import re
 import textwrap
 from collections.abc import Sequence
 from itertools import groupby, pairwise
@@ -32,7 +33,7 @@ _MM = 1.0 / 25.4  # inch
 _FIRST_MM = {SCREEN: 90.0, PAPER: 42.0}  # height of the first panel, and of each that follows
 _NEXT_MM = {SCREEN: 60.0, PAPER: 30.0}
 _FOOT_MM = 1.35  # of a letter of the line at the foot
-_LETTER_MM, _KEY_MM = 1.75, 13.0  # of a letter in a legend, and of what stands before it
+_LETTER_MM, _KEY_MM = 0.18, 1.4  # of a letter in a legend and what stands before it, a point of its size
 _ON_TOP = 3.0  # of what is drawn over each other; the first signal is in front
 _OTHER_ALPHA = 0.55  # of the second log, which is dashed besides
 
@@ -190,16 +191,19 @@ def _least(curves: Sequence[Sequence[Curve]]) -> float:
 
 
 def _legend(axes: Any, request: Request) -> None:
-    """Above the axes on a screen, in as many columns as there is room for; inside them in a paper."""
+    """Above the axes, where it hides no slip, in as many columns as there is room for."""
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) < 2:
         return
-    if request.style == PAPER:
-        axes.legend(handles, labels, loc="best", borderaxespad=0.2, handlelength=1.5, labelspacing=0.3)
-        return
-    room = int(0.85 * request.width_mm / (_KEY_MM + _LETTER_MM * max(map(len, labels))))
+    size = _rules(request.style == PAPER)["legend.fontsize"]
+    room = int(0.85 * request.width_mm / (size * (_KEY_MM + _LETTER_MM * max(map(_letters, labels)))))
     columns = min(max(room, 1), len(handles))
     axes.legend(handles, labels, ncols=columns, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+
+def _letters(label: str) -> int:
+    """How many letters of a label are seen: a symbol in mathematics, as of v_a, is two."""
+    return len(re.sub(r"\$.*?\$", "vd", label))
 
 
 def _draw(axes: Any, curve: Curve, label: str, second: bool, zorder: float) -> None:

@@ -1,5 +1,6 @@
 """What can be drawn of a log: each signal's name, symbol, unit, and where in the log it is."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,13 +113,18 @@ def limits_of(run: RunData, axis: str) -> list[tuple[str, float]]:
     """Limits of an axis in the configuration of a log, in words and in SI units; none where the log does not tell."""
     if axis != "amplitude":
         return []
+    return stroke_limits({role: run.configuration(role) for role in ("controller", "plant") if role in run.headers})
+
+
+def stroke_limits(configurations: Mapping[str, Any]) -> list[tuple[str, float]]:
+    """Limits of the amplitude [m] in the configurations of rig and controller, by role, in words."""
     found: list[tuple[str, float]] = []
     for role, keys, words in (
         ("controller", ("limits", "amplitude_max_m"), "controller's limit"),
         ("plant", ("rig", "guard", "stroke_m"), "guard's limit"),
         ("plant", ("rig", "piezo", "amplitude_max_m"), "exciter's stroke"),
     ):
-        value: Any = run.configuration(role) if role in run.headers else None
+        value: Any = configurations.get(role)
         for key in keys:
             value = value.get(key) if isinstance(value, dict) else None
         if is_number(value):

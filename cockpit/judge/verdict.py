@@ -15,7 +15,9 @@ from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.log_faults import of_bytes, of_clock, of_events
+from cockpit.judge.machine_terms import motion_of
 from cockpit.judge.pauses import Pauses, pauses_in
+from cockpit.judge.phases import Phase, Told, alone, phase, slips_in
 from diagnosis.features.cycles import Cycles, find_cycles
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
@@ -25,16 +27,6 @@ _CONTROLLED = ("drive_force_N", "mass_position_m", "base_accel_mps2", "drive_pos
 _STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
 _BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; a foreign rig need not say it
 _RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
-
-
-class Phase(NamedTuple):
-    """One stretch of a run."""
-
-    seconds: float
-    slips: int
-    slips_per_min: float
-    swing_N: float  # of the drive force, largest to smallest block mean
-    mean_force_N: float
 
 
 class Latency(NamedTuple):
@@ -91,7 +83,9 @@ class RunVerdict(NamedTuple):
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
         table: dict[str, Any] = self._asdict() | {"good": self.good, "chain": self.chain.as_dict()}
-        for name in ("before", "taking_over", "after", "alone", "charge", "latency", "pauses"):
+        for name in ("before", "taking_over", "after", "alone"):
+            table[name] = table[name] and table[name].as_dict()
+        for name in ("charge", "latency", "pauses"):
             table[name] = table[name] and table[name]._asdict()
         return table
 
@@ -119,6 +113,15 @@ def cycles_of(run: RunData) -> Cycles | None:
     return find_cycles(sample_s.ravel(), force_N[finite].ravel(), slowest_fall_s=_slowest_fall_s(run))
 
 
+def stretch_of(run: RunData, from_s: float, to_s: float) -> Phase | None:
+    """What happened in a stretch of a run; None where it has no block. Raises Fault BAD_LOG."""
+    mean_N = run.sensors["drive_force_N"].astype(np.float64).mean(axis=1)
+    finite = np.isfinite(mean_N)
+    block_s = number_of(run.configuration("controller"), "block_s", run.path)
+    told_by = Told(cycles_of(run), run.sensors["t_ns"][finite] * 1e-9, mean_N[finite], motion_of(run, block_s))
+    return phase(told_by, from_s, to_s, [])
+
+
 def absent_channels(run: RunData) -> list[str]:
     """Channels that the file of another program did not hold; they are zeros in its log. Raises Fault BAD_LOG."""
     return texts_of(run.headers, "import", "missing", run.path)
@@ -136,7 +139,7 @@ def judge_run(run: RunData) -> RunVerdict:
     force_N = run.sensors["drive_force_N"].astype(np.float64)
     seconds = float(t_s[-1]) if blocks else 0.0
     began_s = max(float(t_s.min()) - block_s, 0.0) if blocks else 0.0  # a log may begin late
-    in_charge_s = enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
+    in_charge_s = settled_from_s(enabled_from_s)
     finite = np.isfinite(force_N).all(axis=1)
     unreadable = [name for name in _CONTROLLED if not np.isfinite(run.sensors[name]).all()]
     t_s, force_N = t_s[finite], force_N[finite]
@@ -174,7 +177,8 @@ def judge_run(run: RunData) -> RunVerdict:
     pauses, why_not = pauses_in(run, block_s * 1e9) if latency is not None else (None, "")
     # the controller has its second to settle after it was gone as well
     without = [*stops, *((from_s, until_s + _SETTLING_S) for from_s, until_s in gone)]
-    after = _phase(cycles, t_s, mean_N, max(in_charge_s, began_s), seconds, without)
+    told_by = Told(cycles, t_s, mean_N, motion_of(run, block_s))
+    after = phase(told_by, max(in_charge_s, began_s), seconds, without)
     gone_s = sum(until_s - from_s for from_s, until_s in gone)
     return RunVerdict(
         log=str(run.path),
@@ -186,11 +190,11 @@ def judge_run(run: RunData) -> RunVerdict:
         enabled_from_s=enabled_from_s,
         stopped_s=stopped_s,
         charge=charge,
-        alone=_alone(cycles, t_s, mean_N, gone),
-        before=_phase(cycles, t_s, mean_N, began_s, min(enabled_from_s, seconds), []),
-        taking_over=_phase(cycles, t_s, mean_N, enabled_from_s, min(in_charge_s, seconds), without),
+        alone=alone(told_by, gone),
+        before=phase(told_by, began_s, min(enabled_from_s, seconds), []),
+        taking_over=phase(told_by, enabled_from_s, min(in_charge_s, seconds), without),
         after=after,
-        stopped_slips=_slips_in(cycles, stops),
+        stopped_slips=slips_in(cycles, stops),
         drive_velocity_max_mps=float(trace["drive_velocity_mps"].max(initial=0.0)),
         velocity_ratio_min=float(ratio.min()) if len(ratio) else 0.0,
         velocity_ratio_max=float(ratio.max()) if len(ratio) else 0.0,
@@ -207,6 +211,11 @@ def judge_run(run: RunData) -> RunVerdict:
         imported="",
         gain_verified=_gain_is_verified(run),
     )
+
+
+def settled_from_s(enabled_from_s: float) -> float:
+    """From when on a controller that is enabled then is judged."""
+    return enabled_from_s + _SETTLING_S if enabled_from_s > 0 else 0.0
 
 
 def _gain_is_verified(run: RunData) -> bool:
@@ -234,7 +243,7 @@ def _judge_imported(run: RunData, source: str) -> RunVerdict:
         stopped_s=0.0,
         charge=in_charge(run),
         alone=None,
-        before=_phase(cycles_of(run), t_s[finite], mean_N[finite], 0.0, seconds, []),
+        before=phase(Told(cycles_of(run), t_s[finite], mean_N[finite], None), 0.0, seconds, []),
         taking_over=None,
         after=None,
         stopped_slips=0,
@@ -254,14 +263,6 @@ def _judge_imported(run: RunData, source: str) -> RunVerdict:
     )
 
 
-def _slips_in(cycles: Cycles | None, stretches: list[tuple[float, float]]) -> int:
-    """Slips in any of the stretches, each counted once."""
-    if cycles is None or not stretches:
-        return 0
-    at_s = cycles.breakaway_t_s
-    return int(np.count_nonzero(np.any([(at_s > one[0]) & (at_s <= one[1]) for one in stretches], axis=0)))
-
-
 def _is_steady(speed_mps: Any, block_s: float) -> Any:
     """Rows in which the drive moves as fast as 0.1 s before: while it turns, v_a over v_d says nothing."""
     back = round(_STEADY_S / block_s)
@@ -269,17 +270,6 @@ def _is_steady(speed_mps: Any, block_s: float) -> Any:
     changed_mps = np.abs(speed_mps[back:] - speed_mps[:-back])
     steady[back:] = (speed_mps[back:] > _STANDSTILL_MPS) & (changed_mps < _STEADY_SHARE * speed_mps[back:])
     return steady
-
-
-def _alone(cycles: Cycles | None, t_s: Any, mean_N: Any, gone: list[tuple[float, float]]) -> Phase | None:
-    """What happened while nobody was in charge."""
-    phases = [_phase(cycles, t_s, mean_N, from_s, until_s, []) for from_s, until_s in gone]
-    there = [phase for phase in phases if phase is not None]
-    if not there:
-        return None
-    seconds, slips = sum(phase.seconds for phase in there), sum(phase.slips for phase in there)
-    mean = sum(phase.mean_force_N * phase.seconds for phase in there) / seconds
-    return Phase(seconds, slips, 60.0 * slips / seconds, max(phase.swing_N for phase in there), mean)
 
 
 def _untested(run: RunData, after: Phase | None, in_charge_s: float) -> str:
@@ -336,7 +326,7 @@ def _lost_blocks(run: RunData) -> tuple[int, bool]:
     A damaged chunk may hold the first blocks or the last ones: then the plant's END counts, which says how many there were.
     """
     numbers = _numbers(run.sensors)
-    whole = run.damage.whole
+    whole = run.damage.whole and not run.damage.before
     ends = [_BLOCKS.search(event.text) for event in run.events if (event.source, event.code) == ("plant", "END")]
     told = [int(found[1]) for found in ends if found]
     if not told:
@@ -358,24 +348,6 @@ def _numbers(table: Any) -> Any:
     """The numbers of messages, ascending, each once."""
     numbers = np.sort(table["sequence"].astype(np.int64), kind="stable")
     return numbers[np.concatenate([[True], numbers[1:] > numbers[:-1]])[: len(numbers)]]
-
-
-def _phase(
-    cycles: Cycles | None, t_s: Any, mean_N: Any, from_s: float, to_s: float, without: list[tuple[float, float]]
-) -> Phase | None:
-    def counts(at_s: Any) -> Any:
-        return ~sum(((at_s > first_s) & (at_s <= last_s) for first_s, last_s in without), np.zeros(len(at_s), bool))
-
-    inside = (t_s > from_s) & (t_s <= to_s) & counts(t_s)
-    if cycles is None or not inside.any():
-        return None
-    slips = int(np.count_nonzero(counts(cycles.between(from_s, to_s).breakaway_t_s)))
-    seconds = to_s - from_s - sum(max(min(last_s, to_s) - max(first_s, from_s), 0.0) for first_s, last_s in without)
-    # the first ramp of a run starts from an unloaded spring: no part of the swing of what follows
-    later = inside & (t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
-    steady = later if later.any() else inside
-    swing_N = float(np.ptp(mean_N[steady]))
-    return Phase(seconds, slips, 60.0 * slips / seconds, swing_N, float(mean_N[steady].mean()))
 
 
 def _latency(run: RunData) -> Latency | None:

@@ -1,12 +1,15 @@
 """The verdict on a run in words for a mechanic."""
 
+import math
 from typing import Any
 
 from bridge.log.in_charge import WEAK_S
 from bridge.log.storage.chain import chain_in_words
 from bridge.units import counted
 from bridge.wire import realtime
+from cockpit.judge.machine_terms import Following
 from cockpit.judge.pauses import pauses_in_words
+from cockpit.judge.phases import Phase
 from cockpit.judge.verdict import RunVerdict
 
 VERDICT = "verdict"  # the metadata record of a log that `stickslip run` has judged
@@ -14,8 +17,8 @@ _ALARM_RATIO = 1.05
 _FADE_S = 0.2  # of the vibration at the end of a run
 
 
-def in_words(verdict: RunVerdict) -> list[str]:
-    """The verdict as lines for a person."""
+def in_words(verdict: RunVerdict, without: Phase | None = None) -> list[str]:
+    """The verdict as lines for a person, with the stretch after as it is without the controller, if that was simulated."""
     v = verdict
     lines: list[str] = []
     if v.imported:
@@ -35,6 +38,9 @@ def in_words(verdict: RunVerdict) -> list[str]:
         lines.append(
             f"after    {counted(v.after.slips, 'slip')} in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
         )
+    lines.extend(_machine_terms(v.before, v.after))
+    if without is not None:
+        lines.append(_without_in_words(without))
     if v.alone is not None:
         lines.append(
             f"alone    {counted(v.alone.slips, 'slip')} in {v.alone.seconds:.2f} s with nobody in charge, drive force swings by "
@@ -74,6 +80,57 @@ def in_words(verdict: RunVerdict) -> list[str]:
     return lines
 
 
+def _machine_terms(before: Phase | None, after: Phase | None) -> list[str]:
+    """Following error, reversals and dose with the controller, and before it if it came later; without a controller none."""
+    if after is None or after.following is None:
+        return []
+    was = before.following if before is not None else None
+    lines = following_in_words(after.following, was, "before")
+    if after.vibration_dose_mm2_per_s > 0.0:
+        rms_mm_per_s = math.sqrt(after.vibration_dose_mm2_per_s / after.seconds)
+        lines.append(
+            f"dose     v_a^2 over the {after.seconds:.1f} s after is {after.vibration_dose_mm2_per_s:.3g} mm2/s, "
+            f"{rms_mm_per_s:.2f} mm/s rms"
+        )
+    return lines
+
+
+def following_in_words(now: Following, other: Following | None, name: str) -> list[str]:
+    """Following error and reversals of a stretch as lines, beside those of another stretch called `name`, if there is one."""
+    lines = [
+        f"error    following error {_um(now.error_rms_m)} um rms, {_um(now.error_peak_m)} um peak, "
+        f"{_um(now.error_ripple_m)} um rms about its mean"
+    ]
+    if other is not None:
+        sizes_m = other.error_rms_m, other.error_peak_m, other.error_ripple_m
+        lines[0] += f" ({name}: {', '.join(map(_um, sizes_m))})"
+    if now.reversals:
+        line = f"reversal quadrant error {_worst_reversal(now)}"
+        lines.append(line + (f" ({name}: {_worst_reversal(other)})" if other is not None and other.reversals else ""))
+    return lines
+
+
+def _without_in_words(without: Phase) -> str:
+    line = f"without  {counted(without.slips, 'slip')} in {without.seconds:.1f} s, drive force swings by {without.swing_N:.2f} N"
+    if (following := without.following) is not None:
+        line += (
+            f", following error {_um(following.error_rms_m)} um rms, {_um(following.error_peak_m)} um peak, "
+            f"{_um(following.error_ripple_m)} um rms about its mean"
+        )
+        if following.reversals:
+            line += f", quadrant error {_worst_reversal(following)}"
+    return f"{line}: the stretch after, simulated without the controller"
+
+
+def _worst_reversal(following: Following) -> str:
+    stands = f"the slide stands for {1e3 * following.reversal_stick_s:.0f} ms"
+    return f"{_um(following.quadrant_error_m)} um, {stands}, the worst of {following.reversals}"
+
+
+def _um(size_m: float) -> str:
+    return f"{1e6 * size_m:.3g}" if size_m < 1e-3 else f"{1e6 * size_m:.0f}"
+
+
 def noted(verdict: RunVerdict) -> dict[str, Any]:
     """The fields of the table `verdict` in a log: what came of the run, as its end was judged."""
     figures = verdict.as_dict()
@@ -106,6 +163,9 @@ def headline(verdict: RunVerdict) -> str:
         weak += f"; {counted(v.stopped_slips, 'slip')} while it was stopped or not armed"
     if v.after.slips:
         return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge{weak}"
+    untold = next((fault for fault in v.faults if fault.partition(":")[0] not in v.charge.reasons_s), None)
+    if untold is not None:  # what is good above the line must not hide why the run is not
+        weak += f"; but {untold.partition('; ')[0]}"
     if v.before is not None and v.before.slips:
         then = v.taking_over.slips if v.taking_over is not None else 0
         over = (

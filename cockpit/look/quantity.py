@@ -6,7 +6,7 @@ import re
 from bridge.faults import Fault
 from bridge.tables.unit_words import known_unit, si_unit
 
-_EXAMPLES = {"velocity": "0.5mm/s", "force": "94.5N", "mass": "1.5kg", "frequency": "1kHz"}
+_EXAMPLES = {"velocity": "0.5mm/s", "force": "94.5N", "mass": "1.5kg", "frequency": "1kHz", "time": "30s"}
 _GRAMS = {"g": 1e-3, "mg": 1e-6}  # where a mass is asked for, g is no acceleration
 
 

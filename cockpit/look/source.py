@@ -71,6 +71,9 @@ def read_record(path: Path, asked: Asked) -> Record:
     channels = _channels(table, found)
     columns, findings = mapped(table, channels, asked.rate_Hz)
     findings = [Finding("assumed", path.name, "; ".join(found.reasons)), *findings, *_unitless(table, channels)]
+    if found.force and (known_unit(table.unit(found.force)) or ("",))[0] == "torque":
+        text = f"{found.force!r} is a torque: read N as N m, N/m as N m/rad, kg as kg m2, and an angle is not taken as the way"
+        findings.append(Finding("assumed", path.name, text))
     load_N, of_load = asked.load_N, not found.force and bool(found.coefficient)
     if load_N is None and found.load:
         load_N = _mean_load(table, found.load)

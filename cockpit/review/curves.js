@@ -6,6 +6,7 @@ const EXCITING = "#e4f0e1", LIMIT = "#b5402a", MARK = "#b5402a", BEGIN = "#1f2d3
 
 /** Curves of the page, as JSON with base64 of little-endian float32, as arrays; null where there is no value. */
 function unpacked(text) {
+  if (Array.isArray(text)) return text; // of a rig that is watched
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   return Array.from(new Float32Array(bytes.buffer), (value) => (Number.isNaN(value) ? null : value));
 }
@@ -137,18 +138,26 @@ function heightOf(panel) {
   };
 }
 
+/** What a plot of a panel draws, in the order of its series: the first curve is drawn last, on top. */
+function columnsOf(panel, x) {
+  const columns = [x];
+  for (const curve of [...panel.curves].reverse()) {
+    if ("least" in curve) columns.push(unpacked(curve.least), unpacked(curve.most));
+    columns.push(unpacked(curve.mean));
+  }
+  return columns;
+}
+
 /** One panel as a plot in `place`. */
 function plotOf(place, panel, x, logs, axis) {
   const series = [{ label: "time", value: (plot, value) => (value === null || value === undefined ? "-" : `${value.toFixed(3)} s`) }];
-  const bands = [], columns = [x], hidden = [];
-  for (const curve of [...panel.curves].reverse()) { // the first is drawn last, on top
+  const bands = [], hidden = [];
+  for (const curve of [...panel.curves].reverse()) {
     if ("least" in curve) {
       const at = series.length;
       bands.push({ series: [at + 1, at], fill: faint(curve.colour, curve.log > 0 ? 0.15 : 0.28) });
-      columns.push(unpacked(curve.least), unpacked(curve.most));
       hidden.push(at, at + 1);
     }
-    columns.push(unpacked(curve.mean));
     series.push(...seriesOf(curve, logs));
   }
   const width = () => Math.max(place.clientWidth, 300);
@@ -184,7 +193,7 @@ function plotOf(place, panel, x, logs, axis) {
       ready: [(plot) => plot.over.addEventListener("dblclick", () => axis.show(axis.least, axis.most))],
     },
   };
-  const plot = new uPlot(options, columns, place);
+  const plot = new uPlot(options, columnsOf(panel, x), place);
   const rows = [...plot.root.querySelectorAll(".u-legend .u-series")];
   for (const at of hidden) rows[at].style.display = "none";
   for (const row of rows.slice(1)) rows[0].after(row); // back in the order of the panel

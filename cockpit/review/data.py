@@ -71,7 +71,9 @@ def _log(run: RunData, verdict: RunVerdict, label: str, grid: Grid) -> dict[str,
         "label": label,
         "name": shown_name(run.path.name),
         "answer": headline(verdict),
-        "good": verdict.good,
+        "good": None
+        if verdict.imported and verdict.good
+        else verdict.good,  # there is no controller that could be judged
         "in_charge_from_s": verdict.enabled_from_s if verdict.enabled_from_s > 0 and not verdict.imported else None,
         "slips": []
         if cycles is None

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from bridge.log.logfile import RunData
+from cockpit.judge.verdict_words import VERDICT
 
 
 class Difference(NamedTuple):
@@ -18,6 +19,8 @@ def parameters_of(run: RunData) -> dict[str, str]:
     """Every number and word that a log holds of its processes, by a key such as `controller.limits.v_ratio`."""
     found: dict[str, str] = {}
     for role, table in run.headers.items():
+        if role == VERDICT:  # what came of the run is no parameter of it
+            continue
         for name, text in table.items():
             try:
                 value = json.loads(text)

@@ -5,26 +5,10 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const logs = data.logs;
 const axis = new TimeAxis(data.grid.start_s, data.grid.start_s + (data.grid.bins - 1) * data.grid.step_s);
 
-/** An element with a text or with children; `more` are its properties. */
-function made(tag, content, more = {}) {
-  const element = Object.assign(document.createElement(tag), more);
-  element.append(...(Array.isArray(content) ? content : [content]).flatMap((one) => (typeof one === "string" ? rich(one) : [one])));
-  return element;
-}
-
-function into(id, ...children) {
-  document.getElementById(id).append(...children);
-}
-
-function table(head, rows) {
-  const heads = made("tr", head.map((text) => made("th", text)));
-  return made("div", [made("table", [heads, ...rows])], { className: "wide" });
-}
-
 function answers() {
   for (const log of logs) {
     const name = logs.length > 1 ? `${log.label}: ${log.name}` : log.name;
-    into("answers", made("p", [made("small", name), log.answer], { className: `verdict ${log.good ? "good" : "bad"}` }));
+    into("answers", made("p", [made("small", name), log.answer], { className: `verdict ${{ true: "good", false: "bad" }[log.good] ?? "unjudged"}` }));
   }
   if (logs.length < 2) return;
   const first = data.differences.slice(0, 4).map((row) => `${row.key} ${row.values.map((value) => value || "(none)").join(" \u2192 ")}`);
@@ -98,7 +82,6 @@ function zoom() {
   tell();
 }
 
-/** The histogram of latency as SVG: a bar for each stretch of time, its height the logarithm of how many. */
 function latency() {
   const with_ = logs.filter((log) => log.latency);
   into("latency", made("h2", "From a block to its command"));
@@ -107,33 +90,7 @@ function latency() {
     return;
   }
   into("latency", made("p", "How many commands took how long; both axes are logarithmic. What is right of 1 ms came too late for its block.", { className: "small" }));
-  const w = 900, h = 200, left = 60, bottom = 40;
-  const least = Math.min(...with_.map((log) => log.latency.edges_us[0])), most = Math.max(1500, ...with_.map((log) => log.latency.edges_us.at(-1)));
-  const highest = Math.max(...with_.flatMap((log) => log.latency.counts));
-  const px = (us) => left + ((w - left - 10) * Math.log(us / least)) / Math.log(most / least);
-  const py = (count) => h - bottom - ((h - bottom - 10) * Math.log10(1 + count)) / Math.log10(1 + highest);
-  const svg = (tag, attributes, text = "") => {
-    const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
-    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-    element.textContent = text;
-    return element;
-  };
-  const picture = svg("svg", { viewBox: `0 0 ${w} ${h}`, style: "width: 100%; max-width: 900px", "font-size": 12, role: "img", "aria-label": "histogram of latency" });
-  for (const log of with_) {
-    const fill = log === logs[0] ? "#2a6fb5" : "none";
-    log.latency.counts.forEach((count, at) => {
-      const [from, to] = [px(log.latency.edges_us[at]), px(log.latency.edges_us[at + 1])];
-      picture.append(svg("rect", { x: from, y: py(count), width: to - from, height: h - bottom - py(count), fill, stroke: fill === "none" ? "#b5402a" : "none" }));
-    });
-  }
-  picture.append(svg("line", { x1: px(1000), x2: px(1000), y1: 5, y2: h - bottom, stroke: "#b5402a", "stroke-dasharray": "6 4" }));
-  const ticks = [1, 10, 100, 1e3, 1e4, 1e5, 1e6].flatMap((us) => [us, 2 * us, 5 * us]);
-  for (const us of ticks.filter((one) => one >= least && one <= most)) picture.append(svg("text", { x: px(us), y: h - bottom + 16, "text-anchor": "middle" }, us < 1000 ? `${us} µs` : `${us / 1000} ms`));
-  for (let count = 1; count <= highest; count *= 10) picture.append(svg("text", { x: left - 6, y: py(count) + 4, "text-anchor": "end" }, String(count)));
-  picture.append(svg("text", { x: (left + w) / 2, y: h - 6, "text-anchor": "middle" }, "from the block out to its command in"));
-  picture.append(svg("line", { x1: left, x2: w - 10, y1: h - bottom, y2: h - bottom, stroke: "#808b96" }));
-  picture.append(svg("text", { x: 0, y: 14 }, "commands"));
-  into("latency", picture);
+  into("latency", histogram(with_));
   if (with_.length > 1) into("latency", made("p", "Filled: A. Outlined: B.", { className: "small" }));
 }
 

@@ -20,8 +20,8 @@ function ribbon(place, logs, axis, helps) {
   for (const log of logs) {
     const whose = logs.length > 1 ? ` ${log.label}` : "";
     for (const row of log.bands) rows.push({ title: row.title + whose, stretches: row.stretches, kind: row.title });
-    const events = log.events.filter((one) => !one.code.endsWith("PAUSE"));
-    if (events.length) rows.push({ title: "events" + whose, events });
+    const events = () => log.events.filter((one) => !one.code.endsWith("PAUSE"));
+    if (log.grows || events().length) rows.push({ title: "events" + whose, events });
   }
   if (!rows.length) return;
   const canvas = document.createElement("canvas"), colour = colouring();
@@ -54,7 +54,7 @@ function ribbon(place, logs, axis, helps) {
       }
     }
     ctx.fillStyle = ctx.strokeStyle = "#6c3483";
-    for (const event of row.events ?? []) {
+    for (const event of row.events?.() ?? []) {
       const x = xOf(event.t_s);
       ctx.fillRect(x - 1, top + 1, 3, ROW - 2);
     }
@@ -79,7 +79,7 @@ function ribbon(place, logs, axis, helps) {
     if (!row) return null;
     const t_s = axis.from + ((mouse.offsetX - LEFT) / inner()) * (axis.to - axis.from);
     if (row.events) {
-      const near = row.events.filter((one) => Math.abs(xOf(one.t_s) - mouse.offsetX) < 5);
+      const near = row.events().filter((one) => Math.abs(xOf(one.t_s) - mouse.offsetX) < 5);
       return near.length ? { from: near[0].t_s - 0.5, to: near[0].t_s + 0.5, text: near.map((one) => `${one.t_s.toFixed(3)} s ${one.code}: ${one.text}`).join("\n") } : null;
     }
     const found = row.stretches.find(([from, to]) => from <= t_s && t_s <= to);

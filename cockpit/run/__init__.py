@@ -7,5 +7,6 @@ processes, child_process    as several processes: started, watched, ended; how e
 progress, operator, status  the progress line; a person's stop or reset on its way; what goes on at a rig
 replay, log_to_bus          a log through today's controller; a log back on the bus
 authority                   the certificates of the roles
+without                     the same run without its controller
 writable                    files that a command writes at its end
 """

@@ -35,6 +35,7 @@ class Obeyed(NamedTuple):
     amplitude_m: float  # of the exciter
     seconds: float  # from the first word to this
     not_kept: str  # why a stop does not outlast a restart of the rig; empty: it does, or is none
+    alone: bool  # armed without a controller on the bus
 
     def in_words(self) -> list[str]:
         """Lines for a person."""
@@ -49,6 +50,10 @@ class Obeyed(NamedTuple):
         ]
         if self.not_kept:
             lines.append(f"warning  {self.not_kept}")
+        if self.alone:
+            lines.append(
+                "warning  no controller is on the bus: nothing vibrates until one comes, `stickslip controller`"
+            )
         if not self.done and self.state == "FAULT":
             lines.append("next     `stickslip reset` when the cause is gone, then `stickslip arm`")
         return lines
@@ -77,6 +82,7 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         send = bus.publisher(OPERATOR)
         seen = _until_done(send, word, applied, action)
         not_kept = _not_kept(events) if action == wire.Operator.STOP else ""
+        alone = action == wire.Operator.ARM and bool(bus.wait_for(["controller"], _KEPT_S))
     if seen is None:
         line = f"{where}: no rig says what it applies: --prefix must be that of the run"
         raise Fault("NO_PEER", f"{line}; take it that it goes on as before, and {_BY_HAND}")
@@ -93,6 +99,7 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         amplitude_m=last.amplitude_m,
         seconds=seconds,
         not_kept=not_kept,
+        alone=alone,
     )
     if action == wire.Operator.STOP and not obeyed.done:
         line = f"{where}: the rig is {obeyed.state} and vibrates with {quantity(last.amplitude_m, 'm')} after a stop"

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -154,8 +155,20 @@ def likely_reason(run: RunData, settings: list[str]) -> str:
     now = json.loads(header(scenario, "controller", lockstep=False).versions)
     changed = [f"{name} {was.get(name)} then, {now[name]} now" for name in now if was.get(name) != now[name]]
     if changed:
-        return f"other versions: {'; '.join(changed)}"
+        made, made_by = was.get("stickslip"), now["stickslip"]
+        return f"other versions: {'; '.join(changed)}" + (f"; {_installed(str(made))}" if made != made_by else "")
     return "same versions and configuration: the controller's code was changed since, or the log was"
+
+
+def _installed(version: str) -> str:
+    """How to get the version that made a log."""
+    if not re.fullmatch(r"[\w.+-]+", version, re.ASCII):
+        return "the log does not say which one made it"
+    wheel = f"stickslip-{version}-py3-none-any.whl"
+    return (
+        f"`pip install '{wheel}[all]'`, or `pip install '.[all]'` in a checkout of v{version}, repeats it bit for bit; "
+        "what-if runs (`--set`, `--closed-loop`) work with this one"
+    )
 
 
 class RunFigures(NamedTuple):

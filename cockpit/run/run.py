@@ -23,6 +23,7 @@ from cockpit.run.writable import LOG, check_output
 
 if TYPE_CHECKING:
     from cockpit.judge.margins import Margins
+    from cockpit.judge.phases import Phase
     from cockpit.judge.verdict import RunVerdict
 
 
@@ -75,10 +76,13 @@ class RunOutcome(NamedTuple):
     rig: str
     effects: list[str]  # of the rig
     loop: "Margins | None"  # of a rig with effects, which is another than the one the loop was designed for
+    without: "Phase | None" = None  # the stretch `after` without the controller, where it was asked for
 
     def as_dict(self) -> dict[str, Any]:
         """For `--json`."""
         table = self.verdict.as_dict() | {"rig": self.rig}
+        if self.without is not None:
+            table["without"] = self.without.as_dict()
         return table | {"effects": self.effects, "loop": self.loop} if self.loop is not None else table
 
     def in_words(self) -> list[str]:
@@ -88,7 +92,7 @@ class RunOutcome(NamedTuple):
 
         rig = f"rig      {self.rig}" + (f", with {', '.join(self.effects)}" if self.effects else "")
         margins = margins_in_words(self.loop) if self.loop is not None else []
-        return [headline(self.verdict), rig, *margins, *in_words(self.verdict)]
+        return [headline(self.verdict), rig, *margins, *in_words(self.verdict, self.without)]
 
 
 def run_scenario(
@@ -98,11 +102,13 @@ def run_scenario(
     in_process: bool,
     log: Path | None,
     wait_s: float | None = None,
+    without: bool = False,
 ) -> RunOutcome:
     """Run a scenario and judge it. A run without an end is over with Ctrl-C, SIGTERM or SIGHUP, and judged like any other.
 
     Args:
         wait_s: longest time until the log of a run of several processes begins; None: as long as they need.
+        without: simulate the same run without the controller as well, once it is judged.
 
     Raises Fault INTERRUPTED where one with an end was stopped before, with its verdict on stderr first.
 
@@ -141,14 +147,14 @@ def run_scenario(
     left = f"{closed} and not judged; `stickslip log info {path}` judges it"
     line = f"judging the log; Ctrl-C {'again ' if interrupted else ''}to leave it unjudged"
     with left_on_ctrl_c(line, left, again=interrupted):
-        return _judged(scenario, path, closed if interrupted else "")
+        return _judged(scenario, path, closed if interrupted else "", without)
 
 
-def _judged(scenario: Scenario, path: Path, interrupted: str) -> RunOutcome:
+def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool) -> RunOutcome:
     """What came of a run. Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end."""
     from bridge.log.logfile import read_run
     from bridge.log.storage.afterwards import note_afterwards
-    from cockpit.judge.verdict import judge, judge_run
+    from cockpit.judge.verdict import judge, judge_run, settled_from_s
     from cockpit.judge.verdict_words import VERDICT, in_words, noted
 
     if interrupted and scenario.duration_s:
@@ -164,8 +170,14 @@ def _judged(scenario: Scenario, path: Path, interrupted: str) -> RunOutcome:
 
         margins = loop_margins(run)
     verdict = judge_run(run)
-    verdict = verdict._replace(chain=note_afterwards(path, VERDICT, noted(verdict), verdict.chain))
-    return RunOutcome(verdict, scenario.rig.name, list(scenario.rig.effects), margins)
+    alone = None
+    if without and verdict.after is not None:
+        from cockpit.run.without import without_controller
+
+        alone = without_controller(scenario, settled_from_s(verdict.enabled_from_s), verdict.seconds)
+    fields = noted(verdict) | ({"without": alone.as_dict()} if alone is not None else {})
+    verdict = verdict._replace(chain=note_afterwards(path, VERDICT, fields, verdict.chain))
+    return RunOutcome(verdict, scenario.rig.name, list(scenario.rig.effects), margins, alone)
 
 
 def _in_process(scenario: Scenario, path: Path) -> None:

@@ -92,6 +92,10 @@ class Scenario(Strict):
                         f"rig.guard.forbidden_Hz = [{low_Hz:g}, {high_Hz:g}] ends in FAULT; forbid it to the controller as well"
                     )
         _stays_in_range(self.rig, self.duration_s)
+        for table in self.fault:
+            if 0.0 < self.duration_s <= table.from_s:
+                line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
+                raise ValueError(f"{line}, duration_s = {self.duration_s:g}; begin it earlier, or run longer")
         return self
 
 

@@ -4,7 +4,7 @@ import math
 
 from bridge.kernel import Record, kernel
 from controller.codes import SMOOTH, STICK
-from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE
+from controller.estimate.windows import BINS, DRIVE, FEWEST, FORCE, SLIDE
 
 # Elongation rate over its noise from which a window teaches. Smaller: the noise of the positions makes k_d too small, by
 # 1 / 6^2 = 3 % at most here.
@@ -29,7 +29,8 @@ def stiffness(p: Record, s: Record) -> None:
         return
     best, best_level = _SIGMAS * _SIGMAS, -1
     for level in range(p.levels if p.use_slide_position == 1 else 0):
-        if s.pushed[level] < 2 * BINS:
+        # in seconds the positions drift: a noise that is carried on as white noise takes that for a stick
+        if s.pushed[level] < 2 * BINS or (s.stiffness_learnt == 1 and s.differences[level] < FEWEST):
             break
         variance = s.noise[SLIDE, level] * s.noise[SLIDE, level] + s.noise[DRIVE, level] * s.noise[DRIVE, level]
         rate_mps = s.slope[DRIVE, level] - s.slope[SLIDE, level]

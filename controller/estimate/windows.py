@@ -18,7 +18,8 @@ import numpy as np
 
 from bridge.kernel import Record, kernel
 
-BINS = 4  # in a window
+BINS = 4  # in a window; a power of 2
+MOST_FRESH = 16  # bins added at once, at most
 LEVELS = 16  # at most; `levels` of the parameters says how many are used
 FORCE, SLIDE, DRIVE = 0, 1, 2  # rows: drive force [N], slide position [m], drive position [m]
 ROWS = 3
@@ -26,7 +27,7 @@ _OF_BEND = 6.0**-0.5  # sigma of a slope over that of a - 2 b + c
 _QUARTILE = 0.3186  # of |d| of a normal distribution, over its sigma
 _WHITE = 2.0**-1.5  # noise of a slope over the noise at half the window, for white noise
 # Differences until a level's own noise is used; before, that of shorter windows is carried on as white noise.
-_FEWEST = 10
+FEWEST = 10
 WELL_KNOWN = 40  # differences from which a level's noise is off by some per cent only
 _CARRIED = 1.3  # factor for a noise that is carried on: ten differences are 20 % off, and no noise is quite white
 _FIRST_SHARE, _LEAST_SHARE = 4.0, 0.005  # of the logarithm of sigma that one difference moves; 6 % of scatter at 0.005
@@ -39,52 +40,64 @@ OF_STEP = 0.29
 
 
 @kernel
-def push(p: Record, s: Record, force_N: float, slide_m: float, drive_m: float, learn: bool) -> None:
-    """Add the means of one bin; `learn` says whether they are measured, so that their noise counts."""
-    bins, carried, slope, before, sigma = s.bins, s.carried, s.slope, s.slope_before, s.sigma
-    a, b, c = force_N, slide_m, drive_m
+def push(p: Record, s: Record, count: int, learn: bool) -> None:
+    """Add `count` bins, whose means are in `fresh`, level by level; `learn`: their noise counts, as they are measured."""
+    fresh, bins, slope = s.fresh, s.bins, s.slope
     per_s = 0.1 / p.bin_s
-    per_N_per_m = 1.0 / s.stiffness_N_per_m
-    both = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
     for level in range(p.levels):
         pushed = s.pushed[level]
-        at = pushed % BINS
-        bins[FORCE, level, at], bins[SLIDE, level, at], bins[DRIVE, level, at] = a, b, c
-        pushed += 1
-        s.pushed[level] = pushed
-        if pushed >= BINS:
-            first, second, third = pushed % BINS, (pushed + 1) % BINS, (pushed + 2) % BINS
+        longer = 0
+        for i in range(count):
+            at = pushed & (BINS - 1)
             for row in range(ROWS):
-                across = 3.0 * (bins[row, level, at] - bins[row, level, first])
-                slope[row, level] = (across + bins[row, level, third] - bins[row, level, second]) * per_s
+                bins[row, level, at] = fresh[row, i]
+            pushed += 1
             if at == BINS - 1:
-                if pushed >= 3 * BINS and learn:
-                    s.differences[level] += 1
-                    count = s.differences[level]
-                    up = _UP if count >= _MANY else math.exp(0.25 * max(_FIRST_SHARE / count, _LEAST_SHARE))
-                    law_mps = 0.0
-                    for row in range(ROWS):
-                        bend = slope[row, level] - 2.0 * before[row, level, 0] + before[row, level, 1]
-                        law_mps += bend * (per_N_per_m if row == FORCE else 1.0 if row == SLIDE else -1.0)
-                        sigma[row, level] = _moved(sigma[row, level], math.fabs(bend) * _OF_BEND, up, count)
-                    if both:
-                        s.agreements[level] += 1
-                        count = s.agreements[level]
-                        up = _UP_OF_LAW if count >= _MANY_OF_LAW else math.exp(0.25 * _FIRST_SHARE / count)
-                        s.law_mps[level] = _moved(s.law_mps[level], math.fabs(law_mps) * _OF_BEND, up, count)
-                    _note_noise(p, s, level, both)
                 for row in range(ROWS):
-                    before[row, level, 1] = before[row, level, 0]
-                    before[row, level, 0] = slope[row, level]
-        if pushed % 2 == 1:
-            carried[FORCE, level], carried[SLIDE, level], carried[DRIVE, level] = a, b, c
+                    slope[row, level] = (
+                        3.0 * (bins[row, level, 3] - bins[row, level, 0]) + bins[row, level, 2] - bins[row, level, 1]
+                    ) * per_s
+                _note_window(p, s, level, learn and pushed >= 3 * BINS)
+            if pushed & 1 == 0:
+                for row in range(ROWS):
+                    fresh[row, longer] = 0.5 * (bins[row, level, at - 1] + bins[row, level, at])
+                longer += 1
+        s.pushed[level] = pushed
+        last = (pushed - 1) & (BINS - 1)
+        if pushed > BINS and last != BINS - 1:
+            first, second, third = pushed & (BINS - 1), (pushed + 1) & (BINS - 1), (pushed + 2) & (BINS - 1)
+            for row in range(ROWS):
+                across = 3.0 * (bins[row, level, last] - bins[row, level, first])
+                slope[row, level] = (across + bins[row, level, third] - bins[row, level, second]) * per_s
+        if longer == 0:
             return
-        a, b, c = (
-            0.5 * (carried[FORCE, level] + a),
-            0.5 * (carried[SLIDE, level] + b),
-            0.5 * (carried[DRIVE, level] + c),
-        )
+        count = longer
         per_s *= 0.5
+
+
+@kernel
+def _note_window(p: Record, s: Record, level: int, learn: bool) -> None:
+    """Take the slopes of a window that begins where the last one ended: their bends tell the noise."""
+    slope, before, sigma = s.slope, s.slope_before, s.sigma
+    if learn:
+        both = p.use_force == 1 and p.use_slide_position == 1 and s.stiffness_learnt == 1
+        s.differences[level] += 1
+        count = s.differences[level]
+        up = _UP if count >= _MANY else math.exp(0.25 * max(_FIRST_SHARE / count, _LEAST_SHARE))
+        law_mps, per_N_per_m = 0.0, 1.0 / s.stiffness_N_per_m
+        for row in range(ROWS):
+            bend = slope[row, level] - 2.0 * before[row, level, 0] + before[row, level, 1]
+            law_mps += bend * (per_N_per_m if row == FORCE else 1.0 if row == SLIDE else -1.0)
+            sigma[row, level] = _moved(sigma[row, level], math.fabs(bend) * _OF_BEND, up, count)
+        if both:
+            s.agreements[level] += 1
+            count = s.agreements[level]
+            up = _UP_OF_LAW if count >= _MANY_OF_LAW else math.exp(0.25 * _FIRST_SHARE / count)
+            s.law_mps[level] = _moved(s.law_mps[level], math.fabs(law_mps) * _OF_BEND, up, count)
+        _note_noise(p, s, level, both)
+    for row in range(ROWS):
+        before[row, level, 1] = before[row, level, 0]
+        before[row, level, 0] = slope[row, level]
 
 
 @kernel
@@ -107,12 +120,12 @@ def _note_noise(p: Record, s: Record, level: int, both: bool) -> None:
     """Set the noise of the slopes of a level, and of those longer windows whose own is not known yet."""
     for row in range(ROWS):
         for i in range(level, p.levels):
-            if s.differences[i] >= _FEWEST:
+            if s.differences[i] >= FEWEST:
                 if i > level:
                     break
                 measured = s.sigma[row, i]
             elif i > 0 and s.noise[row, i - 1] > 0.0:
-                measured = s.noise[row, i - 1] * _WHITE * (_CARRIED if s.differences[i - 1] >= _FEWEST else 1.0)
+                measured = s.noise[row, i - 1] * _WHITE * (_CARRIED if s.differences[i - 1] >= FEWEST else 1.0)
             else:
                 break
             step = OF_STEP * s.resolution[row] / p.window_s[i]

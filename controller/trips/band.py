@@ -1,15 +1,21 @@
 """The exciter's known gain, and the stroke that it allows.
 
-The known gain is that of the configuration, or the mean over the first tenth of a second of even vibration at a frequency. It
+The known gain is what the rig's loop check measured at the tones beside a frequency, else that of the configuration, else the
+mean over the first tenth of a second of even vibration at the frequency, within what the check measured. It
 does not follow what is learnt later: an accelerometer that loses its gain looks like an exciter that does, and the loop would
 raise the stroke for ever. So the stroke is never more than the wanted v_a asks for at the known gain, times the band.
 """
+
+import math
 
 from bridge.kernel import Record, kernel
 
 KNOWN_S = (
     0.1  # of even vibration that the known gain is a mean of; shorter: the noise of one fit; longer: later bounded
 )
+
+CHECK_BLOCKS = 16  # after a check, in which its tones come; there are 8 at most
+OTHER_TOLD_S = 2.0  # for which it is told that the check measured another gain than the configuration says
 
 
 @kernel
@@ -21,11 +27,62 @@ def begin_known(p: Record, s: Record) -> None:
 
 
 @kernel
+def note_check(p: Record, s: Record, tone_Hz: float, gain: float) -> None:
+    """Take a tone of the rig's loop check; from the tones beside a candidate its known gain is bounded.
+
+    Between two tones a mount may resonate, so the gain there counts as known where the two are alike.
+    """
+    if gain <= 0.0 or s.checked_blocks >= CHECK_BLOCKS:
+        return
+    s.checked_blocks += 1
+    rolled_off = tone_Hz / p.accel_bandwidth_Hz
+    gain *= math.sqrt(1.0 + rolled_off * rolled_off)
+    for i in range(p.candidates):
+        frequency_Hz = p.candidate_Hz[i]
+        if s.tone_Hz[i, 0] <= tone_Hz <= frequency_Hz:
+            s.tone_Hz[i, 0], s.tone_gain[i, 0] = tone_Hz, gain
+        if tone_Hz >= frequency_Hz and (s.tone_Hz[i, 1] == 0.0 or tone_Hz <= s.tone_Hz[i, 1]):
+            s.tone_Hz[i, 1], s.tone_gain[i, 1] = tone_Hz, gain
+    if s.checked_blocks == CHECK_BLOCKS:
+        _use_check(p, s)
+
+
+@kernel
+def _use_check(p: Record, s: Record) -> None:
+    other = p.told_gain > 0.0
+    for i in range(p.candidates):
+        low, high = _checked(s, i)
+        alike = high < p.gain_band * low
+        s.known_gain[i] = math.sqrt(low * high)
+        s.known_steps[i] = p.known_steps if alike else 0
+        other = other and not low / p.gain_band < p.told_gain < high * p.gain_band
+    s.gain_other_s = OTHER_TOLD_S if other else 0.0
+
+
+@kernel
+def _checked(s: Record, i: int) -> tuple[float, float]:
+    """The lower and the higher of the gains at the tones beside a candidate; below and above all tones there is one."""
+    below = s.tone_gain[i, 0] if s.tone_gain[i, 0] > 0.0 else s.tone_gain[i, 1]
+    above = s.tone_gain[i, 1] if s.tone_gain[i, 1] > 0.0 else s.tone_gain[i, 0]
+    return min(below, above), max(below, above)
+
+
+@kernel
+def forget_check(s: Record) -> None:
+    """Another loop check begins."""
+    s.checked_blocks, s.gain_other_s = 0, 0.0
+    s.tone_Hz[:, :], s.tone_gain[:, :] = 0.0, 0.0
+
+
+@kernel
 def note_known(p: Record, s: Record, i: int, gain: float) -> None:
     """Learn the known gain of a candidate frequency, from the first even vibration alone."""
     if s.known_steps[i] < p.known_steps:
         s.known_steps[i] += 1
         s.known_gain[i] += (gain - s.known_gain[i]) / s.known_steps[i]
+        if s.checked_blocks >= CHECK_BLOCKS:
+            low, high = _checked(s, i)
+            s.known_gain[i] = min(max(s.known_gain[i], low), high)
 
 
 @kernel

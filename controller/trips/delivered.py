@@ -18,6 +18,7 @@ SOME = 4  # steps in which what need not be quick is looked at once
 _EVEN = 0.05  # change of the commanded v_a, over its low-pass, up to which it is even
 HOLD_S = 0.05  # of too little v_a until it trips; the band bounds v_a meanwhile
 LOUD_HOLD_S = 0.1  # of too much, until it is told; a slip that shakes the base is shorter
+GROWN_HOLD_S = 1.0  # of half as much too much, on a scale of factors: a gain that grows slowly
 PASSED_S = 1.0  # without too much until that is over
 FOLLOW_S = 1.0  # time constant of the gain that a sudden loss is compared with
 _NO_SINE = 0.25  # mean square beside the sine, over that of the sine, from which an acceleration is no sine any more
@@ -59,7 +60,9 @@ def watch_delivered(p: Record, s: Record, block: Record) -> None:
         s.low_steps = 0
         if s.steps % SOME == 0:
             s.followed_gain += p.follow_share * (now_mps / s.expected_mps - s.followed_gain)
-    high = now_mps > s.known_gain[i] * p.gain_band * s.expected_mps
+    over = now_mps / (s.known_gain[i] * s.expected_mps)
+    s.grown_steps = s.grown_steps + 1 if over > math.sqrt(p.gain_band) else 0
+    high = over > p.gain_band or s.grown_steps > p.grown_steps
     if high and s.high_steps < 0:
         s.high_steps = -p.passed_steps
     elif high:

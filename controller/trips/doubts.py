@@ -9,7 +9,8 @@ import math
 
 from bridge.kernel import Record, kernel
 from controller.codes import CHECKING, RESET
-from controller.trips.band import begin_known
+from controller.trips.anew import forget_motion, forget_needs
+from controller.trips.band import begin_known, forget_check
 
 ACCELEROMETER, CONTACT, DRIVE = 1, 2, 4  # bits of `s.doubted`
 OF_FORCE, OF_SLIDE, OF_DRIVE, OF_BASE = range(4)  # channels, in `s.same_steps`
@@ -28,14 +29,20 @@ def trip(s: Record, reason: int, doubts: int) -> None:
 def end_trips(p: Record, s: Record, events: int) -> None:
     """End all trips on a person's reset; a loop check begins the known gain anew, too."""
     if events & RESET:
+        if s.doubted & (CONTACT | DRIVE):
+            forget_motion(p, s)
+        forget_needs(p, s)
         _forget(s)
         for i in range(p.candidates):  # without a step: what a doubted accelerometer taught is forgotten
             if s.known_steps[i] > 0:
                 s.log_gain[i] = math.log(s.known_gain[i])
     if s.guard_state == CHECKING:
+        if s.doubted & (CONTACT | DRIVE):
+            forget_motion(p, s)
         _forget(s)
         s.gain_known[:] = 0
         begin_known(p, s)
+        forget_check(s)
 
 
 @kernel
@@ -44,3 +51,6 @@ def _forget(s: Record) -> None:
     s.low_steps, s.high_steps = 0, 0
     s.rest_steps, s.broken_steps = 0, 0
     s.same_steps[:] = 0
+    s.grown_steps, s.drops, s.jumps, s.jumped_s = 0, 0.0, 0.0, 0.0
+    s.apart_s, s.confirmed, s.stiffest_N_per_m = 0.0, 1.0, 0.0
+    s.agreed_mps[:] = 0.0

@@ -8,7 +8,7 @@ way, and show one number for hours where the drive stands.
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import DRIVE_DOUBTED, FROZEN
+from controller.codes import DRIVE_DOUBTED, FROZEN, LOOSE
 from controller.trips.doubts import (
     ACCELEROMETER,
     CHANNELS,
@@ -20,6 +20,7 @@ from controller.trips.doubts import (
     OF_SLIDE,
     trip,
 )
+from controller.trips.jumps import watch_jumps
 from controller.trips.noise import look_at_noise
 
 HOLD_S, FEWEST = (
@@ -30,6 +31,8 @@ _FASTEST_MPS = 100.0  # of a drive; a place that goes faster was not gone throug
 _LOOK_STEPS = 16  # blocks from one look at the noise of a channel to that of the next
 _LOOKS = 8  # until a channel counts as one with noise
 _LIVELY = 0.9  # share of the looks that must show it
+_DROPS_S, _MOST_DROPS = 1.0, 3.5  # time constant of the count of dropouts, and how many are too many
+_DEAD_S = 0.3  # of a move in which a force has not changed since the start
 _SAME = 4  # equal samples in a row from which a look says nothing of the noise
 
 
@@ -47,15 +50,40 @@ def watch_frozen(p: Record, s: Record, block: Record) -> None:
     went_m = math.fabs(float(block.drive_position_m[0]) - s.first_sample[OF_DRIVE])
     if blocks > 0 and s.first_seen == 1 and went_m > _FASTEST_MPS * blocks * p.block_s:
         trip(s, DRIVE_DOUBTED, DRIVE)
+    watch_jumps(p, s, float(block.drive_position_m[0]), blocks)
     s.first_seen = 1
     if p.use_force == 1 and _repeats(p, s, OF_FORCE, float(block.drive_force_N[0])):
         trip(s, FROZEN, CONTACT)
+    if p.use_force == 1 and s.moved_s > _DEAD_S and s.same_steps[OF_FORCE] >= s.steps - 1:
+        trip(s, FROZEN, CONTACT)  # it never changed at all, and a drive that moves winds up its spring
     if p.use_slide_position == 1 and _repeats(p, s, OF_SLIDE, float(block.mass_position_m[0])):
         trip(s, FROZEN, CONTACT)
     if _repeats(p, s, OF_DRIVE, float(block.drive_position_m[0])):
         trip(s, FROZEN, DRIVE)
     if _repeats(p, s, OF_BASE, float(block.base_accel_mps2[0])):
         trip(s, FROZEN, ACCELEROMETER)
+    _watch_drops(p, s, block.base_accel_mps2)
+
+
+@kernel
+def _watch_drops(p: Record, s: Record, samples: Record) -> None:
+    """Count the times that a vibration ends in blocks of one number alone; trip where they are too many within a second."""
+    s.drops *= 1.0 - min(p.block_s / _DROPS_S, 1.0)
+    dropped = s.allowed_m > 0.0 and _is_one_number(samples)
+    if dropped and s.dropped == 0:
+        s.drops += 1.0
+        if s.drops > _MOST_DROPS and s.looks[OF_BASE, 1] == _LOOKS and s.lively[OF_BASE, 1] > _LIVELY:
+            trip(s, LOOSE, ACCELEROMETER)
+    s.dropped = 1 if dropped else 0
+
+
+@kernel
+def _is_one_number(samples: Record) -> bool:
+    first = float(samples[0])
+    same = True
+    for i in range(samples.shape[0] - 1, 0, -1):
+        same = same and float(samples[i]) == first
+    return same
 
 
 @kernel

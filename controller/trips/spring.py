@@ -3,14 +3,14 @@
 The law holds while the slide sticks, slips, slides and vibrates, as the force is that of the spring. It does not hold where the
 force is dead, frozen, of another gain or sign and the spring is wound up, nor where a position has another unit. It is looked at
 in the shortest window in which half of v_d stands out from the noise, and doubted once it is broken for longer than a window
-remembers a jump. The place of the drive is doubted where v_d is what changed, else the force, or the place of the slide, which
-the contact is judged by. Meanwhile v_d counts as before, and slips are not believed.
+remembers a jump. The place of the drive is doubted where v_d is what changed, that of the slide where it goes faster than drive
+and spring explain, else the force, which the contact is judged by. Meanwhile v_d counts as before, and slips are not believed.
 """
 
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import DRIVE_DOUBTED, FORCE_DOUBTED
+from controller.codes import DRIVE_DOUBTED, FORCE_DOUBTED, SLIDE_DOUBTED
 from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, WELL_KNOWN
 from controller.trips.delivered import SOME
 from controller.trips.doubts import CONTACT, trip
@@ -23,6 +23,7 @@ _SIGMAS = 8.0
 # Of the larger of the two sides by which they may differ: a spring is softer or stiffer at places by a factor of 5. Where k_d is
 # told and not learnt yet, by a factor of 20.
 _OFF, _TOLD_OFF = 0.8, 0.95
+_SURE = 0.06  # of a learnt stiffness, over itself, up to which it takes the place of the one before
 _HALF = 0.5  # of v_d: a difference that counts
 _TWICE = 2.0  # change of v_d over that of v_s from which the drive is what changed
 
@@ -33,7 +34,10 @@ def watch_spring(p: Record, s: Record) -> None:
     level = _level(p, s)
     if level < 0:
         return
-    if s.broken_steps == 0:  # a fault teaches another stiffness
+    known = s.kept_N_per_m > 0.0 and s.stiffness_learnt == 1 and s.stiffness_sigma > _SURE
+    if (
+        s.broken_steps == 0 and not known
+    ):  # a fault teaches another stiffness, and so does noise where no spring winds up
         s.kept_N_per_m = s.stiffness_N_per_m
     by_force_mps = s.slope[FORCE, level] / s.kept_N_per_m
     drive_mps, slide_mps = s.slope[DRIVE, level], s.slope[SLIDE, level]
@@ -49,20 +53,24 @@ def watch_spring(p: Record, s: Record) -> None:
         return
     drive_by_mps, slide_by_mps = math.fabs(drive_mps - s.kept_mps[DRIVE]), math.fabs(slide_mps - s.kept_mps[SLIDE])
     if s.broken_steps == 0:
-        s.broken_drive = 0
+        s.broken_drive, s.broken_slide = 0, 0
     s.broken_steps += SOME
     if s.broken_steps <= p.first_steps:  # later the slide has changed, too, as the vibration follows v_d
         s.broken_drive += 1 if drive_by_mps > _TWICE * slide_by_mps else -1
+    fastest_mps = max(math.fabs(drive_mps), math.fabs(s.kept_mps[DRIVE]), math.fabs(by_force_mps))
+    s.broken_slide += 1 if math.fabs(slide_mps) > _TWICE * fastest_mps else -1  # a slip is over before it trips
     if s.broken_steps > p.broken_steps + _WINDOWS * p.window_s[level] / p.block_s:
         if s.broken_drive > 0:
             trip(s, DRIVE_DOUBTED, DRIVE_DOUBT)
+        elif s.broken_slide > 0:
+            trip(s, SLIDE_DOUBTED, CONTACT)
         else:
             trip(s, FORCE_DOUBTED, CONTACT)
 
 
 @kernel
 def _largest_mps(p: Record, s: Record) -> float:
-    return max(math.fabs(s.kept_mps[DRIVE]), math.fabs(s.drive_velocity_mps), p.least_feed_mps)
+    return max(math.fabs(s.kept_mps[DRIVE]), _HALF * math.fabs(s.drive_velocity_mps), p.least_feed_mps)
 
 
 @kernel

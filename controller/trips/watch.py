@@ -3,8 +3,9 @@
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import NOISE, RESONANCE, TRAVEL_END
+from controller.codes import GAIN_OTHER, JUMPED, NOISE, RESONANCE, TRAVEL_END
 from controller.estimate.windows import DRIVE as DRIVE_ROW
+from controller.trips.confirmed import watch_confirmed
 from controller.trips.delivered import SOME, is_loud, watch_delivered, watch_rest
 from controller.trips.doubts import ACCELEROMETER, CONTACT, DRIVE, OF_DRIVE
 from controller.trips.frozen import watch_frozen
@@ -20,13 +21,18 @@ def watch(p: Record, s: Record, block: Record) -> None:
     s.slip_count += s.slip_began
     place_m = s.first_sample[OF_DRIVE]
     s.outside = 0 if p.travel_low_m <= place_m <= p.travel_high_m else 1
-    turn = s.steps % SOME
-    if turn == 0 and p.use_force == 1 and p.use_slide_position == 1 and s.doubted & (CONTACT | DRIVE) == 0:
+    turn, all_three = s.steps % SOME, p.use_force == 1 and p.use_slide_position == 1 and s.jumped_s == 0.0
+    if turn == 0 and all_three and s.doubted & (CONTACT | DRIVE) == 0:
         watch_spring(p, s)
     elif turn == 1:
         watch_rest(p, s, block)
     elif turn == 2:
         watch_slips(p, s)
+    elif turn == 3:
+        _look_at_slide_accel(s, block.mass_accel_mps2)
+        if all_three:
+            watch_confirmed(p, s)
+    s.gain_other_s = max(s.gain_other_s - p.block_s, 0.0)
     doubted = s.doubted & (CONTACT | DRIVE) != 0 or s.unbelieved_s > 0.0
     if doubted or s.broken_steps > 0:
         s.slip_began, s.stick_began = 0, 0
@@ -37,12 +43,22 @@ def watch(p: Record, s: Record, block: Record) -> None:
 
 
 @kernel
+def _look_at_slide_accel(s: Record, samples: Record) -> None:
+    total = 0.0
+    for i in range(samples.shape[0]):
+        total += float(samples[i])
+    s.slide_accel_unread = 0 if math.isfinite(total) else 1
+
+
+@kernel
 def restrain(p: Record, s: Record) -> None:
     """After the policy: no vibration without a v_d or outside of the travel, and no frequency whose gain is not known."""
     if s.doubted & DRIVE or s.outside == 1:
         s.wanted_velocity_mps = 0.0
-    elif is_drive_off(s):
+    elif is_drive_off(s) or s.jumped_s > 0.0:
         s.wanted_velocity_mps = s.ratio_now * math.fabs(s.kept_mps[DRIVE_ROW])
+    else:
+        s.wanted_velocity_mps *= s.confirmed
     if s.doubted & ACCELEROMETER and s.followed >= 0 and s.wanted_Hz != p.candidate_Hz[s.followed]:
         s.candidate, s.wanted_Hz = s.followed, p.candidate_Hz[s.followed]
 
@@ -56,4 +72,8 @@ def told_reason(s: Record) -> int:
         return TRAVEL_END
     if is_loud(s):
         return RESONANCE
+    if s.jumped_s > 0.0:
+        return JUMPED
+    if s.gain_other_s > 0.0:
+        return GAIN_OTHER
     return NOISE if s.noise_told_s > 0.0 or s.unbelieved_s > 0.0 else s.reason

@@ -1,5 +1,6 @@
 """Rig numbers that an owner can hardly know: what is assumed where a manifest or a channel map leaves them out."""
 
+import math
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
@@ -11,27 +12,48 @@ _POSITIVE: TypeAdapter[float] = TypeAdapter(Positive)
 # 0.22 um, and other metals after a fraction of a micrometre. Too small: a stiff contact, small steps; too large: soft sticks.
 _PRESLIDING_M = 0.22e-6
 _TOLERANCE = 0.3  # relative, of the numbers that follow from it: 3.3 standard deviations reach 0.11 to 2.2 um
+# Stribeck velocities of dry and boundary-lubricated pairs lie between 0.1 and 10 mm/s.
+_STRIBECK_MPS = 1e-3
+_WIDE = 1.0  # tolerance of a number that nobody knows: it may be a third or three times as large
+_SLIP_S = 0.1  # duration of a slip that gives a mass where the runs do not show one
+WIDE = ("mass_kg", "stribeck_velocity_mps")  # numbers that are assumed so widely that they decide nothing
 
 
-def with_assumed(given: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """The table `[rig]` with every number that may be left out, with tolerances; and the names of what was added."""
+def with_assumed(given: dict[str, Any], mass_kg: float | None = None) -> tuple[dict[str, Any], list[str]]:
+    """The table `[rig]` with every number that may be left out, with tolerances; and the names of what was added.
+
+    `mass_kg` is what the runs show, for a table without a mass.
+    """
     table = dict(given)
+    turns = table.get("drive") == "torsion"
     assumed: dict[str, Any] = {"viscous_damping_Ns_per_m": 0.0}
-    if table.get("drive") in ("spring", "torsion"):
+    if turns or table.get("drive") == "spring":
         assumed["drive_damping_Ns_per_m"] = 0.0
-    mass_kg, static_N = _positive(table.get("mass_kg")), _positive(table.get("static_force_N"))
+    static_N = _positive(table.get("static_force_N"))
+    radius_m = _positive(table.get("radius_m", 1.0)) if turns else 1.0
+    if "mass_kg" not in table:
+        assumed["mass_kg"] = mass_kg or _mass_kg(table.get("drive_stiffness_N_per_m"), static_N)
     # on a rig that turns the way in rad is shorter by the radius
-    presliding = _PRESLIDING_M / (_positive(table.get("radius_m", 1.0)) if table.get("drive") == "torsion" else 1.0)
-    stiffness = _positive(table.get("contact_stiffness_N_per_m", static_N / presliding))
+    assumed["stribeck_velocity_mps"] = _STRIBECK_MPS / radius_m
+    mass = _positive(table.get("mass_kg", assumed.get("mass_kg")))
+    stiffness = _positive(table.get("contact_stiffness_N_per_m", static_N / (_PRESLIDING_M / radius_m)))
     assumed["contact_stiffness_N_per_m"] = stiffness
     # critical damping of the presliding motion, as for the paper's pairs
-    assumed["contact_damping_Ns_per_m"] = 2.0 * (stiffness * mass_kg) ** 0.5
+    assumed["contact_damping_Ns_per_m"] = 2.0 * (stiffness * mass) ** 0.5
     filled = [name for name in assumed if name not in table]
     if isinstance(table.get("tolerance", {}), dict):  # any other type is refused by `validate`
         unsure = {name: _TOLERANCE for name in filled if name.startswith("contact")}
+        unsure |= {name: _WIDE for name in filled if name in WIDE}
         if unsure or "tolerance" in table:
             table["tolerance"] = unsure | table.get("tolerance", {})
     return assumed | table, filled
+
+
+def _mass_kg(stiffness_N_per_m: Any, static_N: float) -> float:
+    """A mass that slips in a tenth of a second; with a force drive one that its friction would stop as quickly."""
+    if stiffness_N_per_m is None:
+        return static_N / 10.0
+    return _positive(stiffness_N_per_m) * (_SLIP_S / math.pi) ** 2
 
 
 def _positive(value: Any) -> float:

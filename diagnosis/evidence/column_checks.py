@@ -11,6 +11,7 @@ from bridge.log.check.signal_range import look
 from bridge.log.finding import Finding
 from bridge.units import counted, percent
 from diagnosis.evidence.manifest import RigTable, RunTable
+from diagnosis.evidence.manifest_keys import BESIDE
 from diagnosis.evidence.sign_and_unit import apparent_stiffness_N_per_m
 
 Floats = npt.NDArray[np.float64]
@@ -61,7 +62,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
     Raises Fault BAD_EVIDENCE when the run cannot be used: its time, length, rate, gaps, or a commanded column are wrong.
     """
     findings: list[Finding] = []
-    file = table.file
+    file = table.name
 
     def note(kind: str, name: str, text: str, times: int = 1) -> None:
         findings.append(Finding(kind, f"{file}: {name}", text, times))
@@ -112,7 +113,7 @@ def checked(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Columns, 
         if wrong:
             note("units", name, f"{wrong}; not used; else set channels.{name}.unit or scale")
             del usable[name]
-        elif seen.constant and not name.startswith("vibration"):
+        elif seen.constant and not name.startswith("vibration") and name not in BESIDE:
             used = "" if name == "drive_position_m" else "; not used"
             note("constant", name, f"is {seen.lowest:g} in every row{used}", seen.samples)
             if name in _SENSORS:
@@ -299,7 +300,7 @@ def _compare_velocity(columns: Columns, rig: RigTable, table: RunTable, note: No
                 else abs(travel_m) > reach_m
             )
             if another:
-                raise Fault("BAD_EVIDENCE", f"{table.file}: drive_position_m: {text}")
+                raise Fault("BAD_EVIDENCE", f"{table.name}: drive_position_m: {text}")
             if abs(measured_mps - stated_mps) > _VELOCITY_TOLERANCE * abs(stated_mps) > 0.0:
                 note("units", "drive_position_m", f"{text}; the stated one is used")
     where = "drive_position_m" if stated_mps is None else "drive_velocity_mps"

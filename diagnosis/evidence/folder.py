@@ -6,7 +6,6 @@ Data that cannot be used is left out and reported as a finding. When nothing usa
 from collections.abc import Iterator
 from difflib import get_close_matches
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,14 +15,19 @@ from bridge.files import check_file
 from bridge.log.finding import Finding
 from bridge.tables.readers import Table, read_table
 from bridge.units import counted
+from diagnosis.evidence.assumed import WIDE
+from diagnosis.evidence.beside import with_beside
 from diagnosis.evidence.column_checks import Columns, checked
-from diagnosis.evidence.exciter_harmonics import DISTORTED, Distortion, distortion
-from diagnosis.evidence.force_pickup import PICK_UP, PickUp, pick_up
+from diagnosis.evidence.exciter_harmonics import DISTORTED, distortion
+from diagnosis.evidence.force_pickup import PICK_UP, pick_up
 from diagnosis.evidence.manifest import MANIFEST, Manifest, RigTable, RunTable, described
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
 from diagnosis.evidence.mapped import has_time, mapped
 from diagnosis.evidence.rotary import as_sliding, run_as_sliding, told
+from diagnosis.evidence.run import Evidence, Run
 from diagnosis.evidence.run_log import columns_of_log
+from diagnosis.evidence.split import split
+from diagnosis.evidence.unknown_mass import shown_mass_kg
 
 Floats = npt.NDArray[np.float64]
 _NO_COLUMN = "column"  # kind of finding: the file lacks a column that the channel map names
@@ -46,39 +50,31 @@ _COST_FORCE = {
 }
 
 
-class Run(NamedTuple):
-    """One measured run. Arrays are [samples], finite, SI units; `t_s` increases."""
-
-    file: str
-    t_s: Floats
-    columns: dict[str, Floats]  # by standard name, without t_s; only the usable ones
-    # by standard name: lowest and highest value that the sensor can show, infinite where the run does not reach it
-    clipped: dict[str, tuple[float, float]]
-    drive_velocity_mps: float | None  # as the manifest states
-    holdout: bool  # held out: not fitted, only predicted
-    pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
-    distortion: Distortion | None = None  # a base that vibrates at other frequencies than the commanded one
-
-
-class Evidence(NamedTuple):
-    """A whole evidence folder; runs in the manifest's order."""
-
-    folder: Path
-    rig: RigTable
-    runs: tuple[Run, ...]
-    findings: tuple[Finding, ...]
-
-
 def load_evidence(folder: Path) -> Evidence:
-    """Read and check an evidence folder. The last of several runs is held out when the manifest holds none out.
+    """Read and check an evidence folder.
+
+    When the manifest holds no run out, the last of several is, or a part of a long one.
 
     Raises Fault BAD_EVIDENCE: file, key or column, row, expectation, remedy.
     """
     manifest, assumed = described(folder)
+    for table in manifest.run:
+        _refuse_a_way_out(folder, table.file)
+        check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
+    read = _read_all(folder, manifest)
+    _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
+    seen_kg: float | None = None
+    if "mass_kg" in assumed:
+        shown = (
+            shown_mass_kg(manifest.rig, table, with_beside(columns, manifest.rig, table)[0])
+            for table, (columns, _) in zip(manifest.run, read, strict=True)
+        )
+        seen_kg = next((mass_kg for mass_kg in shown if mass_kg is not None), None)
+        manifest, assumed = described(folder, seen_kg)
     runs: list[Run] = []
     findings = told(manifest.rig)
     findings += [
-        Finding("assumed", f"{MANIFEST}: rig.{name}", f"left out: taken as {getattr(manifest.rig, name):.6g}")
+        Finding("assumed", f"{MANIFEST}: rig.{name}", _assumed_in_words(name, manifest.rig, seen_kg is not None))
         for name in assumed
     ]
     findings += [
@@ -91,14 +87,6 @@ def load_evidence(folder: Path) -> Evidence:
     if exact := [name for name in _NEVER_EXACT if manifest.rig.values()[name] and not manifest.rig.tolerance.get(name)]:
         text = f"none for {', '.join(exact)}: known exactly, so an ordinary difference there will be called an effect"
         findings.append(Finding("tolerance", f"{MANIFEST}: rig.tolerance", text))
-    for table in manifest.run:
-        _refuse_a_way_out(folder, table.file)
-        check_file(folder / table.file, "BAD_EVIDENCE", f"correct run.file in {MANIFEST}, or copy the file there")
-    read = [
-        read_columns(folder / table.file, manifest.channels | table.channels, manifest.rig.drive == "torsion")
-        for table in manifest.run
-    ]
-    _refuse_misspelt(manifest, [finding for _, found in read for finding in found])
     for table, (columns, damaged) in zip(manifest.run, read, strict=True):
         run, found = examine(columns, manifest.rig, table)
         runs.append(run)
@@ -108,7 +96,44 @@ def load_evidence(folder: Path) -> Evidence:
         runs[-1] = runs[-1]._replace(holdout=True)
         text = "no run is marked holdout: this one is held out; mark one to choose for yourself"
         findings.append(Finding("holdout", runs[-1].file, text))
-    return Evidence(folder, as_sliding(manifest.rig), tuple(runs), tuple(findings))
+    elif len(runs) == 1:
+        runs, told_so = split(runs[0])
+        findings += told_so
+    return Evidence(folder, as_sliding(manifest.rig), tuple(runs), tuple(findings), tuple(assumed))
+
+
+def _read_all(folder: Path, manifest: Manifest) -> list[tuple[Columns, list[Finding]]]:
+    """The columns of every run and what was found about them; a file that several runs share is read once."""
+    known: dict[str, tuple[Columns, list[Finding]]] = {}
+    result: list[tuple[Columns, list[Finding]]] = []
+    for table in manifest.run:
+        channels = manifest.channels | table.channels
+        key = f"{table.file} {sorted(channels.items())}"
+        found, told = known.get(key) or read_columns(folder / table.file, channels, manifest.rig.drive == "torsion")
+        result.append((_stretch(found, table), [] if key in known else told))
+        known[key] = (found, told)
+    return result
+
+
+def _stretch(columns: Columns, table: RunTable) -> Columns:
+    """The part of a file that is a run; its times count since the first sample that has one."""
+    if table.name == table.file:
+        return columns
+    t_s = columns["t_s"]
+    since_s = t_s - t_s[np.isfinite(t_s)][0] if np.isfinite(t_s).any() else t_s
+    own = (since_s >= table.from_s) & (since_s < (np.inf if table.until_s is None else table.until_s))
+    if not own.any():
+        line = f"{table.name}: from_s = {table.from_s:g}: must be before its end at {np.nanmax(since_s):.6g} s"
+        raise Fault("BAD_EVIDENCE", f"{line}; correct it in [[run]]")
+    return {name: values[own] for name, values in columns.items()}
+
+
+def _assumed_in_words(name: str, rig: RigTable, mass_is_seen: bool) -> str:
+    value = f"left out: taken as {getattr(rig, name):.6g}"
+    if name not in WIDE:
+        return value
+    how = ", as the runs show it" if name == "mass_kg" and mass_is_seen else ""
+    return f"{value}{how}; a third or three times as much would do, so it decides nothing"
 
 
 def _refuse_a_way_out(folder: Path, file: str) -> None:
@@ -135,13 +160,15 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
 
     Raises Fault BAD_EVIDENCE when the run cannot be used, or lacks a column that this kind of drive needs.
     """
+    columns, besides = with_beside(columns, rig, table)
     columns, table = run_as_sliding(rig, columns, table)
     rig = as_sliding(rig)
     usable, clipped, findings = checked(columns, rig, table)
+    findings = besides + findings
     reasons = "; ".join(f"{finding.where}: {finding.text}" for finding in findings if finding.kind != "clipped")
 
     def refuse(rule: str) -> Fault:
-        return Fault("BAD_EVIDENCE", f"{table.file}: {rule}" + (f" ({reasons})" if reasons else ""))
+        return Fault("BAD_EVIDENCE", f"{table.name}: {rule}" + (f" ({reasons})" if reasons else ""))
 
     has = ", ".join(sorted(usable)) or "nothing"
     if rig.drive == "force" and "drive_force_N" not in usable:
@@ -154,19 +181,19 @@ def examine(columns: Columns, rig: RigTable, table: RunTable) -> tuple[Run, list
         raise refuse("drive_velocity_mps: missing in [[run]]; without the column drive_position_m it is needed")
     wanted = _COST_SPRING if rig.drive == "spring" else _COST_FORCE
     findings += [
-        Finding("missing", f"{table.file}: {name}", f"not there: {cost}")
+        Finding("missing", f"{table.name}: {name}", f"not there: {cost}")
         for name, cost in wanted.items()
         if name not in usable
     ]
     t_s = usable.pop("t_s")
-    findings += [Finding(kind, f"{table.file}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
+    findings += [Finding(kind, f"{table.name}: {name}", text) for kind, name, text in _vibration(usable, t_s)]
     vibrates = pick_up(rig, t_s, usable)
     if vibrates:
-        findings.append(Finding(PICK_UP, f"{table.file}: drive_force_N", vibrates.text))
+        findings.append(Finding(PICK_UP, f"{table.name}: drive_force_N", vibrates.text))
     distorted = distortion(t_s, usable)
     if distorted:
-        findings.append(Finding(DISTORTED, f"{table.file}: base_accel_mps2", distorted.text))
-    return Run(table.file, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates, distorted), findings
+        findings.append(Finding(DISTORTED, f"{table.name}: base_accel_mps2", distorted.text))
+    return Run(table.name, t_s, usable, clipped, table.drive_velocity_mps, table.holdout, vibrates, distorted), findings
 
 
 def _vibration(columns: Columns, t_s: Floats) -> Iterator[tuple[str, str, str]]:

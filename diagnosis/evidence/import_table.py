@@ -21,11 +21,13 @@ from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
 from diagnosis.evidence.assumed import with_assumed
+from diagnosis.evidence.beside import with_beside
 from diagnosis.evidence.folder import examine
 from diagnosis.evidence.manifest import MANIFEST, DriveVelocity, RigTable, RunTable, read_manifest
-from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap, check_channel_names
+from diagnosis.evidence.manifest_keys import USUAL, ChannelMap, check_channel_names
 from diagnosis.evidence.manifest_text import manifest_text
 from diagnosis.evidence.mapped import mapped
+from diagnosis.evidence.unknown_mass import shown_mass_kg
 
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
@@ -80,7 +82,7 @@ class ImportMap(Strict):
     @model_validator(mode="after")
     def _channels_are_enough(self) -> "ImportMap":
         check_channel_names(self.channels)
-        if not {"drive_force_N", "mass_accel_mps2"} & self.channels.keys():
+        if not {"drive_force_N", "mass_accel_mps2", "motor_current_A"} & self.channels.keys():
             raise ValueError("channels: must name drive_force_N or mass_accel_mps2; nothing shows a slip otherwise")
         if "t_s" in self.channels and self.source.sample_rate_Hz is not None:
             raise ValueError("source.sample_rate_Hz: there is a channel t_s too; remove one of them")
@@ -134,20 +136,22 @@ def _check_free(out: Path) -> None:
 
 
 def _missing(columns: Columns) -> list[str]:
-    return [name for name in STANDARD if name not in columns]
+    return [name for name in USUAL if name not in columns]
 
 
-def _rig(given: dict[str, Any], map_name: str) -> tuple[RigTable, list[str]]:
+def _rig(given: dict[str, Any], map_name: str, mass_kg: float | None = None) -> tuple[RigTable, list[str]]:
     """The rig of the map, with assumed values for numbers that an owner can hardly know; and the names of these numbers."""
     if not given:
         raise Fault("CONFIG", f"{map_name}: rig: missing; an evidence folder needs it, or import into a .mcap file")
-    table, filled = with_assumed(given)
+    table, filled = with_assumed(given, mass_kg)
     return validate(RigTable, table, f"{map_name}: rig"), filled
 
 
 def _to_folder(path: Path, columns: Columns, wanted: ImportMap, map_name: str, out: Path) -> Imported:
     rig, assumed = _rig(wanted.rig, map_name)
     run = RunTable(file=path.stem + ".parquet", **wanted.run.model_dump())
+    if "mass_kg" in assumed and (seen_kg := shown_mass_kg(rig, run, with_beside(columns, rig, run)[0])) is not None:
+        rig, assumed = _rig(wanted.rig, map_name, seen_kg)
     runs = [run]
     if (out / MANIFEST).exists():
         before = read_manifest(out)

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path, PurePath
 from typing import Annotated, Literal
 
@@ -54,7 +55,7 @@ class RigTable(Strict):
     radius_m: Positive | None = Field(
         default=None, description='With drive = "torsion": where its numbers are told in N and m; 1 if not given.'
     )
-    mass_kg: Positive
+    mass_kg: Positive = Field(description="Left out, what the runs show.")
     drive_stiffness_N_per_m: Positive | None = Field(default=None, description='With drive = "spring" only.')
     drive_damping_Ns_per_m: NotNegative | None = Field(default=None, description='With drive = "spring" only.')
     contact_stiffness_N_per_m: Positive
@@ -63,6 +64,9 @@ class RigTable(Strict):
     coulomb_force_N: Positive
     static_force_N: Positive
     stribeck_velocity_mps: Positive
+    force_per_current_N_per_A: Positive | None = Field(
+        default=None, description='With drive = "force": of the motor, where motor_current_A stands for the force.'
+    )
     tolerance: dict[str, float] = Field(
         default={}, description="One standard deviation, relative; a number without a tolerance is known exactly."
     )
@@ -77,6 +81,10 @@ class RigTable(Strict):
                 raise ValueError(f'{key}: unknown with drive = "force"; remove it, or set drive = "spring"')
         if self.radius_m is not None and self.drive != "torsion":
             raise ValueError('radius_m: unknown without drive = "torsion"; remove it, or set drive = "torsion"')
+        if self.force_per_current_N_per_A is not None and self.drive != "force":
+            raise ValueError(
+                'force_per_current_N_per_A: unknown without drive = "force"; the force of a spring is not that of its motor'
+            )
         if self.static_force_N < self.coulomb_force_N:
             raise ValueError(
                 f"static_force_N = {self.static_force_N:g}: must not be below coulomb_force_N = "
@@ -109,7 +117,7 @@ class RigTable(Strict):
         return {
             name: getattr(self, name)
             for name in RigTable.model_fields
-            if name not in {"drive", "tolerance", "radius_m"}
+            if name not in {"drive", "tolerance", "radius_m", "force_per_current_N_per_A"}
         }
 
 
@@ -119,7 +127,26 @@ class RunTable(Strict):
     file: Annotated[str, Field(min_length=1)]
     drive_velocity_mps: DriveVelocity | None = None
     holdout: bool = False
+    from_s: NotNegative = Field(default=0.0, description="Where the run begins, since the first sample of its file.")
+    until_s: Positive | None = Field(default=None, description="Where it ends; the end of the file if not given.")
+    tare_N: float = Field(default=0.0, description="What the force sensor shows where no force acts; taken off.")
+    normal_load_N: Positive | None = Field(default=None, description="Constant, where no column tells it.")
     channels: dict[str, ChannelMap] = Field(default={}, description="Of this run, where they differ from [channels].")
+
+    @property
+    def name(self) -> str:
+        """The file, with the stretch where the run is a part of it: `log-0-to-9s.csv`."""
+        if self.from_s == 0.0 and self.until_s is None:
+            return self.file
+        path = PurePath(self.file)
+        until = "end" if self.until_s is None else f"{self.until_s:g}s"
+        return str(path.with_name(f"{path.stem}-{self.from_s:g}-to-{until}{path.suffix}"))
+
+    @model_validator(mode="after")
+    def _stretch_is_right(self) -> "RunTable":
+        if self.until_s is not None and self.until_s <= self.from_s:
+            raise ValueError(f"until_s = {self.until_s:g}: must be above from_s = {self.from_s:g}; exchange them")
+        return self
 
     @model_validator(mode="after")
     def _names_are_right(self) -> "RunTable":
@@ -147,17 +174,29 @@ class Manifest(Strict):
     @model_validator(mode="after")
     def _names_are_right(self) -> "Manifest":
         check_channel_names(self.channels)
-        names = [str(PurePath(run.file).with_suffix("")) for run in self.run]
+        names = [str(PurePath(run.name).with_suffix("")) for run in self.run]
         counts = Counter(names)
         for run, name in zip(self.run, names, strict=True):
             if counts[name] > 1:
                 raise ValueError(
                     f"run.file = {run.file!r}: {counts[name]} runs are called {name!r}; each run has a file of its own, "
-                    "and goes by its name without the suffix: rename one"
+                    "and goes by its name without the suffix: rename one, or tell their stretches by from_s and until_s"
                 )
+        _refuse_overlap(self.run)
         if all(run.holdout for run in self.run):
             raise ValueError("run.holdout = true for every run: must be false for one at least; nothing is left to fit")
         return self
+
+
+def _refuse_overlap(runs: list[RunTable]) -> None:
+    """Raise ValueError where two runs share a stretch of a file: what is held out must not be fitted."""
+    ordered = sorted(runs, key=lambda run: (run.file, run.from_s))
+    for run, after in pairwise(ordered):
+        if run.file == after.file and after.from_s < (math.inf if run.until_s is None else run.until_s):
+            raise ValueError(
+                f"run.from_s = {after.from_s:g} of {run.file!r}: another run has this stretch as well: must begin where that "
+                "one ends; set until_s"
+            )
 
 
 def check_folder(folder: Path) -> None:
@@ -176,10 +215,15 @@ def read_manifest(folder: Path) -> Manifest:
     return described(folder)[0]
 
 
-def described(folder: Path) -> tuple[Manifest, list[str]]:
+def described(folder: Path, mass_kg: float | None = None) -> tuple[Manifest, list[str]]:
     """`manifest.toml` of an evidence folder, and the rig numbers that it leaves out and that are assumed.
 
     Raises Fault BAD_EVIDENCE, with one line for each problem.
+
+    Args:
+        folder: with the manifest.
+        mass_kg: what the runs show, for a manifest without a mass.
+
     """
     if shown(folder) != str(folder):
         raise Fault("BAD_EVIDENCE", f"{shown(folder)}: its name is not UTF-8; rename it")
@@ -196,7 +240,7 @@ def described(folder: Path) -> tuple[Manifest, list[str]]:
             raise Fault("BAD_EVIDENCE", line)
         assumed: list[str] = []
         if isinstance(table.get("rig"), dict):
-            table["rig"], assumed = with_assumed(table["rig"])
+            table["rig"], assumed = with_assumed(table["rig"], mass_kg)
         return validate(Manifest, table, MANIFEST), assumed
     except Fault as fault:
         raise Fault("BAD_EVIDENCE", fault.line) from None

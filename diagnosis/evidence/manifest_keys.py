@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from bridge.config import Strict
 from bridge.tables.unit_words import known_unit
 
-STANDARD = (
+USUAL = (
     "t_s",
     "drive_force_N",
     "mass_accel_mps2",
@@ -17,6 +17,9 @@ STANDARD = (
     "vibration_frequency_Hz",
     "vibration_amplitude_m",
 )
+# what some rigs measure besides
+BESIDE = ("mass_velocity_mps", "drive_velocity_mps", "normal_load_N", "other_force_N", "motor_current_A")
+STANDARD = (*USUAL, *BESIDE)
 # The upper limit is far above any rig, and low enough that no product of such numbers overflows.
 Positive = Annotated[float, Field(gt=0, lt=1e12)]
 NotNegative = Annotated[float, Field(ge=0, lt=1e12)]

@@ -14,13 +14,16 @@ def manifest_text(rig: RigTable, runs: list[RunTable], assumed: list[str]) -> st
     for name, value in rig.values().items():
         if value is not None:
             lines.append(f"{name} = {_value(value)}" + ("  # assumed, not measured" if name in assumed else ""))
+    if rig.force_per_current_N_per_A is not None:
+        lines.append(f"force_per_current_N_per_A = {_value(rig.force_per_current_N_per_A)}")
     if rig.tolerance:
         lines += ["", "[rig.tolerance]"]
         lines += [f"{name} = {_value(value)}" for name, value in rig.tolerance.items()]
     for run in runs:
         lines += ["", "[[run]]"]
         plain = run.model_dump(exclude={"channels"})
-        lines += [f"{name} = {_value(value)}" for name, value in plain.items() if value is not None]
+        usual = {"from_s": 0.0, "tare_N": 0.0}
+        lines += [f"{name} = {_value(value)}" for name, value in plain.items() if value not in (None, usual.get(name))]
         for name, channel in run.channels.items():
             keys = [f"{key} = {_value(value)}" for key, value in channel.model_dump(exclude_defaults=True).items()]
             lines.append(f"channels.{name} = {{ {', '.join(keys)} }}")

@@ -25,6 +25,11 @@ _MEASURES = {
     "drive_position_m": ("length", "angle"),
     "vibration_frequency_Hz": ("frequency", "frequency"),
     "vibration_amplitude_m": ("length", "angle"),
+    "mass_velocity_mps": ("velocity", "angular velocity"),
+    "drive_velocity_mps": ("velocity", "angular velocity"),
+    "normal_load_N": ("force", "force"),
+    "other_force_N": ("force", "torque"),
+    "motor_current_A": ("current", "current"),
 }
 # Seconds from which a column of times without a unit is no time of a run but of a calendar, by the unit that it is then in
 _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))

@@ -27,7 +27,10 @@ _POWERS = {
     "mass_position_m": 1,
     "drive_position_m": 1,
     "vibration_amplitude_m": 1,
+    "mass_velocity_mps": 1,
+    "other_force_N": -1,
     "drive_velocity_mps": 1,
+    "force_per_current_N_per_A": -1,
 }
 
 

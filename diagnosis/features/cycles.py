@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.features.turns import turns
+from diagnosis.look.turns import turns
 
 Floats = npt.NDArray[np.floating[Any]]
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.kernel import kernel
-from diagnosis.features.turns import turns
+from diagnosis.look.turns import turns
 
 Floats = npt.NDArray[np.floating[Any]]
 Indices = npt.NDArray[np.int64]

@@ -4,6 +4,7 @@ Measured and predicted runs are reduced in the same way and lose the same inform
 spring) and averages 20 samples of noise. Vibration is too fast for the grid and is kept as an rms.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,18 +32,12 @@ def reduce_run(run: Run) -> dict[str, Floats]:
 
     A block without a sample (in a gap, or between slow samples) is interpolated.
     """
-    index = np.floor((run.t_s - run.t_s[0]) / BLOCK_S + 1e-6).astype(np.int64)
+    index = _index(run)
     blocks = int(index[-1]) + 1
     count = np.bincount(index, minlength=blocks)
     empty = np.flatnonzero(count == 0)
     filled = np.flatnonzero(count)
-    reduced: dict[str, Floats] = {}
-    for name in MEANS:
-        if name in run.columns:
-            mean = np.bincount(index, run.columns[name], blocks) / np.maximum(count, 1)
-            if len(empty):
-                mean[empty] = np.interp(empty, filled, mean[filled])
-            reduced[name] = mean
+    reduced = block_means(run, MEANS)
     per_block = len(run.t_s) / max(len(filled), 1)
     if per_block >= SHAKE_RATE_HZ * BLOCK_S:
         for name, source in SHAKEN.items():
@@ -52,6 +47,27 @@ def reduce_run(run: Run) -> dict[str, Floats]:
                 power[empty] = np.median(power)
                 reduced[name] = np.sqrt(power)
     return reduced
+
+
+def block_means(run: Run, names: Sequence[str]) -> dict[str, Floats]:
+    """Means of the columns `names` that the run has, [blocks] each; a block without a sample is interpolated."""
+    index = _index(run)
+    blocks = int(index[-1]) + 1
+    count = np.bincount(index, minlength=blocks)
+    empty, filled = np.flatnonzero(count == 0), np.flatnonzero(count)
+    reduced: dict[str, Floats] = {}
+    for name in names:
+        if name in run.columns:
+            mean = np.bincount(index, run.columns[name], blocks) / np.maximum(count, 1)
+            if len(empty):
+                mean[empty] = np.interp(empty, filled, mean[filled])
+            reduced[name] = mean
+    return reduced
+
+
+def _index(run: Run) -> npt.NDArray[np.int64]:
+    """The block of every sample, [samples]."""
+    return np.floor((run.t_s - run.t_s[0]) / BLOCK_S + 1e-6).astype(np.int64)
 
 
 class Averaged(NamedTuple):

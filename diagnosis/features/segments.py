@@ -101,6 +101,9 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
         drive = _stated(run.drive_velocity_mps, blocks, reduced.get("drive_position_m"))
     else:
         drive = _pieces(reduced["drive_position_m"])
+        if never_constant(reduced["drive_position_m"], drive):
+            rate = np.asarray(savgol_filter(reduced["drive_position_m"], 2 * _WINDOW + 1, 2, deriv=1, delta=BLOCK_S))
+            return Commands(rate, frequency_Hz, amplitude_m, (), changing_s=blocks * BLOCK_S)
     change = (np.diff(drive) != 0.0) | (np.diff(frequency_Hz) != 0.0) | (np.diff(amplitude_m) != 0.0)
     edges = [0, *(np.flatnonzero(change) + 1).tolist(), blocks]
     segments = tuple(
@@ -116,6 +119,41 @@ def commands_of(run: Run, rig: RigTable, reduced: dict[str, Floats]) -> Commands
     )
     changing = sum(last - first for first, last in pairwise(edges) if (last - first) * BLOCK_S < SHORTEST_S)
     return Commands(drive, frequency_Hz, amplitude_m, segments, changing_s=changing * BLOCK_S)
+
+
+def never_constant(position_m: Floats, drive: Floats) -> bool:
+    """Whether a drive changes its velocity all the time: a sine, a ramp, a control that hunts.
+
+    For more than half of its way in time it is then in no piece of constant velocity, or in one whose velocity rises and falls
+    in a single bow.
+
+    Args:
+        position_m: as measured, [blocks].
+        drive: velocity as pieces of constant velocity, [blocks].
+
+    """
+    windows = len(position_m) // _WINDOW
+    if windows < _SHORTEST_WINDOWS:
+        return False
+    measured = np.array([_slope(one) for one in position_m[: windows * _WINDOW].reshape(windows, _WINDOW)])
+    own = drive[: windows * _WINDOW].reshape(windows, _WINDOW)
+    moves = np.abs(measured) > _SLOWEST * float(np.abs(measured).max())
+    constant = np.ptp(own, axis=1) == 0.0
+    edges = np.flatnonzero(np.diff(own[:, 0]) != 0.0) + 1
+    for first, last in pairwise([0, *edges.tolist(), windows]):
+        if _is_bowed(measured[first:last]):
+            constant[first:last] = False
+    return float((moves & ~constant).sum()) > 0.5 * max(int(moves.sum()), 1)
+
+
+def _is_bowed(velocity: Floats) -> bool:
+    """Whether the velocity of a piece [windows] is one smooth bow, by as much as makes two pieces."""
+    if len(velocity) < 2 * _SHORTEST_WINDOWS:
+        return False
+    time = np.linspace(-1.0, 1.0, len(velocity))
+    bow = np.polyval(np.polyfit(time, velocity, 2), time)
+    about = float(np.var(velocity))
+    return float(np.ptp(bow)) > _SMALLEST_CHANGE * float(np.abs(velocity).max()) and float(np.var(bow)) > 0.8 * about
 
 
 def _stated(velocity_mps: float, blocks: int, position_m: Floats | None) -> Floats:

@@ -115,6 +115,7 @@ class Fitter:
         """A fitter for some of the runs, given by the names of their files."""
         own = np.array([file in files for file, _ in self.problem.labels])
         problem = Problem(self.problem.rig, [run for run in self.problem.runs if run.file in files])
+        problem.until_s = self.problem.until_s
         other = Fitter(problem, self.floor.of_features(own), self.nuisances)
         other._rates = self._rates[own[self.floor.compared]]
         return other

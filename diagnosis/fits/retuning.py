@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from bridge.faults import Fault
 from diagnosis.evidence.folder import Evidence
-from diagnosis.features.segments import SHORTEST_S
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
@@ -55,12 +54,6 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     first = replicates(problem, point, ROUGHNESS, FIRST_REPLICATES, 1)
     roughness = roughness_of(problem, first)
     floor = floor_of(problem, point, first)
-    if not any(run.commands.segments for run in problem.runs):
-        raise Fault(
-            "BAD_EVIDENCE",
-            f"{evidence.folder}: in no fitted run speed and vibration stay the same for {SHORTEST_S:g} s: must somewhere, or "
-            "nothing is compared; the vibration columns hold what was commanded, without noise; hold each command longer",
-        )
     if not floor.compared.any():
         raise Fault(
             "BAD_EVIDENCE",

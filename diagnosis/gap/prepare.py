@@ -9,7 +9,7 @@ from diagnosis.evidence.folder import Evidence, Run
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.features.feature import Signals, scales_of
 from diagnosis.features.force_drive import moving_s
-from diagnosis.features.grid import BLOCK_S, SHAKEN, averaged, reduce_run, without_vibration
+from diagnosis.features.grid import BLOCK_S, SHAKEN, averaged, block_means, reduce_run, without_vibration
 from diagnosis.features.noise import Noise, noise_of
 from diagnosis.features.segments import Commands, commands_of
 from diagnosis.features.slips import settled
@@ -19,6 +19,7 @@ from diagnosis.model.segment_starts import entries_of
 
 # Seconds that an axis must move in a run. Too small: the mean friction is noise. Too large: short strokes are refused.
 _SHORTEST_MOTION_S = 0.5
+_BESIDE = ("normal_load_N", "other_force_N")
 
 
 class Prepared(NamedTuple):
@@ -33,6 +34,7 @@ class Prepared(NamedTuple):
     before_s: float  # sum of the durations of the runs before this one, in the manifest's order
     noise: Noise
     clipped: dict[str, tuple[float, float]]  # by signal: lowest and highest value that the sensor can show
+    beside: Signals = {}  # what is measured besides and no model predicts: normal load, another force
 
 
 def prepare(evidence: Evidence) -> list[Prepared]:
@@ -72,7 +74,9 @@ def _prepare(rig: RigTable, run: Run, before_s: float) -> Prepared:
     noise = noise_of(noisy, commands, scales_of(rig))
     clipped = {name: limits for name, limits in run.clipped.items() if name in signals}
     entries = entries_of(signals, commands, scales_of(rig))
-    return Prepared(run.file, run.holdout, signals, commands, start, entries, before_s, noise, clipped)
+    return Prepared(
+        run.file, run.holdout, signals, commands, start, entries, before_s, noise, clipped, block_means(run, _BESIDE)
+    )
 
 
 def _start(rig: RigTable, signals: Signals, commands: Commands) -> Start:

@@ -1,6 +1,7 @@
 """The measured features of one evidence, and predicted features for any rig numbers, sensor chain and effects."""
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -38,6 +39,10 @@ _KEPT = 64
 _DIVERGED = 1e100  # SI units: a feature beyond counts as missing, as its square must still be a number
 
 
+class OutOfTimeError(Exception):
+    """The time that a person allows is over; what is known so far is the answer."""
+
+
 class Point(NamedTuple):
     """A model to evaluate: rig numbers, sensor chain and effects."""
 
@@ -73,6 +78,7 @@ class Problem:
     def __init__(self, rig: RigTable, runs: list[Prepared]) -> None:
         self.rig = rig
         self.runs = runs
+        self.until_s = math.inf  # of `time.monotonic`, which all processes share: then `predicted_many` gives up
         self.scales = scales_of(rig)
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
@@ -100,6 +106,8 @@ class Problem:
     ) -> list[Floats]:
         """Features of the model at each point, [features] each, in less time than by calls of `predicted`.
 
+        Raises OutOfTimeError after `until_s`.
+
         Args:
             points: the models.
             draws: the random part of each point; empty for noise-free predictions.
@@ -109,6 +117,8 @@ class Problem:
         parts: list[list[float]] = [[] for _ in points]
         with np.errstate(over="ignore", invalid="ignore"):  # a refit may start so far away that the model diverges
             for run in self.runs:
+                if time.monotonic() > self.until_s:
+                    raise OutOfTimeError
                 found = self._signals(run, points, draws or [None] * len(points), perhaps)
                 for part, signals in zip(parts, found, strict=True):
                     part.extend([math.nan] if signals is None else self._features(run, signals).values)

@@ -3,10 +3,15 @@
 Scales come from the rig, so that a step of 1 in a coordinate is an effect that one would notice, on any rig.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.gap.prepare import Prepared
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.catalogue import CATALOGUE
+from diagnosis.hypotheses.hypothesis import LEVELS
 from diagnosis.hypotheses.scales import sizes
 from diagnosis.hypotheses.starts import Asked, Trial
 from plant.effects.library import EFFECTS
@@ -20,10 +25,21 @@ def trials(problem: Problem) -> list[Trial]:
     of_rig = sizes(rig, runs, highest_Hz)
     found: list[Trial] = []
     for name, effect in EFFECTS.items():
-        if rig.drive not in effect.drives or (effect.acts_on == "piezo" and highest_Hz == 0.0):
+        if not _shows(name, rig, highest_Hz):
             continue
         for form in effect.forms:
             tried = CATALOGUE[name].forms.get(form)
             if tried is not None:
                 found += tried.starts(Asked(name, form, tried.scale(of_rig), problem, highest_Hz))
     return found
+
+
+def cannot_show(rig: RigTable, runs: Sequence[Prepared], assumed: Sequence[str]) -> tuple[str, ...]:
+    """Effects that this kind of drive cannot have, that need a vibration, or that change a number in `assumed`, left out."""
+    highest_Hz = max(float(run.commands.frequency_Hz.max()) for run in runs)
+    return tuple(name for name in EFFECTS if not _shows(name, rig, highest_Hz) or LEVELS.get(name) in assumed)
+
+
+def _shows(name: str, rig: RigTable, highest_Hz: float) -> bool:
+    effect = EFFECTS[name]
+    return rig.drive in effect.drives and (effect.acts_on != "piezo" or highest_Hz > 0.0)

@@ -6,6 +6,7 @@ slips        breakaways and re-sticks, on the record's own scale of time
 slip_shape   sliding friction and the swing's frequency from all falls laid over each other
 numbers      numbers with intervals of 90 %
 speeds       friction over speed, and over the dwell before a slip
+steady       whether the record is alike from beginning to end
 look         all of it, for one record
 words        a sentence for each number
 """

@@ -126,7 +126,11 @@ def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: 
 
 def _of_coefficient(numbers: dict[str, Number]) -> dict[str, Number]:
     """Numbers of a friction coefficient: dimensionless, and without those of the drive's spring."""
-    left = {name: number for name, number in numbers.items() if name not in ("stiffness_N_per_m", "mass_kg")}
+    left = {
+        name: number
+        for name, number in numbers.items()
+        if name not in ("series_N_per_m", "stiffness_N_per_m", "mass_kg")
+    }
     return {
         _MU.get(name, name): number._replace(unit=re.sub(r"^N\b", "1", number.unit)) for name, number in left.items()
     }
@@ -148,9 +152,26 @@ def _of_cycles(found: list[Slips], cycles: list[Cycle], step_s: float) -> dict[s
         "dwell_s": mean_of([cycle.dwell_s for cycle in stuck], "s", 0.3 * step_s),
         "slip_s": mean_of(durations, "s", 0.3 * step_s),
         "slope_N_per_s": mean_of([cycle.slope_N_per_s for cycle in stuck], "N/s"),
-        "stiffness_N_per_m": mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m"),
-    }
+    } | _stiffness(stuck)
     return {name: number for name, number in numbers.items() if number is not None}
+
+
+def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
+    """The stiffness of the drive beside that in series, where the sticks surely show the contact give way; else the latter alone.
+
+    What the contact gives way is by a formula, so all of it is in the interval, both ways.
+    """
+    series = mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m")
+    drive = mean_of([cycle.drive_m_per_N for cycle in stuck], "m/N")
+    if series is None or drive is None or not drive.low > 0.0:
+        return {"stiffness_N_per_m": series}
+    # fewer half intervals: the scatter that the second column brings would be more than half of what it mends
+    if not 1.0 / series.value - drive.value > 2.0 * (drive.high - drive.value):
+        return {"stiffness_N_per_m": series}
+    value = 1.0 / drive.value
+    more = abs(value - series.value)
+    stiffness = Number(value, 1.0 / drive.high - more, 1.0 / drive.low + more, "N/m")
+    return {"series_N_per_m": series, "stiffness_N_per_m": stiffness}
 
 
 def _of_falls(found: list[Slips], numbers: dict[str, Number]) -> dict[str, Number]:

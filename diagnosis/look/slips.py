@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.features.turns import turns
 from diagnosis.look.record import Part, noise_of, smoothed
+from diagnosis.look.turns import turns
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]

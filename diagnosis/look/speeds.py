@@ -10,7 +10,7 @@ from diagnosis.look.record import Part, smoothed
 from diagnosis.look.sticks import Cycle
 
 Floats = npt.NDArray[np.float64]
-_VARIES = 1.3  # largest speed over smallest, from which friction is told over speed
+VARIES = 1.3  # largest speed over smallest, from which friction is told over speed
 _BINS_A_DECADE = 8.0
 _WINDOWS = 200  # of a record without slips, in which speed and force are averaged
 _FEWEST_IN_BIN = 3
@@ -41,7 +41,7 @@ def over_speed(parts: list[Part], cycles: list[Cycle], unit: str = "N") -> list[
         slipping = np.concatenate([slipping, np.zeros(len(more_speed), np.bool_)])
     good = np.isfinite(speeds) & np.isfinite(means) & (speeds > 0.0)
     speeds, means, tops, slipping = speeds[good], means[good], tops[good], slipping[good]
-    if len(speeds) < 2 * _FEWEST_IN_BIN or speeds.max() < _VARIES * speeds.min():
+    if len(speeds) < 2 * _FEWEST_IN_BIN or speeds.max() < VARIES * speeds.min():
         return []
     found: list[AtSpeed] = []
     bins = np.round(np.log10(speeds) * _BINS_A_DECADE).astype(int)

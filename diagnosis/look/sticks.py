@@ -15,6 +15,8 @@ _FROM, _TO = (
     0.9,
 )  # share of a stick in which its slope is read: a re-stick rings, and before a breakaway it creeps
 _FEWEST = 5  # samples of that
+_UNKNOWN = (np.nan, np.nan, np.nan, np.nan, np.nan)
+_DEGREE = 4  # of the smooth curve through a stick: a contact that gives way bends it once
 _HALVES = 4  # samples of a smoothing from which every other one finds a peak and the others measure it
 
 
@@ -28,7 +30,9 @@ class Cycle(NamedTuple):
     dwell_s: float  # of the stick before
     slope_N_per_s: float  # of that stick
     speed_mps: float  # of the drive in that stick
-    stiffness_N_per_m: float  # of that stick, over the way of the drive
+    stiffness_N_per_m: float  # of that stick, over the way of the drive: of drive and contact in series
+    drive_m_per_N: float  # of that way: what the drive gives way for a force
+    contact_m_per_N: float  # and the contact, before it nears its breakaway
     mean_force_N: float  # from this breakaway to the next
     sign: float  # of the force as measured
 
@@ -42,7 +46,9 @@ def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
         bottom = int(slips.bottoms[i]) if i < len(slips.bottoms) else -1
         began = int(slips.bottoms[i - 1]) if i else -1
         following = int(slips.tops[i + 1]) if i + 1 < len(slips.tops) else -1
-        slope, speed, stiffness = _stick(part, began if i else 0, top, speed_mps) if i else (np.nan, np.nan, np.nan)
+        slope, speed, stiffness, drive, contact = (
+            _stick(part, began, top, float(top_N[i]), speed_mps, slips.width) if i else _UNKNOWN
+        )
         found.append(
             Cycle(
                 float(part.t_s[top]),
@@ -53,6 +59,8 @@ def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
                 slope,
                 speed,
                 stiffness,
+                drive,
+                contact,
                 float(part.force_N[top:following].mean()) if following >= 0 else np.nan,
                 part.sign,
             )
@@ -87,17 +95,45 @@ def _extremes(smooth: Floats, at: Indices, reach: int, sign: float) -> Floats:
     return np.array([sign * (sign * smooth[max(i - reach, 0) : i + reach + 1]).max() for i in at.tolist()])
 
 
-def _stick(part: Part, began: int, top: int, speed_mps: float | None) -> tuple[float, float, float]:
-    """Slope of the force, speed of the drive, and stiffness, in the middle of a stick; NaN where it is too short."""
+def _stick(
+    part: Part, began: int, top: int, breakaway_N: float, speed_mps: float | None, width: int
+) -> tuple[float, float, float, float, float]:
+    """Slope of the force, speed of the drive, slope over its way, and what drive and contact give way, in the middle of a stick.
+
+    NaN where the stick is too short or the speed is not known.
+    """
     first, last = began + int(_FROM * (top - began)), began + int(_TO * (top - began))
     if last - first < _FEWEST:
-        return np.nan, np.nan, np.nan
+        return _UNKNOWN
     t_s, force_N = part.t_s[first:last], part.force_N[first:last]
     slope = _slope(t_s, force_N)
     if part.position_m is None:
-        return slope, speed_mps if speed_mps is not None else np.nan, slope / speed_mps if speed_mps else np.nan
-    speed = _slope(t_s, part.position_m[first:last])
-    return slope, speed, slope / speed if speed > 0.0 else np.nan
+        speed = speed_mps if speed_mps is not None else np.nan
+    else:
+        speed = _slope(t_s, part.position_m[first:last])
+    if not speed > 0.0:
+        return slope, speed, np.nan, np.nan, np.nan
+    # a breakaway is known to the width of the smoothing that found it: nearer to it the force may be that of the slip
+    whole = slice(0, max(min(last, top - width) - first, 0))
+    return slope, speed, slope / speed, *_both(speed * (t_s - t_s[0])[whole], force_N[whole], breakaway_N)
+
+
+def _both(way_m: Floats, force_N: Floats, breakaway_N: float) -> tuple[float, float]:
+    """What drive and contact give way for a force [m/N]; NaN where the stick does not show it.
+
+    A contact whose stiffness falls from S to nothing as the force nears its breakaway F_b goes the way -F_b / S * ln(1 - F / F_b)
+    (Dahl, A solid friction model, 1968), the drive F / k: a line in two columns. The force in both is a smooth curve through
+    the samples, as noise in a column would draw its factor towards zero.
+    """
+    if len(way_m) <= 2 * _DEGREE:
+        return np.nan, np.nan
+    smooth = np.polynomial.Polynomial.fit(way_m, force_N, _DEGREE)(way_m)
+    left = 1.0 - smooth / breakaway_N
+    if breakaway_N <= 0.0 or left.min() <= 0.0:
+        return np.nan, np.nan
+    columns = np.column_stack([np.ones_like(way_m), smooth, -breakaway_N * np.log(left)])
+    _, drive, contact = np.linalg.lstsq(columns, way_m, rcond=None)[0]
+    return float(drive), float(contact)
 
 
 def _slope(x: Floats, y: Floats) -> float:

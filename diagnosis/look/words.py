@@ -5,6 +5,7 @@ import math
 from bridge.units import counted, fixed_digits, prefixed
 from diagnosis.look.look import Look
 from diagnosis.look.numbers import Number
+from diagnosis.look.steady import unsteady
 
 # in the order in which they are told
 TITLES = {
@@ -23,7 +24,8 @@ TITLES = {
     "dwell_s": ("stick", "from re-stick to breakaway"),
     "slip_s": ("slip", "from breakaway to re-stick"),
     "slope_N_per_s": ("climb", "rise of the force in a stick"),
-    "stiffness_N_per_m": ("stiffness", "rise of the force over the way of the drive: drive and contact in series"),
+    "series_N_per_m": ("in series", "rise of the force over the way of the drive: drive and contact in series"),
+    "stiffness_N_per_m": ("stiffness", "of the drive, from its way in a stick"),
     "mass_kg": ("mass", "from the swing in a slip, on that stiffness"),
     "dwell_N_per_decade": ("ageing", "rise of the breakaway force per decade of stick time"),
 }
@@ -85,12 +87,17 @@ def cannot_tell(seen: Look) -> list[str]:
     names = ("mu_s", "mu_k") if seen.known.coefficient else ("static_force_N", "kinetic_force_N")
     if "stiffness_N_per_m" not in seen.numbers and "slope_N_per_s" in seen.numbers:
         lines.append("no stiffness and no mass: the drive's speed is not known; add --speed 0.5mm/s")
+    if "stiffness_N_per_m" in seen.numbers and "series_N_per_m" not in seen.numbers:
+        lines.append(
+            "no stiffness of the contact: the sticks are straight, and the stiffness is that of drive and contact in series"
+        )
     if seen.known.coefficient:
         lines.append("no force: the normal load is not known; add --load 94.5N")
     elif seen.known.load_N is None:
         lines.append("no friction coefficient: the normal load is not known; add --load 94.5N")
     if seen.slips >= 2 and not {"dwell_N_per_decade", "mu_dwell_per_decade"} & seen.numbers.keys():
         lines.append("no dependence on the stick time: all sticks last alike; measure at several speeds")
+    lines += unsteady(seen.cycles, "1" if seen.known.coefficient else "N")
     static = seen.numbers[names[0]]
     if names[1] in seen.numbers and static.value - static.low > 0.1 * (static.value - seen.numbers[names[1]].value):
         lines.append(

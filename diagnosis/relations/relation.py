@@ -14,7 +14,7 @@ Floats = npt.NDArray[np.floating[Any]]
 Bools = npt.NDArray[np.bool_]
 Piece = tuple[int, int]  # rows [first, last) of a run, without a hole
 OUTSIDE = frozenset(
-    {"acceleration-clock", "force-amplifier", "loose-clamp"}
+    {"acceleration-clock", "logger-clock", "force-amplifier", "loose-clamp"}
 )  # causes that no effect of the library makes
 END_BLOCKS = 20  # left out at the ends of a run
 _EDGE_BLOCKS = 100  # left out around a change of command, while drive and piezo settle

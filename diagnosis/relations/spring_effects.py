@@ -18,6 +18,7 @@ _KNEES = (0.3, 0.4, 0.5, 0.57, 0.64, 0.71, 0.78, 0.85, 0.92)  # of the largest f
 _YIELDS = (0.04, 0.06, 0.09, 0.13, 0.18, 0.25)  # of the extension at the largest force
 _EDGES = (0.02, 0.05, 0.1)  # softness of a backlash, of the largest force
 _MODES_HZ = np.geomspace(25.0, 320.0, 30)  # a frame's ringing is some periods long: steps of 9 %
+_SKEW = 5e-4  # between two recorders of which one is timed by software
 _SETTLING_S = (1.5, 3.0, 6.0, 12.0)
 
 
@@ -43,6 +44,7 @@ def spring_effects(
             for each_Hz in _MODES_HZ.tolist()
         ),
         *_drifting(runs, most_N),
+        *_clocks(stiffness, rates),
     ]  # fmt: skip
 
 
@@ -70,6 +72,15 @@ def _slow(values: Floats, order: int, time_s: float) -> Floats:
     for _ in range(order):
         values = low_pass(values, time_s / order)
     return values
+
+
+def _clocks(stiffness: float, rates: Sequence[Floats]) -> list[Term]:
+    """Force and positions from two loggers: clocks that run apart within a run."""
+    pulls = [-stiffness * v for v in rates]
+    apart = [pull * (np.arange(len(pull)) * BLOCK_S) for pull in pulls]
+    return [
+        term("logger-clock", "runs apart in each run", apart, _SKEW, 0, "skew"),
+    ]
 
 
 def _bent(pull: Sequence[Floats], most_N: float) -> list[Term]:

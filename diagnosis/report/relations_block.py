@@ -1,11 +1,15 @@
 """The relations' part of an answer: shares of what differs, the remainder, refitted numbers, one picture."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from diagnosis.evidence.manifest import RigTable
 from diagnosis.gap.prepare import Prepared
+from diagnosis.latent.answer import LatentSignal
 from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.decide import Decision
+from diagnosis.report.latent_block import latent_findings, latent_remainder, latent_rows, latent_shares
 from diagnosis.report.summary import summary
 from diagnosis.result import (
     Curve,
@@ -24,18 +28,27 @@ _TWO_SIDED_90 = 1.645
 
 
 def with_relations(
-    done: Diagnosis, rig: RigTable, runs: list[Prepared], relations: Relations, decision: Decision
+    done: Diagnosis,
+    rig: RigTable,
+    runs: list[Prepared],
+    relations: Relations,
+    decision: Decision,
+    latent: Sequence[LatentSignal],
 ) -> Diagnosis:
-    """The diagnosis with the relations' shares, remainder, numbers and picture, and with its sentences."""
+    """The diagnosis with shares, remainder, numbers and picture of relations and latent friction, and with its sentences."""
     found = done._replace(
-        shares=tuple(share for one in relations.answered for share in _shares(one)),
-        remainder=_remainder(relations, decision),
-        relations=tuple(
-            RelationRow(
-                signal_of(one.name), one.unit, one.described, one.refitted, one.left, one.noise, one.chosen.causes
-            )
-            for one in relations.answered
+        shares=(*(share for one in relations.answered for share in _shares(one)), *latent_shares(latent)),
+        remainder=_remainder(relations, decision) or latent_remainder(latent),
+        relations=(
+            *(
+                RelationRow(
+                    signal_of(one.name), one.unit, one.described, one.refitted, one.left, one.noise, one.chosen.causes
+                )
+                for one in relations.answered
+            ),
+            *latent_rows(latent),
         ),
+        findings=(*done.findings, *latent_findings(latent)),
         left_out=tuple(LeftOut(signal_of(one.name), one.why) for one in relations.missing),
         numbers=tuple(number for one in relations.answered for number in _numbers(one, rig)),
         pictures=(*_pictures(relations, runs), *done.pictures),

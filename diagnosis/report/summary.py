@@ -6,11 +6,13 @@ from bridge.units import percent, signal_name, times
 from diagnosis.evidence.exciter_harmonics import DISTORTED
 from diagnosis.evidence.force_pickup import PICK_UP
 from diagnosis.model.per_run import has_own_phases
+from diagnosis.report.latent_block import latent_answer, latent_sentences
 from diagnosis.report.relation_words import remainder_in_words
 from diagnosis.report.words import EFFECT_WORDS, cannot_tell, closed_between, closed_in_words, estimate_in_words
 from diagnosis.result import Diagnosis
 from diagnosis.verdict.held_out import MORE_THAN_RIGHT
 
+_WORSE = 1.1  # times the gap as described from which a refit makes held-out runs worse, and not by chance
 _SMALL_SHARE = 0.05  # of the gap: regimes with less are not told
 
 
@@ -31,7 +33,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             "than a quarter of the rigs without a visible gap had one."
         )
     elif unexplained:
-        sentences.append("There is a gap, and nothing in the library explains it.")
+        sentences.append(latent_answer(diagnosis) or "There is a gap, and nothing in the library explains it.")
         if gap.refuted:
             names = " and ".join(gap.refuted)
             with_it = next(one.gap for one in gap.compared if one.who == names)
@@ -47,10 +49,13 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 "of debris or a tilted track would: no path can be told from these runs."
             )
     elif diagnosis.verdict == "partly":
+        sentences += [most] if (most := latent_answer(diagnosis)) else []
         sentences.append(
             f"{' and '.join(diagnosis.effects)} explains a part of what differs, more than chance would; the rest is not "
             "explained."
         )
+    kept = f" on {', '.join(gap.runs)}, held out" if gap.runs else ""
+    sentences += latent_sentences(diagnosis, kept)
     if diagnosis.remainder is not None and diagnosis.remainder.what:
         sentences.append(f"{remainder_in_words(diagnosis.remainder)}.")
     still = [finding.where.partition(":")[0] for finding in diagnosis.findings if finding.kind == "still"]
@@ -71,6 +76,10 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
                 else ""
             )
         )
+    if gap.runs and gap.retuned > _WORSE * gap.nominal:
+        sentences.append(
+            "The refit makes the held-out runs worse: take the numbers of the description, not the refitted ones."
+        )
     if diagnosis.where and diagnosis.verdict != "no-gap":
         sentences.append(_where(diagnosis))
     sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
@@ -84,7 +93,7 @@ def summary(diagnosis: Diagnosis) -> tuple[str, ...]:
             says = f"explains it together with {diagnosis.effects[1]}"
         sentences.append(
             f"{name} {says}"
-            + (f" (probability {percent(sure)})" if i == 0 else "")
+            + (f" (probability {percent(sure)})" if i == 0 and math.isfinite(sure) else "")
             + f": {EFFECT_WORDS[name]}"
             + (f"; {numbers}." if numbers else ".")
         )

@@ -5,6 +5,7 @@ from typing import Final
 
 from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, percent, prefixed, times
 from diagnosis.hypotheses.catalogue import CATALOGUE
+from diagnosis.report.latent_block import mostly
 from diagnosis.result import PARAMETERS, Diagnosis, Estimate
 
 EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
@@ -34,10 +35,15 @@ def answer(diagnosis: Diagnosis) -> str:
         if cannot_tell(diagnosis):
             return f"these runs cannot tell, the held-out runs are {times(diagnosis.gap.retuned)} noise floors off"
         return "the rig as described explains these runs"
+    most = mostly(diagnosis)
     if diagnosis.verdict == "unexplained":
+        if most is not None:
+            return f"{most.what} explains most of the {most.signal}, and no known effect accounts for it"
         return "these runs differ from the rig as described, and no known effect accounts for it"
     names = " and ".join(diagnosis.effects)
     if diagnosis.verdict == "partly":
+        if most is not None:
+            return f"{most.what} explains most of the {most.signal}, {names} a part besides"
         return f"{names} explains a part of what differs; the rest is not explained"
     sure = sum(one.probability for one in diagnosis.candidates if one.effect in diagnosis.effects)
     others = [one for group in diagnosis.not_distinguishable if {*group} & {*diagnosis.effects} for one in group]

@@ -90,6 +90,11 @@ class Contest:
             )
             self._contest_on_floor_of(nearest)
 
+    def stop(self) -> None:
+        """End where the time is over: the verdict is that over what was fitted by then."""
+        self.rig.fitter.problem.until_s = math.inf
+        self.verdict = self._judged()
+
     def check(self) -> None:
         """Let a name of little evidence stand up to several refits, or fall."""
         found = self.verdict

@@ -8,6 +8,7 @@ from bridge.wire.messages import CHANNELS
 SENSORS, EXCITER, CLOCK, BUS, PROCESS = "sensors", "exciter", "clock", "bus", "process"
 ALL_SENSORS = "sensors"
 LINK = "link"  # both directions
+LARGEST = 3.4e38  # of a sample on the wire
 # what a fault is done to, by group
 TARGETS = {
     SENSORS: (*CHANNELS, ALL_SENSORS),

@@ -8,12 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.wire.messages import CHANNELS
-from plant.faults.kinds import ALL_SENSORS
+from plant.faults.kinds import ALL_SENSORS, LARGEST
 from plant.faults.table import FaultTable
 
 Floats = npt.NDArray[np.float64]
 
-_LARGEST = 3.4e38  # of a sample on the wire
 _JUMP_S = 0.1
 _HUM_HZ = 50.0
 _LOOSE_BLOCKS = 5.0  # mean length of a burst
@@ -55,7 +54,7 @@ class SensorFault:
             return
         for name in self._channels:
             samples = self._spoil(self._makers[name], block[name].astype(np.float64), since_s)
-            block[name][:] = np.clip(samples, -_LARGEST, _LARGEST)
+            block[name][:] = np.clip(samples, -LARGEST, LARGEST)
 
 
 class _Channel:

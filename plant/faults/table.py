@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from bridge.config import Strict
 from bridge.wire.messages import CHANNELS
-from plant.faults.kinds import BUS, KINDS, PROCESS, TARGETS, group_of
+from plant.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 
 
 class FaultTable(Strict):
@@ -40,6 +40,8 @@ class FaultTable(Strict):
         elif not made.lowest <= self.size <= made.highest:
             rule = f"must be {made.lowest:g} to {made.highest:g} for kind = {self.kind} ({made.value})"
             raise ValueError(f"value = {self.size:g}: {rule}; change the value")
+        if group == SENSORS and abs(self.size) > LARGEST:
+            raise ValueError(f"value = {self.size:g}: must be within {LARGEST:g} either way, as a sample is of 32 bits")
         if (self.kind == "swapped") != bool(self.other):
             raise ValueError(f"other = {self.other!r}: goes with kind = swapped alone; name the other channel")
         if self.other and (self.other not in CHANNELS or self.target not in CHANNELS or self.other == self.target):

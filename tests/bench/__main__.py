@@ -6,7 +6,7 @@
 import sys
 import time
 
-from tests.bench import cycles, diagnosis, effects, kernel, loop, old_version, replay, side_by_side
+from tests.bench import cycles, diagnosis, effects, files, kernel, loop, old_version, replay, side_by_side
 
 # the diagnosis first: its memory counts this process too, and what the others leave in it
 BENCHES = [
@@ -17,6 +17,7 @@ BENCHES = [
     loop.bench,
     side_by_side.bench,
     replay.bench,
+    files.bench,
     cycles.bench,
 ]
 

@@ -1,5 +1,7 @@
 """Sensors that fail while it vibrates: the vibration stays within bounds, and a word says what it is."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from bridge.wire import stickslip_pb2 as wire
 from tests.closed_loop.sensor_faults import (
     CHANNELS,
     Fault,
+    Memory,
     clipped,
     dead,
     drifting,
@@ -73,7 +76,7 @@ def test_a_drive_position_in_another_unit_fades_the_vibration_out(factor: float)
 
 @pytest.mark.parametrize(
     ("fault", "reason"),
-    [(dead(FORCE), "FROZEN"), (frozen(FORCE), "FROZEN"), (scaled(SLIDE, 10.0), "FORCE_DOUBTED")],
+    [(dead(FORCE), "FROZEN"), (frozen(FORCE), "FROZEN"), (scaled(SLIDE, 10.0), "SLIDE_DOUBTED")],
     ids=["dead", "frozen", "slide in another unit"],
 )
 def test_a_doubted_force_or_slide_leaves_it_vibrating_while_it_moves(fault: Fault, reason: str) -> None:
@@ -89,7 +92,38 @@ def test_a_place_that_jumps_once_changes_nothing() -> None:
     came = suffer(jumped(DRIVE, 1e-3), SECONDS)
     assert came.peak < 1.2
     assert came.at_end > 0.85
+    assert came.reasons["JUMPED"] < 0.01
     assert not set(came.reasons) & {"DRIVE_DOUBTED", "FORCE_DOUBTED"}
+
+
+def test_a_place_that_drifts_raises_no_vibration() -> None:
+    def drifts(block: Any, at: int, _memory: Memory) -> None:
+        block[DRIVE] += 5e-7 * at  # 0.5 mm/s: twice the velocity
+
+    came = suffer(drifts, SECONDS)
+    assert came.over_s <= AT_MOST_S
+    assert came.reasons["DRIVE_DOUBTED"] < 0.4
+
+
+def test_a_gain_of_the_drive_that_was_wrong_from_the_start_is_confirmed_by_nobody() -> None:
+    came = suffer(scaled(DRIVE, 2.0), 5.0, from_s=0.0)
+    assert came.reasons["POSITIONS_APART"] < 4.5
+    assert came.at_end < 1.4  # v_a is for the slide, and not for twice its velocity
+
+
+def test_dropouts_of_the_accelerometer_leave_it_at_the_known_gain() -> None:
+    def drops(block: Any, at: int, _memory: Memory) -> None:
+        block[BASE] *= at % 100 >= 5
+
+    came = suffer(drops, SECONDS)
+    assert came.reasons["LOOSE"] < 0.5
+    assert came.at_end == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_mended_drive_vibrates_as_before_once_a_person_says_so() -> None:
+    came = suffer(scaled(DRIVE, 10.0), 5.5, mend_s=2.5, operator={2700: wire.Operator.RESET})
+    assert came.over_s <= AT_MOST_S
+    assert came.at_end == pytest.approx(1.0, abs=0.15)
 
 
 def test_noise_that_rises_a_hundredfold_is_learnt_anew() -> None:

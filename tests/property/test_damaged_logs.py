@@ -74,7 +74,7 @@ def test_a_cut_costs_only_the_open_chunk(tmp_path: Path, share: float) -> None:
         return
     result = recover(path, saved)
     again = read_run(saved)
-    assert again.damage == Damage(0, 0, closed=True)
+    assert again.damage._replace(before="") == Damage(0, 0, closed=True)
     for name in TABLES:
         assert getattr(again, name).tobytes() == getattr(run, name).tobytes()
     assert again.headers == run.headers

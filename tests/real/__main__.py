@@ -8,11 +8,12 @@ from pathlib import Path
 
 from diagnosis.diagnose import diagnose
 from diagnosis.evidence.folder import load_evidence
+from diagnosis.processes import one_thread
 from diagnosis.report.page import write_report
 from diagnosis.result import to_json
 from tests.real.evidences import AXIS, EVIDENCES, MISSING, SLIDER
 from tests.real.known import known
-from tests.real.table import lines, of_relations
+from tests.real.table import lines, of_latent, of_relations
 
 parser = argparse.ArgumentParser(prog="python -m tests.real", description=__doc__)
 parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(EVIDENCES)}; all if left out")
@@ -22,6 +23,7 @@ parser.add_argument("--known", action="store_true", help="only what plain rulers
 parser.add_argument(
     "--relations", action="store_true", help="only the relations between channels, without a simulation"
 )
+parser.add_argument("--latent", action="store_true", help="only what the friction goes with, without a simulation")
 parser.add_argument("--jobs", type=int, default=1)
 
 if __name__ == "__main__":
@@ -34,13 +36,13 @@ if __name__ == "__main__":
     if told.known:
         print("\n".join(known()))
         sys.exit()
-    if told.relations:
+    if told.relations or told.latent:
+        of_evidence = of_relations if told.relations else of_latent
         for name in told.names or EVIDENCES:
-            with tempfile.TemporaryDirectory() as folder:
+            with tempfile.TemporaryDirectory() as folder, one_thread():
                 EVIDENCES[name](Path(folder))
-                print(
-                    "\n".join([name, *(f"  {line}" for line in of_relations(load_evidence(Path(folder))))]), flush=True
-                )
+                shown = of_evidence(load_evidence(Path(folder)))
+                print("\n".join([name, *(f"  {line}" for line in shown)]), flush=True)
         sys.exit()
     told.out.mkdir(parents=True, exist_ok=True)
     results = {}

@@ -3,8 +3,11 @@
 from bridge.units import percent, times
 from diagnosis.evidence.folder import Evidence
 from diagnosis.gap.prepare import prepare
+from diagnosis.latent.answer import latent_of
 from diagnosis.relations.answer import Answered, relations_of
 from diagnosis.relations.decide import decision_of
+from diagnosis.report.latent_block import latent_shares
+from diagnosis.report.relation_words import share_in_words
 from diagnosis.report.words import estimate_in_words, headline
 from diagnosis.result import Diagnosis, Shrinkage
 
@@ -47,6 +50,16 @@ def of_relations(evidence: Evidence) -> list[str]:
         for one in decision.outside
     ]
     return [*said, *(f"{one.name}: left out: {one.why}" for one in relations.missing)]
+
+
+def of_latent(evidence: Evidence) -> list[str]:
+    """What the friction goes with: what differs on the held-out runs, and the shares of it."""
+    said: list[str] = []
+    for one in latent_of(evidence.rig, prepare(evidence)):
+        once = "" if one.revisited else "; each place once"
+        said.append(f"{one.signal}: {one.differs:.3g} N differ in {one.rows} rows, noise {one.noise:.2g}{once}")
+        said += [f"  {share_in_words(share)}" for share in latent_shares([one])]
+    return said
 
 
 def _relation(one: Answered) -> list[str]:

@@ -43,6 +43,13 @@ def processes(endpoint: str, log: Path) -> Iterator[dict[str, subprocess.Popen[s
             process.communicate()
 
 
+def life_of(process: subprocess.Popen[str]) -> list[str]:
+    """What a process that has ended told a person of its life."""
+    assert process.stderr is not None
+    words = [line.split()[0] for line in process.stderr.read().splitlines()]
+    return [word for word in words if word in {"waiting", "joined", "running", "ended"}]
+
+
 def await_commands(endpoint: str) -> None:
     inbox = Inbox(1000)
     with Bus(BusConfig(endpoint=endpoint), "viewer", lockstep=False, patience_s=60.0) as viewer:
@@ -62,7 +69,10 @@ def test_a_rig_that_is_killed_and_started_again_is_taken_up_again(tmp_path: Path
             subprocess.run([*COMMAND, "plant", *settings], timeout=60, check=False, capture_output=True).returncode == 0
         )
         ends = {role: started[role].wait(20) for role in ("controller", "recorder")}
+        said = {role: life_of(started[role]) for role in ends}
     assert ends == {"controller": 0, "recorder": 0}
+    assert said["controller"] == ["waiting", "joined", "running", "waiting", "joined", "ended"]
+    assert said["recorder"] == ["waiting", "waiting", "joined", "running", "ended"]
     data = read_run(log)
     codes = [event.code for event in data.events if event.source == "controller"]
     assert [code for code in codes if code in {"RIG_RESTARTED", "RIG_BACK"}] == ["RIG_RESTARTED", "RIG_BACK"]

@@ -1,8 +1,11 @@
-"""What a run said on stderr, but for what depends on this machine: the priority that it grants, how long judging takes."""
+"""What a command said on stderr, but for its life, and what depends on this machine: its priority, how long judging takes."""
 
-_OF_THE_MACHINE = ("stickslip: warning: normal scheduling", "judging the log; ")
+_LEFT_OUT = (
+    *("stickslip: warning: normal scheduling", "judging the log; "),
+    *("waiting  for ", "joined   ", "running  ", "ended    "),
+)
 
 
 def told(err: str) -> list[str]:
     """Its lines."""
-    return [line for line in err.strip().splitlines() if not line.startswith(_OF_THE_MACHINE)]
+    return [line for line in err.strip().splitlines() if not line.startswith(_LEFT_OUT)]

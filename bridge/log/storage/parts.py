@@ -16,7 +16,8 @@ from bridge.log.storage.chain import CHAIN, Chain, Stretch, chain_of
 
 PART = "part"  # the metadata record of every file but the first
 RECOVERED = "recovered"  # the metadata record of a file that `stickslip log recover` wrote; before the record above
-OF_FILES = frozenset({CHAIN, PART, RECOVERED})  # what a file says of itself and not of its run
+LOST = "lost"  # the metadata record at the end of such a file, where the log that it was saved from was not whole
+OF_FILES = frozenset({CHAIN, PART, RECOVERED, LOST})  # what a file says of itself and not of its run
 _BEGINNING_BYTES = 1 << 21  # within which the first link is: definitions, configurations and one chunk
 
 

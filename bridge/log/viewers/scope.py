@@ -107,7 +107,8 @@ class ScopeMaker:
 
     def _made(self, channels: Mapping[str, int], last: bool) -> Rows | None:
         waiting, self._waiting, self._blocks_waiting = self._waiting, [], 0
-        data = np.frombuffer(b"".join([data for data, _ in waiting]), np.uint8)
+        joined = waiting[0][0] if len(waiting) == 1 else b"".join([data for data, _ in waiting])
+        data = np.frombuffer(joined, np.uint8)
         begins = np.cumsum([0, *(len(data) for data, _ in waiting)])
         for said in self._said:
             starts, _ = _places([indexes[said.topic] for _, indexes in waiting], begins)

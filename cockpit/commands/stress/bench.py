@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from bridge.files import write_whole
-from cockpit.commands.json_option import Json, JsonGroup, carry_out, tell
+from cockpit.commands.as_json.option import Json, JsonGroup, carry_out, tell
 from cockpit.run.child_process import end_like_ctrl_c
-from cockpit.run.writable import PAGE, check_output, writing
+from cockpit.run.writable import PAGE, PICTURE, check_output, writing
 
 bench_app = typer.Typer(
     cls=JsonGroup, help="How good is the controller? Judged by what truly happens on made rigs.", no_args_is_help=True
@@ -24,6 +24,10 @@ def bench_control(
     small: Annotated[bool, typer.Option("--small", help="The small part of the bank alone, some seconds.")] = False,
     rivals: Annotated[bool, typer.Option(help="Run the rules that need no controller, too.")] = True,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one .html file.")] = None,
+    axes: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="FILE", help="Draw the runs over feed, stiffness and noise: .png, .svg or .pdf."),
+    ] = None,
     as_json: Json = None,
 ) -> None:
     """Run the controller on the bank, and judge it by the plant's truth; exit status 3: it misses a bar."""
@@ -31,13 +35,15 @@ def bench_control(
     def work() -> int:
         from joblib import cpu_count
 
-        from cockpit.bank.result import bench, in_words
+        from cockpit.bank.result import OWN, bench, in_words
         from cockpit.bank.scenario import chosen, load_bank
         from cockpit.commands.diagnose_output import watched
 
         end_like_ctrl_c()
         if report is not None:
             check_output("--report", report, PAGE)
+        if axes is not None:
+            check_output("--map", axes, PICTURE)
         bank = chosen(load_bank(), only, small)
         with watched() as progress:
             result = bench(bank, rivals, jobs or cpu_count(), lambda share, line: progress(line, share))
@@ -46,7 +52,13 @@ def bench_control(
 
             with writing(report):
                 write_page(result, report)
-        tell(as_json, result.as_json(), [*in_words(result), *([f"report     {report}"] if report else [])], indent=1)
+        if axes is not None:
+            from cockpit.bank.axes_map import draw
+
+            with writing(axes):
+                draw(result.scenarios, [one.figures for one in result.done if one.figures.subject == OWN], axes)
+        written = [f"{name:<11}{path}" for name, path in (("report", report), ("map", axes)) if path is not None]
+        tell(as_json, result.as_json(), [*in_words(result), *written], indent=1)
         return 0 if result.passed else 3
 
     carry_out(work, as_json)

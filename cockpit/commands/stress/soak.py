@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
-from cockpit.commands.json_option import Json, carry_out, tell
+from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.commands.options import (
     Certs,
     Endpoint,

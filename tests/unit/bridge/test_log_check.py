@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from bridge.faults import Fault
 from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
+from bridge.log.recover import recover
 from cockpit.commands.log import log_app
 from cockpit.judge.verdict import judge
 from cockpit.judge.verdict_words import in_words
@@ -206,3 +207,13 @@ def test_the_verdict_counts_the_blocks_of_a_damaged_chunk(tmp_path: Path, chunk:
     assert (told.lost_blocks, told.all_losses_known) == (lost, known)
     expected = f"{lost} LOST" if known else "how many are lost is not known"
     assert f"blocks   {400 - lost}, {expected}" in "\n".join(in_words(told))
+
+
+def test_a_log_that_was_saved_says_what_had_been_lost(tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(short_log()[: len(short_log()) * 2 // 3])
+    for path, out in ((cut, tmp_path / "saved.mcap"), (tmp_path / "saved.mcap", tmp_path / "again.mcap")):
+        recover(path, out)
+        assert "cut.mcap: " in kinds(out)["recovered"]
+        assert "bytes of an open chunk" in kinds(out)["recovered"]
+        assert judge(out).all_losses_known is False

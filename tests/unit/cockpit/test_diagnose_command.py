@@ -19,10 +19,6 @@ from tests import made_up
 @pytest.fixture(autouse=True)
 def stand_in(monkeypatch):
     monkeypatch.setattr(many, "real_diagnose", made_up.quick)
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def diagnose(*arguments):
@@ -265,7 +261,7 @@ def test_a_cluster_without_the_package_is_one_line(tmp_path, monkeypatch):
 
 
 def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
-    def interrupted(evidence, progress, jobs):
+    def interrupted(evidence, progress, jobs, budget_s=None):
         os.kill(os.getpid(), signal.SIGTERM)
         raise AssertionError("not interrupted")
 
@@ -278,7 +274,7 @@ def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
 def test_the_answer_is_said_whatever_cannot_be_written(tmp_path):
     """A folder appears where the JSON goes, while the diagnosis works: report and words are there all the same."""
 
-    def in_the_way(evidence, progress, jobs):
+    def in_the_way(evidence, progress, jobs, budget_s=None):
         (tmp_path / "a.json").mkdir()
         return made_up.quick(evidence, progress, jobs)
 
@@ -341,7 +337,7 @@ def test_a_report_that_cannot_be_written_ends_no_other(tmp_path):
 
 
 def test_json_on_stdout_stays_one_whatever_else_cannot_be_written(tmp_path, monkeypatch):
-    def in_the_way(evidence, progress, jobs):
+    def in_the_way(evidence, progress, jobs, budget_s=None):
         (tmp_path / "a.html").mkdir()
         return made_up.quick(evidence, progress, jobs)
 

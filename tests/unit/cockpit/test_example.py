@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from cockpit.cli import app
-from cockpit.commands.schemas import FORMATS
+from cockpit.commands.as_json.schemas import FORMATS
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.synthetic import folder as making
 from diagnosis.synthetic.protocols import PROTOCOLS, RunPlan
@@ -24,10 +24,6 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Two runs of a second, made in an empty working folder."""
     monkeypatch.setitem(PROTOCOLS, "ladder", SHORT)
     monkeypatch.chdir(tmp_path)
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def example(*arguments: str):

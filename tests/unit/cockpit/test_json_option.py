@@ -14,7 +14,7 @@ from bridge.files import strict_json
 from bridge.log.finding import Finding
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
-from cockpit.commands.json_option import with_places
+from cockpit.commands.as_json.option import with_places
 from tests.logs import short_log
 
 pytestmark = pytest.mark.slow

@@ -183,3 +183,12 @@ def test_rows_that_go_back_and_gaps_are_told(tmp_path: Path) -> None:
     path = table_of(tmp_path / "b.csv", "Time (s),Force (N)", np.tile(t_s, 2), np.tile(force_N, 2))
     result = CliRunner().invoke(app, ["look", str(path), "--json"])
     assert "4000 rows not later than the rows before" in json.loads(result.stdout)["line"]
+
+
+def test_a_torque_is_told_as_one(tmp_path: Path) -> None:
+    text = tribometer(tmp_path).read_text(encoding="latin-1").replace("Reibkraft [N]", "Torque [N m]")
+    turned = tmp_path / "turned.csv"
+    turned.write_text(text.replace(";94,5", "").replace(";Normalkraft [N]", ""), encoding="latin-1")
+    result = CliRunner().invoke(app, ["look", str(turned), "--json"])
+    texts = " ".join(one["text"] for one in json.loads(result.stdout)["findings"])
+    assert "'Torque [N m]' is a torque: read N as N m" in texts

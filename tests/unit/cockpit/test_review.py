@@ -12,6 +12,9 @@ from typer.testing import CliRunner
 
 from bridge.log.logfile import read_run
 from cockpit.cli import app
+from cockpit.judge.verdict import Phase, judge
+from cockpit.judge.verdict_words import headline
+from cockpit.review.differences import parameters_of
 from cockpit.review.page import write_review
 from tests.logs import Tables, doctored, short_log, tables_of, write
 from tests.unit.cockpit.test_figures import sawtooth_log
@@ -114,6 +117,7 @@ def test_measured_data_of_another_program_have_a_page(tmp_path: Path) -> None:
     assert call("review", path).exit_code == 0
     data = data_in(tmp_path / "measured.html")
     assert len(data["logs"][0]["slips"]) == 4
+    assert data["logs"][0]["good"] is None  # there is no controller that could be judged
     assert [panel["title"] for panel in data["panels"]] == ["Drive force"]
 
 
@@ -127,3 +131,24 @@ def test_a_log_without_a_block_and_a_third_log(tmp_path: Path, log: Path) -> Non
     third = call("review", log, log, log)
     assert third.exit_code == 2
     assert f"{log}: is a third log: a page has one or two; leave it out" in third.stderr
+
+
+def test_a_verdict_is_no_parameter(log: Path) -> None:
+    run = read_run(log)
+    run.headers["verdict"] = {"good": "true"}
+    assert not any(key.startswith("verdict") for key in parameters_of(run))
+
+
+def test_the_answer_says_why_a_run_without_a_slip_is_not_good(tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(short_log()[: len(short_log()) * 2 // 3])
+    still = Phase(
+        seconds=0.1,
+        slips=0,
+        slips_per_min=0.0,
+        swing_N=0.0,
+        mean_force_N=0.0,
+        following=None,
+        vibration_dose_mm2_per_s=0.0,
+    )
+    assert "; but cut: has no end" in headline(judge(cut)._replace(after=still, untested="", alone=None))

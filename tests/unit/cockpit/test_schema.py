@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from bridge.files import strict_json
 from cockpit.cli import app
 from cockpit.commands import diagnose_output
-from cockpit.commands.schemas import FORMATS, JSON, TOML
+from cockpit.commands.as_json.schemas import FORMATS, JSON, TOML
 from cockpit.run.scenario_file import deploy_folder
 from diagnosis import diagnose_many as many
 from diagnosis.result import to_json

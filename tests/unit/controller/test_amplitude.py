@@ -1,7 +1,6 @@
 """The amplitude loop with an exciter of any gain behind any delay: what it learns, and that it never drives too far."""
 
 import math
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +9,7 @@ import pytest
 
 from bridge.config import validate
 from bridge.wire import stickslip_pb2 as wire
-from controller.amplitude import FIRST_SHARE, REMEMBERED, amplitude, listen
+from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
 from controller.codes import BLOCK
 from controller.config import ControllerConfig
 from controller.limits import allow
@@ -24,7 +23,13 @@ NOISE_MPS2 = 0.0015
 
 
 def run(
-    steps: int, delay: int, gain: Callable[[int], float], block_s: float = 1e-3, silent_s: float = SILENT_S
+    steps: int,
+    delay: int,
+    gain: Callable[[int], float],
+    block_s: float = 1e-3,
+    silent_s: float = SILENT_S,
+    later: Callable[[int], int] = lambda _: 0,
+    wanted: Callable[[int], float] = lambda _: WANTED_MPS,
 ) -> tuple[Any, Any, Any]:
     """Parameters, memory, and true v_a of each step [m/s]: `silent_s` without, then with a vibration wanted.
 
@@ -34,6 +39,8 @@ def run(
         gain: delivered over commanded amplitude at a step.
         block_s: length of a block.
         silent_s: from the start, in which the noise is learnt.
+        later: blocks that a command takes beyond `delay`, at a step.
+        wanted: v_a at a step [m/s], after the silence.
 
     """
     samples = round(block_s / 5e-5)
@@ -49,20 +56,20 @@ def run(
     omega = 2.0 * math.pi * s.wanted_Hz
     rolled_off = math.sqrt(1.0 + (s.wanted_Hz / p.accel_bandwidth_Hz) ** 2)
     chance = np.random.default_rng(1)
-    on_its_way = deque([0.0] * (delay + 1))
+    sent_m = [0.0]
     now_m, true_mps = 0.0, []
     for step in range(steps):
-        before_m, now_m = now_m, on_its_way.popleft() * gain(step)
+        before_m, now_m = now_m, sent_m[max(step - delay - later(step), 0)] * gain(step)
         t_s = block_s * step + p.sample_s * np.arange(1, samples + 1)
         share = np.arange(1, samples + 1) / samples
         accel = (before_m + share * (now_m - before_m)) * omega**2 / rolled_off * np.cos(omega * t_s)
         measure(p, s, (accel + chance.normal(0.0, NOISE_MPS2, samples)).astype(np.float32))
-        listen(p, s)
-        s.wanted_velocity_mps = WANTED_MPS if step >= silent else 0.0
+        listen(p, s, False)
+        s.wanted_velocity_mps = wanted(step) if step >= silent else 0.0
         amplitude(p, s)
         allow(p, s, BLOCK, s.wanted_Hz, s.wanted_m)
-        s.sent_m[s.steps % REMEMBERED] = s.allowed_m
-        on_its_way.append(s.allowed_m)
+        note_sent(p, s)
+        sent_m.append(s.allowed_m)
         s.steps += 1
         true_mps.append(omega * now_m)
     return p, s, np.array(true_mps)
@@ -115,6 +122,50 @@ def test_a_gain_that_jumps_is_taken_back_within_a_delay(delay: int, factor: floa
     assert longest(true_mps > 1.3 * WANTED_MPS) <= 6 + delay
     assert true_mps[-100:] == pytest.approx(WANTED_MPS, rel=0.02)
     assert math.exp(s.log_gain[s.candidate]) == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize("late", [5, 20, 48])
+@pytest.mark.parametrize("gain", [0.5, 3.0])
+def test_a_delay_that_changes_while_v_a_does_teaches_no_gain(late: int, gain: float) -> None:
+    """It jumps up, and down again, and up at a third of the blocks, while the set point steps between 0.5 and 1 every 60 ms."""
+    settled = SILENT + 800
+    chance = np.random.default_rng(2)
+
+    def later(step: int) -> int:
+        if step < settled:
+            return 0
+        return late if step < settled + 700 else 0 if step < settled + 1000 else late * int(chance.random() < 0.3)
+
+    def wanted(step: int) -> float:
+        return WANTED_MPS * (0.5 if step > settled and step // 60 % 2 == 0 else 1.0)
+
+    _, s, true_mps = run(settled + 1700, 0, lambda _: gain, later=later, wanted=wanted)
+    assert math.exp(s.log_gain[s.candidate]) == pytest.approx(gain, rel=0.02)
+    assert true_mps[settled:].max() < 1.03 * WANTED_MPS
+    assert true_mps[settled + 120 :].min() > 0.97 * 0.5 * WANTED_MPS
+
+
+@pytest.mark.parametrize("late", [0, 20, 48])
+@pytest.mark.parametrize("factor", [0.75, 1.25])
+def test_a_gain_that_changes_is_learnt_whatever_the_delay_became(late: int, factor: float) -> None:
+    """What no command of the last 65 ms explains halves within each of them."""
+    jump = SILENT + 800
+    _, s, true_mps = run(
+        jump + 500, 0, lambda step: factor if step >= jump else 1.0, later=lambda step: late if step >= jump else 0
+    )
+    assert true_mps[-100:] == pytest.approx(WANTED_MPS, rel=0.03)
+    assert math.exp(s.log_gain[s.candidate]) == pytest.approx(factor, rel=0.03)
+
+
+def test_a_late_block_teaches_nothing() -> None:
+    p, s, _ = run(SILENT + 400, 0, lambda _: 1.0)
+    before = (s.log_gain[s.candidate], s.noise_mps, s.loop_delay_steps)
+    for _ in range(300):  # as a rig shows them that makes up for a pause: full v_a after 0.3 s of no command
+        s.allowed_m = 0.0
+        note_sent(p, s)
+        s.steps += 1
+        listen(p, s, True)
+    assert (s.log_gain[s.candidate], s.noise_mps, s.loop_delay_steps) == before
 
 
 def test_an_exciter_that_is_not_heard_is_told_and_driven_no_further_than_the_model() -> None:

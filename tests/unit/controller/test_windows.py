@@ -8,7 +8,7 @@ import pytest
 
 from bridge.config import validate
 from controller.config import ControllerConfig
-from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE, begin_anew, note_steps, push
+from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, begin_anew, note_steps, push
 from controller.records import build
 
 
@@ -17,9 +17,14 @@ def _start() -> tuple[Any, Any]:
     return params[0], state[0]
 
 
+def _bin(p: Any, s: Any, force_N: float, slide_m: float, drive_m: float, learn: bool) -> None:
+    s.fresh[:, 0] = force_N, slide_m, drive_m
+    push(p, s, 1, learn)
+
+
 def _push(p: Any, s: Any, force_N: Any) -> None:
     for value in force_N.tolist():
-        push(p, s, value, 0.0, 0.0, True)
+        _bin(p, s, value, 0.0, 0.0, True)
 
 
 def _of_white(p: Any, sigma_N: float, level: int) -> float:
@@ -30,7 +35,7 @@ def _of_white(p: Any, sigma_N: float, level: int) -> float:
 def test_a_ramp_has_its_slope_at_every_level() -> None:
     p, s = _start()
     for n in range(40000):
-        push(p, s, 3.0 + 5.0 * p.bin_s * n, -2e-3 * p.bin_s * n, 5e-4 * p.bin_s * n, True)
+        _bin(p, s, 3.0 + 5.0 * p.bin_s * n, -2e-3 * p.bin_s * n, 5e-4 * p.bin_s * n, True)
     seen = [level for level in range(p.levels) if s.pushed[level] >= BINS]
     assert max(p.window_s[level] for level in seen) > 3.0
     for level in seen:
@@ -86,7 +91,7 @@ def test_the_noise_outlives_a_new_beginning_and_what_was_not_measured_does_not_c
     begin_anew(s)
     assert (s.pushed == 0).all()
     for _ in range(2000):
-        push(p, s, 0.0, 0.0, 0.0, False)
+        _bin(p, s, 0.0, 0.0, 0.0, False)
     assert s.noise[FORCE, 2] == before
 
 
@@ -102,7 +107,22 @@ def test_a_swing_of_the_slide_that_force_and_position_tell_alike_is_no_noise(kno
     noise = chance.normal(0.0, 1.0, (3, len(t_s))) * np.array([[0.014], [3.5e-7], [3.5e-7]])
     for n in range(len(t_s)):
         force_N = 11700.0 * (drive_m[n] - slide_m[n])
-        push(p, s, force_N + noise[0, n], slide_m[n] + noise[1, n], drive_m[n] + noise[2, n], True)
+        _bin(p, s, force_N + noise[0, n], slide_m[n] + noise[1, n], drive_m[n] + noise[2, n], True)
     level = next(i for i in range(p.levels) if p.window_s[i] > 0.04)
     assert (s.noise[SLIDE, level] < 5e-6) == bool(known)
     assert (s.noise[FORCE, level] / 11700.0 < 5e-6) == bool(known)
+
+
+def test_bins_added_together_are_as_bins_added_one_by_one() -> None:
+    p, one = _start()
+    _, many = _start()
+    chance = np.random.default_rng(4)
+    for _ in range(300):
+        count = int(chance.integers(1, MOST_FRESH + 1))
+        bins = chance.normal(0.0, 1.0, (3, count))
+        for i in range(count):
+            _bin(p, one, *bins[:, i].tolist(), True)
+        many.fresh[:, :count] = bins
+        push(p, many, count, True)
+        for name in ("bins", "slope", "slope_before", "pushed", "sigma"):
+            np.testing.assert_array_equal(many[name], one[name])

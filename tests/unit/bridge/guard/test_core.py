@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from bridge.guard.check import tell_gain
 from bridge.guard.codes import (
     ACTIVE,
     ARMED,
@@ -17,6 +18,7 @@ from bridge.guard.codes import (
 )
 from bridge.guard.config import GuardConfig
 from bridge.guard.core import NO_COMMAND
+from bridge.wire.messages import sensor_block
 from tests.unit.bridge.guard.rigs import NANO, RUN, Rig
 
 
@@ -117,3 +119,17 @@ def test_an_exciter_without_a_slew_follows_at_once() -> None:
     rig = Rig(GuardConfig(), exciter=EXCITER._replace(slew_m_per_s=0.0))
     rig.run(1)
     assert rig.s.amplitude_m == pytest.approx(30 * NANO)
+
+
+def test_after_a_check_each_block_tells_one_of_its_gains() -> None:
+    rig = Rig(GuardConfig(check_Hz=[1000.0, 2000.0, 4000.0]))
+    rig.s.gain[:3] = 1.0, 2.0, 6.0
+    block = sensor_block(20).blank()
+    tell_gain(rig.p, rig.s, block[0])
+    assert (block[0]["check_Hz"], block[0]["check_gain"]) == (0.0, 0.0)
+    rig.s.verified = 1
+    told = []
+    for rig.s.block in range(3):
+        tell_gain(rig.p, rig.s, block[0])
+        told.append((float(block[0]["check_Hz"]), float(block[0]["check_gain"])))
+    assert told == [(1000.0, 1.0), (2000.0, 2.0), (4000.0, 6.0)]

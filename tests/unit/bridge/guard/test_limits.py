@@ -193,3 +193,23 @@ def test_a_velocity_that_the_drive_is_going_to_have_counts_before_it_moves() -> 
         rig.run(1)
     assert rig.s.state == ACTIVE
     assert rig.s.drive_mps == pytest.approx(5e-4, rel=0.01)
+
+
+def test_a_drive_position_that_jumps_leaves_the_velocity_as_it_was() -> None:
+    rig = Rig()
+    rig.run(100)
+    rig.v_d_mps = 1.0
+    rig.run(1)  # 1 mm in a block
+    rig.v_d_mps = 5e-4
+    rig.run(60)
+    assert rig.s.drive_mps == pytest.approx(5e-4, rel=0.05)
+
+
+def test_a_shake_that_is_over_soon_is_not_told_as_loud() -> None:
+    rig = Rig()
+    rig.run(90)
+    rig.gain = 6.0
+    rig.run(10)
+    assert (rig.s.state, rig.s.limit) == (ACTIVE, NO_CAUSE)
+    rig.run(30)
+    assert rig.s.limit == LOUD

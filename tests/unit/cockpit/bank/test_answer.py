@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cockpit.bank.answer import end_stroke
 from controller.codes import EXCITE, HELD, PROBE, SMOOTH, STICK, STICK_SEEN, WATCH
 from tests.unit.cockpit.bank.made import along, at_speed, judged, times
 from tests.unit.cockpit.bank.test_motion import stuck_from
@@ -94,3 +95,27 @@ def test_energies_are_sums_over_the_moving_time() -> None:
     assert said.state.drive_energy == pytest.approx(12.0 * 5e-4**2, rel=2e-3)
     assert said.state.settled_s == pytest.approx(2.0, abs=0.03)  # from 10 s after the first announcement
     assert said.state.excited_s == pytest.approx(12.0, abs=0.03)
+
+
+def test_quadrant_error_and_stick_at_a_change_of_sign() -> None:
+    """The drive turns at 2 s; the slide stands for 0.3 s more, overshoots to 40 um behind it, and follows 30 um behind."""
+    t_s = times(4.0)
+    drive_m = np.where(t_s < 2.0, t_s, 4.0 - t_s) * 1e-3
+    behind_m = np.where(t_s < 2.0, 3e-5, -3e-5)
+    stands = (t_s >= 2.0) & (t_s < 2.3)
+    # from 0.27 to 0.04 mm behind within 20 ms, then in 100 ms to 0.03 mm
+    behind_m = np.where(t_s >= 2.3, -np.interp(t_s, [2.3, 2.32, 2.42], [2.7e-4, 4e-5, 3e-5]), behind_m)
+    slide_m = np.where(stands, 2e-3 - 3e-5, drive_m - behind_m)
+    said = judged(slide_m, drive_m, slowest_mps=1e-3)
+    end_stroke(said.state)
+    assert said.state.turns == 1
+    assert said.state.turn_stick_s == pytest.approx(0.3, abs=3e-3)
+    # the mean from the end of the stick on: 20 ms of 155 um, 100 ms of 35 um, 1.58 s of 30 um
+    mean_m = (0.02 * 1.55e-4 + 0.1 * 3.5e-5 + 1.58 * 3e-5) / 1.7
+    assert said.state.quadrant_m == pytest.approx(2.7e-4 - mean_m, rel=0.02)
+
+
+def test_a_drive_that_never_turns_has_no_quadrant_error() -> None:
+    said = judged(at_speed(1.0), at_speed(1.0))
+    end_stroke(said.state)
+    assert (said.state.turns, said.state.quadrant_m, said.state.turn_stick_s) == (0.0, 0.0, 0.0)

@@ -14,7 +14,7 @@ from cockpit.bank.figures import Figures, refused
 from cockpit.bank.least import Least
 from cockpit.bank.scenario import chosen, load_bank
 from cockpit.cli import app
-from cockpit.commands.schemas import FORMATS
+from cockpit.commands.as_json.schemas import FORMATS
 
 BANK = load_bank()
 OWN = rules.NAMES[rules.CONTROLLER]

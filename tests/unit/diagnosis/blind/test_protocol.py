@@ -32,10 +32,6 @@ def stand_ins(monkeypatch):
     monkeypatch.setattr(strata, "_real_faults", lambda: 0)
     monkeypatch.setattr(strata, "UNCLEAR", (strata.Unclear(("force-sensor-gain", "drive-backlash"), ()),))
     monkeypatch.setattr(many, "real_diagnose", made_up.quick)
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def blind(*arguments):
@@ -268,7 +264,7 @@ def slow_run() -> None:
     app()
 
 
-def slow(evidence, progress, jobs):
+def slow(evidence, progress, jobs, budget_s=None):
     time.sleep(0.5)
     return made_up.quick(evidence, progress, jobs)
 
@@ -285,7 +281,7 @@ def test_a_case_that_fails_counts_as_wrong(made, monkeypatch):
     assert tool["false_alarms"]["value"] == 1.0
 
 
-def refusing(evidence, progress, jobs):
+def refusing(evidence, progress, jobs, budget_s=None):
     raise ZeroDivisionError("nothing to divide by")
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis.look.look import Known, look
+from diagnosis.look.words import cannot_tell
 from plant.config import RigConfig
 from plant.simulate import simulate
 from tests.unit.diagnosis.look.rival import eight_lines
@@ -141,3 +142,22 @@ def test_a_triangle_and_a_reversal_are_no_slips() -> None:
     turning = look(t_s, 14.5 * np.tanh(20.0 * np.cos(np.pi * t_s)) + noise_N, 5e-3 * np.sin(np.pi * t_s))
     assert turning is not None
     assert turning.slips == 0
+
+
+def test_a_drift_and_several_speeds_are_told_and_an_even_record_tells_neither() -> None:
+    def told(tops: list[float], speeds_mps: list[float]) -> str:
+        pieces: list[np.ndarray] = []
+        for top, speed_mps in zip(tops, speeds_mps, strict=True):
+            rise = round((top - 12.0) / (11_700.0 * speed_mps) * 2e3)
+            pieces += [np.linspace(12.0, top, rise), np.linspace(top, 12.0, 40)[1:-1]]
+        force_N = np.concatenate(pieces) + 0.01 * np.random.default_rng(3).standard_normal(sum(map(len, pieces)))
+        seen = look(np.arange(len(force_N)) / 2e3, force_N, None, Known(1e-3))
+        assert seen is not None
+        return "; ".join(cannot_tell(seen))
+
+    scatter = 17.0 + 0.1 * np.random.default_rng(5).standard_normal(30)
+    even = told(scatter.tolist(), [1e-3] * 30)
+    assert "no steady level" not in even
+    assert "no single speed" not in even
+    assert "the breakaway rises by 2.85 N" in told((scatter + np.linspace(0.0, 3.0, 30)).tolist(), [1e-3] * 30)
+    assert "no single speed: sticks climb by 11.7 to 23.5" in told(scatter.tolist(), [1e-3] * 15 + [2e-3] * 15)

@@ -92,6 +92,10 @@ def runs_fast(_: int, signals: Signals) -> None:
     signals["mass_accel_mps2"] = np.interp(T_S * (1.0 + 4e-4), T_S, signals["mass_accel_mps2"])
 
 
+def is_logged_apart(_: int, signals: Signals) -> None:
+    signals["drive_force_N"] = np.interp(T_S * (1.0 + 4e-4), T_S, signals["drive_force_N"])
+
+
 def drops_out(number: int, signals: Signals) -> None:
     for first in np.random.default_rng(number).integers(0, 7900, 12):
         signals["drive_force_N"][first : first + 10] *= 0.9
@@ -102,6 +106,7 @@ def drops_out(number: int, signals: Signals) -> None:
     [
         (saturates, "spring", "force-amplifier: from 1"),
         (runs_fast, "motion", "acceleration-clock: in each run"),
+        (is_logged_apart, "spring", "logger-clock: runs apart"),
         (drops_out, "spring", "in bursts"),
     ],
 )

@@ -142,11 +142,19 @@ def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
     rig = schema["$defs"]["RigTable"]
     # what an owner can hardly know is assumed
     rig |= (
-        {"required": [name for name in rig["required"] if not name.startswith(("contact", "viscous"))]}
+        {
+            "required": [
+                name for name in rig["required"] if not name.startswith(("contact", "viscous", "mass", "stribeck"))
+            ]
+        }
         if "required" in rig
         else {}
     )
-    numbers = [name for name in RigTable.model_fields if name not in {"drive", "tolerance", "radius_m"}]
+    numbers = [
+        name
+        for name in RigTable.model_fields
+        if name not in {"drive", "tolerance", "radius_m", "force_per_current_N_per_A"}
+    ]
     tolerance = rig["properties"]["tolerance"]
     share = {"type": "number", "minimum": 0.0, "maximum": 1.0}
     tolerance |= {"properties": dict.fromkeys(numbers, share), "additionalProperties": False}
@@ -157,7 +165,7 @@ def _with_channels(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _diagnosis_type() -> Any:
-    from cockpit.commands.json_types import table
+    from cockpit.commands.as_json.types import table
     from diagnosis.result import FORMAT, Candidate, Diagnosis, Estimate
 
     candidate = table(Candidate, {"form": NotRequired[str], "parameters": NotRequired[dict[str, Estimate]]})
@@ -165,14 +173,14 @@ def _diagnosis_type() -> Any:
 
 
 def _diagnosis() -> dict[str, Any]:
-    from cockpit.commands.json_types import schema_of
+    from cockpit.commands.as_json.types import schema_of
 
     return schema_of(_diagnosis_type())
 
 
 def _diagnoses() -> dict[str, Any]:
+    from cockpit.commands.as_json.types import objects, schema_of
     from cockpit.commands.diagnose_output import MANY_FORMAT
-    from cockpit.commands.json_types import objects, schema_of
 
     fault = objects("FolderFault", {"fault": str, "line": str})
     one = {"evidence": str, "diagnosis": NotRequired[_diagnosis_type()], "fault": NotRequired[fault]}
@@ -180,7 +188,7 @@ def _diagnoses() -> dict[str, Any]:
 
 
 def _blind_scores() -> dict[str, Any]:
-    from cockpit.commands.json_types import objects, schema_of
+    from cockpit.commands.as_json.types import objects, schema_of
     from diagnosis.blind.pooling import FORMAT
     from diagnosis.blind.scoring import Scores
 
@@ -192,7 +200,7 @@ def _bench_control() -> dict[str, Any]:
     from cockpit.bank.bars import Bar
     from cockpit.bank.figures import Figures
     from cockpit.bank.least import Least
-    from cockpit.commands.json_types import objects, schema_of
+    from cockpit.commands.as_json.types import objects, schema_of
 
     fields = {"passed": bool, "bars": list[Bar], "runs": list[Figures], "least": dict[str, Least]}
     fields |= {"step_cost_ratio": float, "elapsed_s": float}
@@ -200,36 +208,38 @@ def _bench_control() -> dict[str, Any]:
 
 
 def _fault() -> dict[str, Any]:
-    from cockpit.commands.json_types import objects, schema_of
+    from cockpit.commands.as_json.types import objects, schema_of
 
     return schema_of(objects("Fault", {"fault": str, "line": str, "exit_status": int}))
 
 
 def _run() -> dict[str, Any]:
-    from cockpit.commands.json_types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of, table
     from cockpit.judge.margins import Margins
+    from cockpit.judge.phases import Phase
     from cockpit.judge.verdict import RunVerdict
 
     more = {"good": bool, "rig": str, "effects": NotRequired[list[str]], "loop": NotRequired[Margins]}
+    more |= {"without": NotRequired[Phase]}
     return schema_of(table(RunVerdict, more))
 
 
 def _log_info() -> dict[str, Any]:
-    from cockpit.commands.json_types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of, table
     from cockpit.judge.verdict import RunVerdict
 
     return schema_of(table(RunVerdict, {"good": bool}))
 
 
 def _plot() -> dict[str, Any]:
-    from cockpit.commands.json_types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of, table
     from cockpit.judge.verdict import RunVerdict
 
     return schema_of(table(RunVerdict, {"good": bool, "picture": str, "data": str | None}))
 
 
 def _review() -> dict[str, Any]:
-    from cockpit.commands.json_types import objects, schema_of, table
+    from cockpit.commands.as_json.types import objects, schema_of, table
     from cockpit.judge.verdict import RunVerdict
 
     return schema_of(objects("Review", {"page": str, "logs": list[table(RunVerdict, {"good": bool})]}))
@@ -237,7 +247,7 @@ def _review() -> dict[str, Any]:
 
 def _look() -> dict[str, Any]:
     from bridge.log.finding import Finding
-    from cockpit.commands.json_types import objects, schema_of
+    from cockpit.commands.as_json.types import objects, schema_of
 
     number = objects("Number", {"value": float, "interval_90": list[float | None], "unit": str})
     of_speed = {"speed_mps": float, "times": int, "mean_N": number, "breakaway_N": number | None}
@@ -259,7 +269,7 @@ def _look() -> dict[str, Any]:
 
 def _log_recover() -> dict[str, Any]:
     from bridge.log.damage import Damage
-    from cockpit.commands.json_types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of, table
 
     return schema_of(table(Damage, {"messages": int, "attachments": int, "out": str}))
 
@@ -267,14 +277,14 @@ def _log_recover() -> dict[str, Any]:
 def _explain() -> dict[str, Any]:
     from bridge.wire.event_codes import EventCode
     from bridge.wire.words import Word
+    from cockpit.commands.as_json.types import schema_of
     from cockpit.commands.explain import Meaning
-    from cockpit.commands.json_types import schema_of
 
     return schema_of(list[Meaning | Word | EventCode])
 
 
 def _reproduce() -> dict[str, Any]:
-    from cockpit.commands.json_types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of, table
     from cockpit.paper.page import ReproduceResult
 
     return schema_of(table(ReproduceResult, {"passed": bool, "verdict": str}))
@@ -287,14 +297,14 @@ def _faults() -> dict[str, Any]:
 
 
 def _soak() -> dict[str, Any]:
-    from cockpit.commands.json_types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of, table
     from cockpit.run.soak import Soaked
 
     return schema_of(table(Soaked, {"good": bool}))
 
 
 def _bench_faults() -> dict[str, Any]:
-    from cockpit.commands.json_types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of, table
     from cockpit.faults.bench import FaultBench
 
     return schema_of(table(FaultBench, {"counts": dict[str, int], "worse_than_known": list[str]}))
@@ -306,7 +316,7 @@ def _result_of(module: str, kind: str, many: bool = False) -> Callable[[], dict[
     def make() -> dict[str, Any]:
         from importlib import import_module
 
-        from cockpit.commands.json_types import schema_of
+        from cockpit.commands.as_json.types import schema_of
 
         made = getattr(import_module(module), kind)
         return schema_of(list[made] if many else made)

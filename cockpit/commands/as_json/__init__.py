@@ -1,0 +1,1 @@
+"""Results as JSON: the option `--json`, types, and the schemas of what is printed."""

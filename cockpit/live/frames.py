@@ -1,0 +1,29 @@
+"""Frames for a browser: a length, JSON, then columns of float32, all little-endian."""
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.files import strict_json
+
+_ALIGNED = 4  # a browser reads floats only at multiples of their length
+
+
+def frame(kind: str, table: dict[str, Any], columns: npt.NDArray[np.float32] | None = None) -> bytes:
+    """The bytes of one frame.
+
+    Args:
+        kind: what it is, for the page.
+        table: what JSON can hold.
+        columns: [columns, values]; the JSON says how many of each.
+
+    """
+    rows, count = columns.shape if columns is not None else (0, 0)
+    told = {"kind": kind, **table, "rows": rows, "count": count}
+    text = json.dumps(strict_json(told), allow_nan=False, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % _ALIGNED)
+    data = np.ascontiguousarray(columns, "<f4").tobytes() if columns is not None else b""
+    return struct.pack("<I", len(text)) + text + data

@@ -1,0 +1,234 @@
+"""`stickslip serve`: one port of this computer with the page, the frames of a rig, and a person's words to it."""
+
+import asyncio
+import contextlib
+import http
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from bridge.faults import Fault
+from bridge.wire.messages import CHANNELS
+from bridge.wire.words import words
+from bridge.wire.zenoh_link import BusConfig
+from cockpit.figures.signals import SIGNALS
+from cockpit.live.buckets import COLUMNS, Buckets
+from cockpit.live.frames import frame
+from cockpit.live.gate import NO_METHOD, PAGE, refusal
+from cockpit.live.listener import Listener
+from cockpit.live.page import Page
+from cockpit.live.person import SCOPE, Words, wish_of
+from cockpit.live.trigger import Capture
+from cockpit.live.view import Step, View
+from cockpit.live.viewers import MOST_VIEWERS, Viewers
+from cockpit.review.panels import PANELS
+
+HOST = "127.0.0.1"
+PERIOD_S = 0.05  # of a frame
+_LATENCY_S = 1.0  # between two histograms
+_MOST_CONNECTIONS = 48  # those that say nothing are ended after `_OPEN_S`; further ones are refused
+_OPEN_S = 5.0
+_MOST_BYTES = 1024  # of a message of a page; the longest has a word and a token
+_MOST_WISHES = 4  # of one page that wait for an answer
+_HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",  # the buttons must not lie under those of another site
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Connection": "close",
+}
+
+
+def listening(port: int) -> socket.socket:
+    """A socket of this computer alone. Raises Fault ENDPOINT_BUSY."""
+    try:
+        return socket.create_server((HOST, port))
+    except (OSError, OverflowError) as error:
+        line = f"{HOST}:{port}: cannot listen there ({error})"
+        raise Fault("ENDPOINT_BUSY", f"{line}; end the process that holds it, or choose another --port") from None
+
+
+class Server:
+    """The page of one rig.
+
+    Args:
+        bus: of the rig.
+        token: that arms from the page.
+        port: that it listens at.
+
+    """
+
+    def __init__(self, bus: BusConfig, token: str, port: int) -> None:
+        self._port = port
+        self._words = Words(bus, token)
+        self._listener = Listener(bus)
+        self._view = View(self._listener, bus.endpoint)
+        self._page = Page(port)
+        self._viewers = Viewers()
+        self._connections = 0
+        self._latency_s = 0.0
+
+    def run(self, sock: socket.socket, stop: threading.Event, ready: Callable[[], None]) -> None:
+        """Serve until `stop` is set; `ready` is called when pages are answered."""
+        # what strangers send is told in no log: an error of theirs is theirs
+        logger = logging.getLogger("stickslip.live")
+        logger.addHandler(logging.NullHandler())
+        logger.propagate = False
+        with self._listener:
+            asyncio.run(self._serve(sock, stop, ready, logger))
+
+    async def _serve(
+        self, sock: socket.socket, stop: threading.Event, ready: Callable[[], None], logger: logging.Logger
+    ) -> None:
+        outer = self
+
+        class Counted(ServerConnection):
+            """A connection that is refused at once where there are too many."""
+
+            def connection_made(self, transport: asyncio.BaseTransport) -> None:
+                outer._connections += 1
+                super().connection_made(transport)
+                if outer._connections > _MOST_CONNECTIONS:
+                    self.transport.abort()
+
+            def connection_lost(self, exc: Exception | None) -> None:
+                outer._connections -= 1
+                super().connection_lost(exc)
+
+        async with serve(
+            self._attend,
+            sock=sock,
+            process_request=self._answer,
+            create_connection=Counted,
+            compression=None,  # of numbers that are never the same it saves little, and costs the server's time
+            max_size=_MOST_BYTES,
+            max_queue=_MOST_WISHES,
+            open_timeout=_OPEN_S,
+            ping_interval=10.0,
+            ping_timeout=20.0,
+            close_timeout=1.0,
+            server_header=None,
+            logger=logger,
+        ):
+            ready()
+            due_s = time.monotonic()
+            while not stop.is_set():
+                self._tick()
+                due_s = max(due_s + PERIOD_S, time.monotonic())
+                await asyncio.sleep(due_s - time.monotonic())
+
+    def _answer(self, _connection: ServerConnection, request: Request) -> Response | None:
+        """The page, or why not; None for a web socket that is let in."""
+        headers = request.headers
+        upgrades = "websocket" in headers.get("Upgrade", "").lower()
+        names = headers.get_all("Host"), headers.get_all("Origin")
+        no = NO_METHOD if request.method != "GET" else refusal(request.path, *names, self._port, upgrades)
+        if no is not None:
+            body = f"{no.line}\n".encode()
+            told = _HEADERS | {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))}
+            return Response(no.status, http.HTTPStatus(no.status).phrase, Headers(told), body)
+        if request.path != PAGE:
+            return None
+        told = _HEADERS | {"Content-Security-Policy": self._page.policy, "Content-Length": str(len(self._page.body))}
+        return Response(200, "OK", Headers(told), self._page.body)
+
+    def _tick(self) -> None:
+        step = self._view.step()
+        if not len(self._viewers):
+            return
+        if step.anew:
+            self._viewers.tell(frame("anew", self._grid()))
+        self._viewers.tell(self._now(step))
+        if step.capture is not None:
+            self._viewers.tell(_captured(step.capture))
+
+    def _grid(self) -> dict[str, Any]:
+        run = self._view.run
+        return {"step_s": run.buckets.step_s if run is not None else None}
+
+    def _now(self, step: Step) -> bytes:
+        """What is new, and the state of this instant."""
+        told = self._view.now() | {"events": [event._asdict() for event in step.events]}
+        told |= {"viewers": len(self._viewers), "viewers_dropped": self._viewers.dropped}
+        if time.monotonic() > self._latency_s + _LATENCY_S and self._view.run is not None:
+            self._latency_s = time.monotonic()
+            told["latency"] = self._view.run.tally.latency()
+        return _bucketed("now", told, step.buckets)
+
+    def _first(self) -> list[bytes]:
+        """What a page gets when it opens: what things are called, the last minute, the events and the last capture."""
+        run, view = self._view.run, self._view
+        kept = run.buckets.kept() if run is not None else None
+        told = {
+            "columns": COLUMNS,
+            "channels": CHANNELS,
+            "panels": [_panel(panel) for panel in PANELS],
+            "words": [one._asdict() for one in words()],
+            **self._grid(),
+        }
+        events = [event._asdict() for event in view.events]
+        latency = run.tally.latency() if run is not None else None
+        first = [frame("hello", told), _bucketed("now", view.now() | {"events": events, "latency": latency}, kept)]
+        return [*first, *([_captured(view.capture)] if view.capture is not None else [])]
+
+    async def _attend(self, socket: ServerConnection) -> None:
+        """Show a page the rig, and do what it asks for."""
+        tasks: set[asyncio.Task[None]] = set()
+        async with contextlib.AsyncExitStack() as seen:
+            if len(self._viewers) < MOST_VIEWERS:
+                await seen.enter_async_context(self._viewers.added(socket, self._first()))
+            else:
+                line = f"{MOST_VIEWERS} pages are open already: close one. STOP works here, too"
+                await socket.send(frame("full", {"line": line}))
+            with contextlib.suppress(ConnectionClosed):
+                async for message in socket:
+                    wish = wish_of(message)
+                    if wish is None:
+                        return
+                    if wish.word == SCOPE:
+                        self._view.take_now()
+                        continue
+                    while len(tasks) >= _MOST_WISHES:
+                        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+                    task = asyncio.create_task(self._obey(socket, wish))
+                    tasks.add(task)
+                    task.add_done_callback(tasks.discard)
+
+    async def _obey(self, socket: ServerConnection, wish: Any) -> None:
+        answer = await self._words.say(wish)
+        with contextlib.suppress(ConnectionClosed):
+            await socket.send(frame("answer", answer))
+
+
+def _bucketed(kind: str, told: dict[str, Any], buckets: Buckets | None) -> bytes:
+    if buckets is None:
+        return frame(kind, told)
+    return frame(kind, told | {"first": buckets.first}, buckets.values)
+
+
+def _captured(capture: Capture) -> bytes:
+    told = {name: value for name, value in capture._asdict().items() if name != "samples"}
+    return frame("capture", told, capture.samples)
+
+
+def _panel(panel: Any) -> dict[str, Any]:
+    signals = [SIGNALS[name] for name in panel.signals]
+    return {
+        "title": panel.title,
+        "hint": panel.hint,
+        "open": panel.is_open,
+        "unit": signals[0].unit,
+        "axis": signals[0].axis,
+        "curves": [one._asdict() for one in signals],
+    }

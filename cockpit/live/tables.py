@@ -1,0 +1,55 @@
+"""Messages of one topic as one array, as they came within some hundredths of a second."""
+
+import contextlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bridge.faults import Fault
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import CHANNELS, Layout, Records, sensor_block
+from bridge.wire.payloads import parsed
+from bridge.wire.topics import SENSORS
+
+_MOST_SAMPLES = 400  # of a channel in a block
+
+
+def table_of(layout: Layout, payloads: Sequence[bytes], topic: str) -> Records:
+    """The messages, [messages]; those that cannot be read are left out."""
+    if all(len(payload) == layout.size for payload in payloads):
+        joined = np.frombuffer(b"".join(payloads), np.uint8).reshape(len(payloads), layout.size)
+        if layout.all_canonical(joined):
+            return joined.reshape(-1).view(layout.dtype)
+    good: list[bytes] = []
+    for payload in payloads:
+        with contextlib.suppress(Fault):
+            good.append(layout.canonical(payload, topic))
+    return np.frombuffer(b"".join(good), layout.dtype)
+
+
+class SensorTables:
+    """Blocks of one rig, whose number of samples is that of a block that can be read, until none has that number."""
+
+    def __init__(self) -> None:
+        self._layout: Layout | None = None
+
+    def of(self, payloads: Sequence[bytes]) -> Records | None:
+        """The blocks of one number of samples, [blocks]; None where none can be read."""
+        for layout in (self._layout, None):
+            known = layout or next((sensor_block(samples) for samples in map(_samples, payloads) if samples), None)
+            table = table_of(known, payloads, SENSORS.name) if known is not None else None
+            if table is not None and len(table):
+                self._layout = known
+                return table
+        return None
+
+
+def _samples(payload: bytes) -> int:
+    """Samples of each channel in a block; 0 where it is none."""
+    with contextlib.suppress(Fault):
+        block: Any = parsed(wire.SensorBlock, payload, SENSORS.name)
+        lengths = {len(getattr(block, channel)) for channel in CHANNELS}
+        if len(lengths) == 1 and 0 < max(lengths) <= _MOST_SAMPLES:
+            return max(lengths)
+    return 0

@@ -1,0 +1,409 @@
+"""What a person is shown of a rig now: new buckets, events and captures, and the words and figures of this instant."""
+
+import collections
+import contextlib
+import functools
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from bridge.faults import Fault
+from bridge.log.pause_events import CORE_PAUSE, PAUSE
+from bridge.log.screen import Screen
+from bridge.plain import plain
+from bridge.units import counted
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.block_numbers import WINDOW
+from bridge.wire.complaints import Complaints
+from bridge.wire.event_codes import EVENTS, FAILURE, LETTERS, OUTSIDE, TRIPS, WEAK_REASONS, harms
+from bridge.wire.messages import APPLIED, TRACE, Records
+from bridge.wire.payloads import parsed
+from bridge.wire.words import words
+from bridge.wire.zenoh_link import Inbox, Received
+from cockpit.figures.signals import stroke_limits
+from cockpit.live.buckets import Bucketing, Buckets, block_numbers
+from cockpit.live.listener import Presence
+from cockpit.live.tables import SensorTables, table_of
+from cockpit.live.tally import Tally
+from cockpit.live.trigger import Capture, Scope
+
+SILENT_S = 0.5  # without a message from which its values are old; longer: what is past is shown as what is
+_AT_ONCE = 1 << 13  # messages of one step; more than may wait
+_FAR = 12_000  # buckets without a block, a minute, after which it is another run: nobody wants to see so long a hole
+_EVENTS_KEPT = 200
+_EVENTS_AT_ONCE = 50  # of one step; who says more is counted
+_LONGEST_TEXT = 500
+_SLIPS_S = 10.0  # over which the slips of late are counted
+# how the state is: in words for a person, in colours for a page
+GOOD, LOOK, BAD, OFF = "good", "look", "bad", "off"
+WAITING, LIVE, SILENT, LEFT, ENDED = "waiting", "live", "silent", "left", "ended"
+
+
+class Source(Protocol):
+    """Where messages come from: `cockpit.live.listener`, or a test."""
+
+    @property
+    def inbox(self) -> Inbox:
+        """Of the messages that came."""
+        ...
+
+    @property
+    def presence(self) -> Presence:
+        """Who is there."""
+        ...
+
+    @property
+    def headers(self) -> Mapping[str, Any]:
+        """The configurations of rig and controller, by role."""
+        ...
+
+
+class Said(NamedTuple):
+    """One event, as it is shown."""
+
+    t_s: float  # of the run
+    at: str  # time of day here
+    source: str
+    code: str
+    letter: str  # of NAMUR NE 107; empty for news
+    weight: str  # what the letter means
+    text: str
+    help: str
+
+
+class Step(NamedTuple):
+    """What is new since the last step."""
+
+    anew: bool  # another run began: what was shown is of an earlier one
+    buckets: Buckets | None
+    capture: Capture | None
+    events: list[Said]
+
+
+class Answer(NamedTuple):
+    """The state in one sentence."""
+
+    level: str  # GOOD, LOOK, BAD; OFF: there is nothing to be told of a rig now
+    text: str
+
+
+class _Run:
+    """All that begins anew with a run."""
+
+    def __init__(self, block_ns: int, dtype: np.dtype[Any]) -> None:
+        self.dtype = dtype  # of its blocks
+        self.buckets = Bucketing(block_ns)
+        self.scope = Scope(block_ns)
+        self.tally = Tally()
+        self.slips: collections.deque[tuple[float, int]] = collections.deque()
+        self.newest = {"sensors": -1, "trace": -1, "applied": -1}
+
+
+class View:
+    """Follows a source, step by step.
+
+    Args:
+        source: of the messages.
+        where: its endpoint, for words.
+        clock: the time [s].
+
+    """
+
+    def __init__(self, source: Source, where: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._source, self._where, self._clock = source, where, clock
+        self.unreadable = 0  # messages that are none, or of a stranger
+        self.pauses = 0  # of the machine, as the recorder tells them: many, and no news
+        self.run: _Run | None = None
+        self.events: collections.deque[Said] = collections.deque(maxlen=_EVENTS_KEPT)
+        self.capture: Capture | None = None
+        self._sensors = SensorTables()
+        self._screen = Screen(Complaints(self._note_strange, clock))
+        self._heard_s: dict[str, float] = {}
+        self._newest: dict[str, Records] = {}
+        self._ended_at_s: float | None = None  # time of the run of the rig's END
+        self._began_s = clock()
+
+    def _note_strange(self, _code: str, _text: str) -> None:
+        self.unreadable += 1
+
+    def step(self) -> Step:
+        """Take all that waits."""
+        waiting: dict[str, list[bytes]] = {"sensors": [], "trace": [], "applied": []}
+        said: list[Received] = []
+        for _ in range(_AT_ONCE):
+            received = self._source.inbox.get_nowait()
+            if received is None:
+                break
+            for one in self._screen.passed(received):
+                if one.topic.name in waiting:
+                    waiting[one.topic.name].append(one.payload)
+                else:
+                    said.append(one)
+        anew = self._take_blocks(waiting["sensors"])
+        self._take("trace", waiting["trace"])
+        self._take("applied", waiting["applied"])
+        run = self.run
+        capture = run.scope.ready() if run is not None else None
+        self.capture = capture or (None if anew else self.capture)
+        return Step(anew, run.buckets.ready() if run is not None else None, capture, self._take_events(said))
+
+    def take_now(self) -> None:
+        """Trigger the scope by hand."""
+        if self.run is not None:
+            self.run.scope.take_now()
+
+    def _take_blocks(self, payloads: list[bytes]) -> bool:
+        """Take blocks; whether they begin another run."""
+        table = self._sensors.of(payloads)
+        if table is None:
+            return False
+        numbers = block_numbers("sensors", table)
+        anew = False
+        if self.run is not None:
+            steps = np.diff(numbers, prepend=self.run.newest["sensors"])
+            breaks = np.flatnonzero((steps < -WINDOW) | (steps > _FAR * self.run.buckets.blocks))
+            anew = bool(len(breaks)) or table.dtype != self.run.dtype
+            if anew:
+                begin = breaks[-1] if len(breaks) else 0
+                table, numbers, self.run = table[begin:], numbers[begin:], None
+        if self.run is None:
+            block_ns = _block_ns(table, numbers)
+            if block_ns is None:
+                return anew
+            self.run = _Run(block_ns, table.dtype)
+            self._ended_at_s = None
+            anew = True
+        keep = numbers > np.maximum.accumulate(np.append(self.run.newest["sensors"], numbers[:-1]))
+        table, numbers = table[keep], numbers[keep]
+        if not len(table):
+            return anew
+        self.run.newest["sensors"] = int(numbers[-1])
+        self._heard_s["sensors"] = self._clock()
+        self._newest["sensors"] = table[-1:]
+        self.run.buckets.add("sensors", table, numbers)
+        self.run.scope.add_blocks(table, numbers)
+        self.run.tally.add_blocks(numbers)
+        return anew
+
+    def _take(self, topic: str, payloads: list[bytes]) -> None:
+        if not payloads or self.run is None:
+            return
+        table = table_of(TRACE if topic == "trace" else APPLIED, payloads, topic)
+        if not len(table):
+            return
+        numbers = block_numbers(topic, table)
+        before = np.maximum.accumulate(np.append(self.run.newest[topic], numbers))
+        # a block far ahead is none of this run
+        keep = (numbers >= before[:-1]) & (numbers <= self.run.newest["sensors"] + self.run.buckets.blocks * 200)
+        table, numbers = table[keep], numbers[keep]
+        if not len(table):
+            return
+        self.run.newest[topic] = int(numbers[-1])
+        self._heard_s[topic] = self._clock()
+        self._newest[topic] = table[-1:]
+        self.run.buckets.add(topic, table, numbers)
+        if topic == "applied":
+            self.run.tally.add_applied(table)
+            return
+        self.run.tally.add_trace(table)
+        slips = table["slips"].astype(np.int64)
+        self.run.scope.add_slips(slips, numbers)
+        self.run.slips.append((self._clock(), int(slips[-1])))
+        while self.run.slips[0][0] < self._clock() - _SLIPS_S:
+            self.run.slips.popleft()
+
+    def _take_events(self, received: list[Received]) -> list[Said]:
+        found: list[Said] = []
+        for one in received[:_EVENTS_AT_ONCE]:
+            with contextlib.suppress(Fault):
+                event = parsed(wire.Event, one.payload, one.topic.name)
+                if event.code in (PAUSE, CORE_PAUSE):
+                    self.pauses += 1
+                else:
+                    found.append(self._said(event, one.topic.sender))
+        if len(received) > _EVENTS_AT_ONCE:
+            text = f"{len(received) - _EVENTS_AT_ONCE} more events came at once; the log has them"
+            found.append(self._event(0.0, "page", "FLOOD", text))
+        self.events.extend(found)
+        return found
+
+    def _said(self, event: wire.Event, sender: str) -> Said:
+        t_s = event.t_ns * 1e-9
+        if event.code == "END" and sender == "plant":
+            self._ended_at_s = t_s
+        return self._event(t_s, sender, event.code, event.text)
+
+    def _event(self, t_s: float, source: str, code: str, text: str) -> Said:
+        known = EVENTS.get(code)
+        letter = known.letter if known is not None else ""
+        return Said(
+            t_s=round(t_s, 3),
+            at=time.strftime("%H:%M:%S"),
+            source=source,
+            code=plain(code[:40]),
+            letter=letter,
+            weight=LETTERS[letter],
+            text=plain(text[:_LONGEST_TEXT]),
+            help=known.help.replace("`", "") if known is not None else "not known to this version",
+        )
+
+    def _of(self, topic: str) -> Any:
+        """The newest message of a topic; None where it is too old to be true."""
+        if self._clock() - self._heard_s.get(topic, -1e9) > SILENT_S:
+            return None
+        return self._newest[topic][0]
+
+    def phase(self) -> str:
+        """Whether data come, or why not."""
+        presence = self._source.presence
+        if self._of("sensors") is not None:
+            return LIVE
+        if "plant" in presence.roles:  # after an END it is another one: the first withdraws its token with its END
+            return SILENT if self.run is not None and self._ended_at_s is None else WAITING
+        if self.run is None:
+            return WAITING
+        return ENDED if self._ended_at_s is not None else LEFT
+
+    def now(self) -> dict[str, Any]:
+        """All figures and words of this instant; what is not known now is null."""
+        presence, run, phase = self._source.presence, self.run, self.phase()
+        figures = self._figures() if phase == LIVE else {}
+        late = self._slips_of_late()
+        return {
+            "phase": phase,
+            "silent_s": round(self._clock() - self._heard_s.get("sensors", self._began_s), 1),
+            "answer": self.answer(phase, figures)._asdict(),
+            "rig": plain(str(_inside(self._source.headers, "plant", "rig", "name") or "")[:80]),
+            "roles": sorted(presence.roles),
+            "limits": [{"words": said, "value": value} for said, value in stroke_limits(self._source.headers)],
+            "slips_of_late": late[0] if "slips" in figures else None,
+            "slips_over_s": late[1] if "slips" in figures else None,
+            "lost": run.tally.lost(self._source.inbox.dropped)._asdict() if run is not None else None,
+            "late_us": {
+                "p50": run.tally.percentile_us(0.5),
+                "p99": run.tally.percentile_us(0.99),
+            }
+            if run is not None
+            else None,
+            "unreadable": self.unreadable,
+            "pauses": self.pauses,
+            **figures,
+        }
+
+    def _figures(self) -> dict[str, Any]:
+        block, trace, applied = self._of("sensors"), self._of("trace"), self._of("applied")
+        figures: dict[str, Any] = {
+            "t_s": round(float(block["t_ns"]) * 1e-9, 3),
+            "drive_force_N": _number(float(np.mean(block["drive_force_N"]))),
+        }
+        if applied is not None:
+            figures |= {
+                "amplitude_m": _number(applied["amplitude_m"]),
+                "frequency_Hz": _number(applied["frequency_Hz"]),
+                "fallback": bool(applied["fallback"]),
+                "guard_state": _word("guard_state", applied),
+                "cause": _word("cause", applied),
+                "guard_limit": _word("cause", applied, "guard_limit"),
+            }
+        if trace is not None:
+            v_a, v_d = float(trace["vibration_velocity_mps"]), float(trace["drive_velocity_mps"])
+            waiting_s = float(trace["time_to_slip_s"])
+            figures |= {
+                "vibration_velocity_mps": _number(v_a),
+                "drive_velocity_mps": _number(v_d),
+                "wanted_velocity_mps": _number(trace["wanted_velocity_mps"]),
+                "velocity_ratio": _number(v_a / abs(v_d)) if v_d else None,
+                "wanted_amplitude_m": _number(trace["wanted_amplitude_m"]),
+                "time_to_slip_s": _number(waiting_s) if waiting_s >= 0.0 else None,
+                "breakaway_force_N": _number(trace["breakaway_force_N"]) or None,
+                "slips": int(trace["slips"]),
+                "mode": _word("mode", trace),
+                "state": _word("state", trace),
+                "reason": _word("reason", trace),
+                "limit": _word("limit", trace),
+            }
+        return figures
+
+    def answer(self, phase: str, figures: Mapping[str, Any]) -> Answer:
+        """The state in one sentence, with what to do."""
+        silent_s = self._clock() - self._heard_s.get("sensors", self._began_s)
+        presence = self._source.presence
+        if presence.trouble:
+            return Answer(BAD, presence.trouble)
+        if phase == WAITING:
+            if "plant" in presence.roles:
+                others = " and ".join(role for role in ("controller", "recorder") if role not in presence.roles)
+                more = f": {others} {'is' if 'and' not in others else 'are'} not there" if others else ""
+                return Answer(OFF, f"waiting: a rig is there, and sent no block yet{more}")
+            return Answer(OFF, f"waiting for a rig at {self._where}")
+        if phase == SILENT:
+            why = "the rig is on the bus, and sends nothing" if presence.linked else "the link to the rig is cut"
+            return Answer(BAD, f"no data for {silent_s:.0f} s: {why}")
+        if phase == ENDED:
+            return Answer(OFF, f"the run ended {silent_s:.0f} s ago, at {self._ended_at_s:.1f} s; waiting for the next")
+        if phase == LEFT:
+            return Answer(BAD, f"the rig left {silent_s:.0f} s ago, without an END; waiting for it")
+        return _of_a_live_rig(figures, *self._slips_of_late())
+
+    def _slips_of_late(self) -> tuple[int, float]:
+        """Slips, and over how long [s]: less than usual where it has not listened for so long."""
+        slips = self.run.slips if self.run is not None else ()
+        return (slips[-1][1] - slips[0][1], round(self._clock() - slips[0][0], 1)) if slips else (0, 0.0)
+
+
+def _of_a_live_rig(figures: Mapping[str, Any], slips: int, over_s: float) -> Answer:
+    guard, cause = figures.get("guard_state"), figures.get("cause")
+    mode, reason = figures.get("mode"), figures.get("reason")
+    if guard == "FAULT":
+        why = help_of("cause", str(cause))
+        more = "" if "reset" in why else "; nothing vibrates until a reset, then arm"
+        return Answer(BAD, f"FAULT: {cause}: {why.partition(': ')[2]}{more}")
+    if mode is None:
+        return Answer(BAD, "no controller: nobody decides, and the rig fades out by itself")
+    if figures.get("fallback") and guard in {"ARMED", "ACTIVE", "NO_GUARD"}:
+        return Answer(BAD, "the rig has no fresh command and ramps the vibration to zero by itself")
+    if guard in {"DISARMED", "CHECKING", "READY"}:
+        letter, _, why = help_of("cause", str(cause)).partition(": ")
+        more = f"; since {cause}: {why}" if letter in {FAILURE, OUTSIDE} else ""
+        return Answer(LOOK, f"{guard}: {help_of('guard_state', guard)}{more}")
+    told = f"{counted(slips, 'slip') if slips else 'no slip'} in the last {over_s:.0f} s"
+    told += f"; {mode}: {help_of('mode', str(mode))}"
+    if reason in {*WEAK_REASONS, *TRIPS}:
+        return Answer(BAD if harms(str(reason)) else LOOK, f"{reason}: {help_of('reason', str(reason))}; {told}")
+    return Answer(LOOK if slips else GOOD, told)
+
+
+@functools.cache
+def _known() -> dict[tuple[str, int], tuple[str, str]]:
+    return {(one.column, one.number): (one.word, one.help.replace("`", "")) for one in words()}
+
+
+def help_of(column: str, word: str) -> str:
+    """What a word of a column means."""
+    return next((told for (of, _), (one, told) in _known().items() if (of, one) == (column, word)), "not known here")
+
+
+def _word(column: str, record: Any, field: str = "") -> str:
+    number = int(record[field or column])
+    return _known().get((column, number), (str(number), ""))[0]
+
+
+def _number(value: Any) -> float | None:
+    """A number for JSON; None for what is none."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _inside(table: Any, *keys: str) -> Any:
+    for key in keys:
+        table = table.get(key) if isinstance(table, dict) else None
+    return table
+
+
+def _block_ns(table: Records, numbers: Any) -> int | None:
+    """The length of a block from two of them; None where there are none, or it is none."""
+    if len(numbers) < 2 or numbers[-1] <= numbers[0]:
+        return None
+    length_ns = (int(table["t_ns"][-1]) - int(table["t_ns"][0])) / (int(numbers[-1]) - int(numbers[0]))
+    return round(length_ns) if 1e4 <= length_ns <= 1e9 else None

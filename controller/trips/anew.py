@@ -1,0 +1,57 @@
+"""To begin anew after a fault of force or place: what was learnt from a channel that lied is forgotten.
+
+Windows, noise, stiffness, forces, and the speeds at which a vibration was needed or not are learnt again, as at a start. What is
+known of exciter, loop delay and accelerometer stays: no channel that was doubted taught it.
+"""
+
+from bridge.kernel import Record, kernel
+from controller.estimate.learning import begin
+from controller.estimate.windows import begin_anew
+
+
+@kernel
+def forget_motion(p: Record, s: Record) -> None:
+    """Forget all that force and places have taught."""
+    begin_anew(s)
+    for table in (s.slope, s.sigma, s.noise):
+        table[:, :] = 0.0
+    s.slope_before[:, :, :] = 0.0
+    s.law_mps[:], s.resolution[:], s.kept_mps[:], s.kept_N_per_m = 0.0, 0.0, 0.0, 0.0
+    s.agreements[:], s.differences[:] = 0, 0
+    s.looks[:, :], s.lively[:, :], s.first_seen = 0, 0.0, 0
+    s.bend_m, s.bent, s.noise_told_s, s.unbelieved_s, s.slip_count = 0.0, 0, 0.0, 0.0, 0.0
+    _forget_velocities(s)
+    _forget_forces(p, s)
+    forget_needs(p, s)
+
+
+@kernel
+def _forget_velocities(s: Record) -> None:
+    s.drive_velocity_mps, s.held_mps, s.rising_mps, s.steady_mps = 0.0, 0.0, 0.0, 0.0
+    s.steady_s, s.moved_s, s.stood_s = 0.0, 0.0, 0.0
+    s.measured, s.moving, s.blind = 0, 0, 0
+    s.sliding_mps, s.fine_mps, s.fine_sigma_mps = 0.0, 0.0, 0.0
+    s.level, s.swing_level, s.slipping = -1, -1, 0
+    s.stick_s, s.since_stick_s, s.smooth_s, s.slid_s, s.unseen_s = 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@kernel
+def _forget_forces(p: Record, s: Record) -> None:
+    begin(p, s)
+    s.stiffness_learnt, s.stretched = 0, 0
+    s.taught, s.taught_ratio, s.taught_square = 0.0, 0.0, 0.0
+    s.peak_N, s.slip_from_N = 0.0, 0.0
+    for force_N in (s.swing_N, s.breakaway_N, s.sliding_N, s.slid_N):
+        force_N[:] = 0.0
+    s.dragged[:] = 0
+
+
+@kernel
+def forget_needs(p: Record, s: Record) -> None:
+    """Forget where a vibration was needed, was not, or did not help: an exciter that was off taught some of it."""
+    for needs in (s.edge_ratio, s.edge_held_s, s.probe_s, s.needed_to_mps, s.needless_from_mps, s.rough_with):
+        needs[:] = 0.0
+    s.ratio[:] = p.v_ratio
+    s.off_s[:], s.off_left_s[:], s.harmful[:] = 0.0, 0.0, 0
+    s.swing, s.even_s, s.lead, s.top, s.roughness, s.roughness_s = 0.0, 0.0, 0.0, -1.0, 0.0, 0.0
+    s.helpless, s.failed, s.failed_left_s, s.wobbles = 0, 0, 0.0, 0

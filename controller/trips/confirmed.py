@@ -1,0 +1,100 @@
+"""v_d that a second channel confirms: what the drive's place alone says raises no vibration.
+
+While it vibrates, the slide goes at v_d but for what the spring winds up by: v_s + F' / k_d = v_d. Where the place of the drive
+goes faster than both say, v_a is for what they say. A law that holds three signals together does not tell which of them is wrong:
+the one that changed is, where only one did (DRIVE_DOUBTED, SLIDE_DOUBTED, FORCE_DOUBTED), else POSITIONS_APART names both places.
+k_d is the largest that was learnt, as places that go apart teach a spring that is ever softer.
+"""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import DRIVE_DOUBTED, FORCE_DOUBTED, POSITIONS_APART, SLIDE_DOUBTED
+from controller.estimate.windows import BINS, DRIVE, FORCE, SLIDE
+from controller.trips.delivered import SOME
+from controller.trips.doubts import CONTACT, trip
+from controller.trips.doubts import DRIVE as DRIVE_DOUBT
+
+WINDOW_S = 0.05  # shortest; shorter: nothing, as v_a changes no faster by it
+_LONGER = 4  # levels of longer windows for feeds that do not stand out
+_EXACT = 0.05  # noise of both places over v_d, at most
+_APART = 1.2  # by which they are apart; scales are better
+_MARGIN = 1.1  # of v_a over what is confirmed, once they are
+_WINDOWS = 5.0 * BINS  # that taught a stiffness: BINS in a row overlap, and in hum five of them agree on a wrong one
+_SURE = 0.03  # of a learnt stiffness, over itself; the first ones are a third too large
+# Share of v_d below which the slide sticks, and what is confirmed of it then at least: all the rest hangs on the stiffness.
+_STICKS, _STUCK = 0.25, 0.4
+_SOFTER = 2.0  # times that the spring may be softer here than where it was stiffest
+_TWICE = 2.0  # change of one over that of the other from which the one is what changed
+_SAME = 0.08  # of v_d, up to which a velocity is the same; less than half of what they are apart by then
+_NONE = -1  # row of none
+TRIP_S = 0.3  # for which they are apart until it trips; a turning drive crosses its backlash meanwhile
+
+
+@kernel
+def watch_confirmed(p: Record, s: Record) -> None:
+    """Follow which share of v_d is confirmed; trip where it is none for long. Once in SOME steps."""
+    some_s = SOME * p.block_s
+    vibrates = s.moving == 1 and (s.allowed_m > 0.0 or s.confirmed < 1.0)
+    s.shaken_s = s.shaken_s + some_s if vibrates else 0.0
+    if s.stiffness_learnt == 1 and s.stiffness_sigma < _SURE and s.taught >= _WINDOWS:
+        s.stiffest_N_per_m = max(s.stiffest_N_per_m, s.stiffness_N_per_m)
+    level = _level(p, s)
+    if s.doubted & CONTACT and s.trip != POSITIONS_APART:  # by a force or a slide that is doubted nothing is confirmed
+        s.apart_s, s.confirmed = 0.0, 1.0
+        return
+    if s.moving == 0:
+        s.apart_s = 0.0
+    if level < 0 or s.stiffest_N_per_m == 0.0:
+        return
+    drive_mps, slide_mps = s.direction * s.slope[DRIVE, level], s.direction * s.slope[SLIDE, level]
+    winds_mps = s.direction * s.slope[FORCE, level] / s.stiffest_N_per_m
+    share = (slide_mps + winds_mps) / drive_mps
+    sticks = slide_mps < _STICKS * drive_mps
+    if (_STUCK if sticks else 1.0 / _APART) < share < _APART:
+        s.apart_s, s.confirmed = 0.0, 1.0
+        if not sticks:  # a slide that sticks has nothing to say of its gain
+            s.agreed_mps[DRIVE], s.agreed_mps[SLIDE] = drive_mps, slide_mps
+        return
+    if s.apart_s == 0.0:
+        s.apart_by = _changed(s, drive_mps, slide_mps)
+    s.apart_s += some_s
+    if s.apart_by in (SLIDE, FORCE) or share >= 1.0:
+        s.confirmed = 1.0
+    else:
+        s.confirmed = max(share, 0.0) * _MARGIN
+    explained = s.apart_by == _NONE and slide_mps + _SOFTER * winds_mps > drive_mps / _APART and share < 1.0
+    if s.apart_s > TRIP_S and not explained:
+        if s.apart_by == DRIVE:
+            trip(s, DRIVE_DOUBTED, DRIVE_DOUBT)
+        else:
+            # a slide that became slower may be so: then it is the force that does not follow
+            by_change = SLIDE_DOUBTED if share > 1.0 else FORCE_DOUBTED
+            trip(s, POSITIONS_APART if s.apart_by == _NONE else by_change, CONTACT)
+
+
+@kernel
+def _changed(s: Record, drive_mps: float, slide_mps: float) -> int:
+    """The row of the one signal that changed since all three agreed; _NONE where two did, or they never agreed."""
+    if s.agreed_mps[DRIVE] == 0.0:
+        return _NONE
+    drive_by_mps = math.fabs(drive_mps - s.agreed_mps[DRIVE])
+    slide_by_mps = math.fabs(slide_mps - s.agreed_mps[SLIDE])
+    if max(drive_by_mps, slide_by_mps) < _SAME * s.agreed_mps[DRIVE]:
+        return FORCE
+    if drive_by_mps > _TWICE * slide_by_mps:
+        return DRIVE
+    return SLIDE if slide_by_mps > _TWICE * drive_by_mps else _NONE
+
+
+@kernel
+def _level(p: Record, s: Record) -> int:
+    """The shortest windows of motion under vibration in which both places stand out; -1 for none."""
+    for level in range(p.confirm_level, min(p.confirm_level + _LONGER, p.levels)):
+        window_s = p.window_s[level]
+        if s.pushed[level] < 2 * BINS or s.shaken_s < 2.0 * window_s or s.moved_s < 2.0 * window_s:
+            return -1
+        noise_mps = math.hypot(s.noise[DRIVE, level], s.noise[SLIDE, level])
+        if s.noise[DRIVE, level] > 0.0 and noise_mps < _EXACT * s.direction * s.slope[DRIVE, level]:
+            return level
+    return -1

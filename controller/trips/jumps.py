@@ -1,0 +1,53 @@
+"""A place of the drive that jumps: from one block to the next by far more than in the blocks before and after."""
+
+import math
+
+from bridge.kernel import Record, kernel
+from controller.codes import DRIVE_DOUBTED
+from controller.estimate.windows import BINS, begin_anew
+from controller.estimate.windows import DRIVE as DRIVE_ROW
+from controller.trips.doubts import DRIVE, OF_DRIVE, trip
+
+_FARTHER = 10.0  # than in the blocks beside it
+_BENDS = 20.0  # of the bend within a block, which is noise: 2 sigma of it
+_ANOTHER = 0.3  # change of v_d, over it, with a jump: a unit that changed
+_SIGMAS = 3.0  # and of its noise
+_STEPS = 4.0  # of the resolution
+HOLD_S = 0.1  # for which v_d is that before the jump, while the windows begin anew
+_MOST = 2.5  # jumps within FORGET_S, from which the place is doubted
+FORGET_S = 1.0
+
+
+@kernel
+def watch_jumps(p: Record, s: Record, place_m: float, blocks: int) -> None:
+    """Take the first place of a block, and how many blocks it is after the last; judge the way before this one."""
+    if s.jumped_s > 0.0:
+        s.jumped_s = max(s.jumped_s - p.block_s, 0.0)
+        if s.jumped_s == 0.0 and _is_another_speed(p, s):
+            trip(s, DRIVE_DOUBTED, DRIVE)
+    s.jumps *= 1.0 - min(p.block_s / FORGET_S, 1.0)
+    went_m = math.fabs(place_m - s.first_sample[OF_DRIVE])
+    if blocks != 1 or s.first_seen == 0 or s.bend_m == 0.0:
+        s.went_m[:] = -1.0
+        return
+    before_m, middle_m = s.went_m[0], s.went_m[1]
+    s.went_m[0], s.went_m[1] = middle_m, went_m
+    floor_m = max(_BENDS * s.bend_m, _STEPS * s.resolution[DRIVE_ROW])
+    if before_m < 0.0 or middle_m <= floor_m + _FARTHER * max(before_m, went_m):
+        return
+    s.jumped_s, s.shaken_s = HOLD_S, 0.0
+    s.jumps += 1.0
+    begin_anew(s)  # a window that holds a jump teaches noise and a soft spring
+    if s.jumps > _MOST:
+        trip(s, DRIVE_DOUBTED, DRIVE)
+
+
+@kernel
+def _is_another_speed(p: Record, s: Record) -> bool:
+    """Whether the drive goes at another speed than before a jump."""
+    level = max(s.spring_level, p.spring_level)
+    if s.pushed[level] < BINS:
+        return False
+    before_mps, after_mps = s.kept_mps[DRIVE_ROW], s.slope[DRIVE_ROW, level]
+    least_mps = _ANOTHER * math.fabs(before_mps) + _SIGMAS * s.noise[DRIVE_ROW, level]
+    return math.fabs(after_mps - before_mps) > least_mps

@@ -1,0 +1,38 @@
+"""An evidence in memory: the rig as described, the runs as float64 arrays in SI units, and the findings."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.log.finding import Finding
+from diagnosis.evidence.exciter_harmonics import Distortion
+from diagnosis.evidence.force_pickup import PickUp
+from diagnosis.evidence.manifest import RigTable
+
+Floats = npt.NDArray[np.float64]
+
+
+class Run(NamedTuple):
+    """One measured run. Arrays are [samples], finite, SI units; `t_s` increases."""
+
+    file: str
+    t_s: Floats
+    columns: dict[str, Floats]  # by standard name, without t_s; only the usable ones
+    # by standard name: lowest and highest value that the sensor can show, infinite where the run does not reach it
+    clipped: dict[str, tuple[float, float]]
+    drive_velocity_mps: float | None  # as the manifest states
+    holdout: bool  # held out: not fitted, only predicted
+    pick_up: PickUp | None = None  # a vibration in the force signal that no spring carries
+    distortion: Distortion | None = None  # a base that vibrates at other frequencies than the commanded one
+
+
+class Evidence(NamedTuple):
+    """A whole evidence folder; runs in the manifest's order."""
+
+    folder: Path
+    rig: RigTable
+    runs: tuple[Run, ...]
+    findings: tuple[Finding, ...]
+    assumed: tuple[str, ...] = ()  # rig numbers that nobody stated

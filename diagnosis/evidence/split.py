@@ -1,0 +1,79 @@
+"""One long run as two parts: one to fit and one to judge on, where nobody marks a run."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.log.finding import Finding
+from diagnosis.evidence.run import Run
+
+Floats = npt.NDArray[np.float64]
+_SHORTEST_S = 12.0  # of a run that is split: a third of it must hold some slips
+_WINDOW_S = 0.1  # over which speed and vibration count as one condition
+_PARTS = 3  # the part to judge on is one of them
+
+
+def split(run: Run) -> tuple[list[Run], list[Finding]]:
+    """The run as parts, one of which is held out, and a finding that says which; the run as it is where it is short.
+
+    Held out is the third whose speeds and vibrations occur most in the rest; among equals the last one.
+    """
+    length_s = float(run.t_s[-1] - run.t_s[0])
+    if length_s < _SHORTEST_S:
+        return [run], []
+    edges_s = run.t_s[0] + length_s / _PARTS * np.arange(_PARTS + 1)
+    condition, at_s = _conditions(run)
+    part = np.clip(np.searchsorted(edges_s, at_s, side="right") - 1, 0, _PARTS - 1)
+    common = [_common(condition[part == held], condition[part != held]) for held in range(_PARTS)]
+    held = max(range(_PARTS), key=lambda i: (round(common[i], 2), i))
+    first_s, last_s = (edges_s[held : held + 2] - run.t_s[0]).tolist()
+    until_s = last_s if held < _PARTS - 1 else math.inf  # the last sample is no stretch of its own
+    stretches = [(0.0, first_s), (first_s, until_s), (until_s, math.inf)]
+    parts = [
+        cut(run, begin_s, end_s)._replace(holdout=number == 1)
+        for number, (begin_s, end_s) in enumerate(stretches)
+        if begin_s < end_s
+    ]
+    text = (
+        f"the only run: {first_s:.3g} to {last_s:.3g} s are held out, the third whose speeds and vibrations occur most in the "
+        "rest; mark runs by from_s, until_s and holdout to choose for yourself"
+    )
+    return parts, [Finding("holdout", run.file, text)]
+
+
+def cut(run: Run, from_s: float, until_s: float) -> Run:
+    """The stretch of a run, in seconds since its first sample; it goes by its stretch."""
+    since_s = run.t_s - run.t_s[0]
+    own = (since_s >= from_s) & (since_s < until_s)
+    stem, dot, suffix = run.file.rpartition(".")
+    name = f"{stem}-{from_s:.4g}-to-{min(until_s, float(since_s[-1])):.4g}s{dot}{suffix}"
+    return run._replace(file=name, t_s=run.t_s[own], columns={key: values[own] for key, values in run.columns.items()})
+
+
+def _conditions(run: Run) -> tuple[npt.NDArray[np.int64], Floats]:
+    """A number for the speed and the vibration in each window of 0.1 s, and the windows' instants, [windows]."""
+    at_s = np.arange(run.t_s[0], run.t_s[-1], _WINDOW_S)
+    first = np.searchsorted(run.t_s, at_s)
+    place = run.columns.get("drive_position_m", run.columns.get("mass_position_m"))
+    key = np.zeros(len(at_s), np.int64)
+    if place is not None and len(at_s) > 1:
+        speed = np.gradient(place[first], _WINDOW_S)
+        fastest = float(np.abs(speed).max())
+        if fastest > 0.0:  # octaves of the speed below the fastest, by direction
+            octave = np.clip(np.round(-np.log2(np.maximum(np.abs(speed) / fastest, 1e-3))), 0, 9).astype(np.int64)
+            key = 2 * octave + (speed > 0.0)
+    amplitude, frequency = run.columns.get("vibration_amplitude_m"), run.columns.get("vibration_frequency_Hz")
+    if amplitude is not None and frequency is not None:
+        _, vibration = np.unique(np.where(amplitude[first] > 0.0, frequency[first], 0.0), return_inverse=True)
+        key = key + 100 * vibration
+    return key, at_s
+
+
+def _common(held: npt.NDArray[np.int64], rest: npt.NDArray[np.int64]) -> float:
+    """Share of what was held out whose condition the rest has as often."""
+    if not len(held) or not len(rest):
+        return 0.0
+    keys, counts = np.unique(held, return_counts=True)
+    share = counts / len(held)
+    return float(sum(min(own, float((rest == key).mean())) for key, own in zip(keys, share, strict=True)))

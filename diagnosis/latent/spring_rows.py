@@ -1,0 +1,123 @@
+"""Friction of a slide on a spring: at each breakaway, in the middle of each slip, and while it slides evenly.
+
+A slide that nothing damps falls as far below the sliding friction as it was above it at breakaway, so the middle of peak and
+trough is the sliding friction in a slip, without an acceleration. Peaks and troughs need no constant speed of the drive.
+"""
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from diagnosis.evidence.manifest import RigTable
+from diagnosis.features.feature import Signals, scales_of
+from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.slips import find_slips
+from diagnosis.gap.prepare import Prepared
+from diagnosis.latent.rows import BREAKAWAY, SLIDING, Floats, Indices, Rows, noise_of_force_N
+from diagnosis.relations.relation import pieces_of
+
+_SETTLED = 50  # blocks left out at the ends of a stretch in one direction
+_CELL = 200  # blocks of a row of even sliding
+_RATE_WINDOW = 201  # blocks over which the velocity of a drive is read that changes it all the time
+_STANDS = 0.02  # share of its fastest velocity below which it stands
+_SHORTEST = 300  # blocks of a stretch in one direction
+_OVER_NOISE = 4.0  # standard deviations of the noise that a slip must fall by, or noise has peaks of its own
+
+
+def spring_rows(rig: RigTable, runs: list[Prepared]) -> list[Rows]:
+    """Breakaways and sliding friction of every run that has a force; a list of the rows of each run and signal."""
+    found: list[Rows] = []
+    gone_m = 0.0  # a path that nobody measured goes on from run to run: no place of one is known to be one of another
+    for number, run in enumerate(runs):
+        force_N = run.signals.get("drive_force_N")
+        if force_N is None:
+            continue
+        drive_mps = _drive_mps(run)
+        place_m = gone_m + _place_m(rig, run.signals, drive_mps, force_N)
+        if not {"mass_position_m", "drive_position_m"} & run.signals.keys():
+            gone_m += float(np.abs(drive_mps).sum()) * BLOCK_S
+        for first, last in _stretches(run, drive_mps):
+            found += _of_stretch(rig, run, number, slice(first, last), drive_mps, place_m)
+    return found
+
+
+def _drive_mps(run: Prepared) -> Floats:
+    """Velocity of the drive, [blocks]: as commanded, or as measured where no command lasts."""
+    position_m = run.signals.get("drive_position_m")
+    if run.commands.segments or position_m is None or len(position_m) <= _RATE_WINDOW:
+        return run.commands.drive
+    rate = np.asarray(savgol_filter(position_m, _RATE_WINDOW, 2, deriv=1, delta=BLOCK_S))
+    return np.where(np.abs(rate) > _STANDS * np.abs(rate).max(), rate, 0.0)
+
+
+def _stretches(run: Prepared, drive_mps: Floats) -> list[tuple[int, int]]:
+    """Blocks [first, last) of one direction without vibration."""
+    sign = np.sign(drive_mps)
+    still = run.commands.frequency_Hz == 0.0
+    found: list[tuple[int, int]] = []
+    for way in (-1.0, 1.0):
+        found += pieces_of((sign == way) & still, _SHORTEST)
+    return sorted(found)
+
+
+def _place_m(rig: RigTable, signals: Signals, drive_mps: Floats, force_N: Floats) -> Floats:
+    """Place of the slide: as measured, or that of the drive less the extension of the spring, [blocks]."""
+    if "mass_position_m" in signals:
+        return signals["mass_position_m"]
+    drive_m = signals.get("drive_position_m")
+    if drive_m is None:
+        drive_m = np.cumsum(drive_mps) * BLOCK_S
+    return drive_m - force_N / scales_of(rig).stiffness_N_per_m
+
+
+def _of_stretch(
+    rig: RigTable, run: Prepared, number: int, own: slice, drive_mps: Floats, place_m: Floats
+) -> list[Rows]:
+    sign = float(np.sign(drive_mps[own.start]))
+    speed_mps = np.abs(drive_mps[own])
+    scales = scales_of(rig)
+    noise_N = noise_of_force_N(run)
+    scales = scales._replace(drop_N=max(scales.drop_N, _OVER_NOISE * noise_N))
+    cut = {name: sign * values[own] for name, values in run.signals.items() if name == "drive_force_N"}
+    slips = find_slips(cut, scales)
+    level_N = cut["drive_force_N"] + sign * run.beside.get("other_force_N", np.zeros(len(drive_mps)))[own]
+    if len(slips.tops) >= 2:
+        tops, bottoms = slips.tops[1:], slips.bottoms[1:]
+        middle_N = 0.5 * (level_N[tops] + level_N[bottoms]) - rig.coulomb_force_N
+        fall_mps = (level_N[tops] - level_N[bottoms]) / scales.stiffness_N_per_m / (2.0 * scales.slip_s / np.pi)
+        breaks_N, middle = level_N[tops] - rig.static_force_N, (tops + bottoms) // 2
+        return [
+            _rows(BREAKAWAY, run, number, own, sign, tops, breaks_N, place_m, speed_mps[tops], noise_N),
+            _rows(SLIDING, run, number, own, sign, middle, middle_N, place_m, fall_mps, noise_N),
+        ]
+    if len(slips.tops):
+        return []
+    inner = np.arange(_SETTLED, own.stop - own.start - _SETTLED)
+    cells = len(inner) // _CELL
+    if cells == 0:
+        return []
+    at = inner[: cells * _CELL].reshape(cells, _CELL)
+    mean_N = level_N[at].mean(axis=1) - rig.coulomb_force_N
+    speed = speed_mps[at].mean(axis=1)
+    return [_rows(SLIDING, run, number, own, sign, at[:, _CELL // 2], mean_N, place_m, speed, noise_N / _CELL**0.5)]
+
+
+def _rows(
+    signal: str, run: Prepared, number: int, own: slice, sign: float, at: Indices, excess_N: Floats,
+    place_m: Floats, speed_mps: Floats, noise_N: float,
+) -> Rows:  # fmt: skip
+    count, index = len(at), at + own.start
+    load = run.beside.get("normal_load_N")
+    return Rows(
+        signal=signal,
+        excess_N=excess_N,
+        sign=np.full(count, sign),
+        place_m=place_m[index],
+        t_s=run.before_s + index * BLOCK_S,
+        speed_mps=speed_mps,
+        run=np.full(count, number),
+        held_out=np.full(count, run.holdout),
+        load_N=None if load is None else load[index],
+        pull_N=None,
+        rate_N_per_s=None,
+        noise_N=noise_N,
+    )

@@ -1,0 +1,65 @@
+"""A diagnosis without a simulated fit: what relations and latent friction say, where no fit is possible or there is no time."""
+
+import math
+import time
+
+from diagnosis.features.segments import SHORTEST_S
+from diagnosis.gap.measure import DEFINITION
+from diagnosis.gap.prepare import Prepared
+from diagnosis.result import Candidate, Diagnosis, Experiment, Gap
+from diagnosis.verdict.judge import Verdict
+from plant.effects.library import EFFECTS
+
+HOLD = Experiment(
+    f"Hold each speed and each vibration for {SHORTEST_S:g} s or more in some runs.",
+    "No simulated fit compares a command that changes all the time.",
+    None,
+)
+LONGER = Experiment("Diagnose the same runs with a longer --budget.", "No effect was fitted in this time.", None)
+
+
+def comparable(runs: list[Prepared]) -> bool:
+    """Whether any run that is fitted has a stretch that simulated fits can compare."""
+    return any(run.commands.segments for run in runs if not run.holdout)
+
+
+def unfitted() -> Verdict:
+    """The verdict before anything is known: all explanations alike."""
+    names = (*EFFECTS, "none", "unexplained")
+    return Verdict(
+        "unexplained",
+        None,
+        dict.fromkeys(("unexplained", *names), 1.0 / len(names)),
+        runner_up=None,
+        ranked=(),
+        scale=1.0,
+    )
+
+
+def without_fits(verdict: Verdict, runs: list[Prepared], following: Experiment, began: float) -> Diagnosis:
+    """The diagnosis of a verdict that no fit stands behind, still without relations, shares and sentences."""
+    return Diagnosis(
+        verdict=verdict.kind,
+        effects=verdict.names,
+        summary=(),
+        candidates=tuple(Candidate(name, math.nan) for name in dict.fromkeys((*verdict.names, "unexplained", "none"))),
+        not_distinguishable=(),
+        where=(),
+        gap=Gap(
+            DEFINITION,
+            tuple(run.file for run in runs if run.holdout),
+            math.nan,
+            math.nan,
+            math.nan,
+            1.0,
+            None,
+            None,
+            (),
+        ),
+        next_experiment=following,
+        rig=(),
+        findings=(),
+        pictures=(),
+        compared_features=0,
+        elapsed_s=time.monotonic() - began,
+    )

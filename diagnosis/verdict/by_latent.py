@@ -1,0 +1,35 @@
+"""A verdict of the contest in view of the latent friction, which gives a part of the gap a name where no formula fits."""
+
+from collections.abc import Sequence
+
+from diagnosis.latent.answer import LatentSignal
+from diagnosis.latent.components import DIRECTION, PLACE, TIME
+from diagnosis.verdict.judge import Verdict
+
+_KNOWN = (PLACE, DIRECTION, TIME)  # processes that are effects of the library
+# Log likelihood that the rows must lose without a process that is named: by chance 0.3 % of records lose 4, and eight processes
+# are tried.
+_SURE = 4.0
+MOST = 0.5  # share below which it is told and not named: the rest would be the answer
+
+
+def named_by(latent: Sequence[LatentSignal]) -> tuple[str, ...]:
+    """Effects whose share of a signal is more than half, more than chance shows, and sure; the largest share first."""
+    found: dict[str, float] = {}
+    for signal in latent:
+        for one in signal.shares if signal.judged_on_held_out else ():
+            sure = one.what in _KNOWN and one.null_90 is not None and one.gain > _SURE
+            if sure and one.null_90 is not None and one.interval_90[0] > one.null_90 and one.share > MOST:
+                found[one.what] = max(one.share, found.get(one.what, 0.0))
+    return tuple(sorted(found, key=lambda what: -found[what]))
+
+
+def with_latent(verdict: Verdict, latent: Sequence[LatentSignal]) -> Verdict:
+    """What is "unexplained" becomes "partly" where the friction goes for the most part with something that the library has."""
+    names = named_by(latent)[:1]
+    if verdict.kind != "unexplained" or not names or verdict.outside or set(names) & set(verdict.refuted):
+        return verdict
+    top, value = next(iter(verdict.probabilities.items()))
+    swapped = {top: verdict.probabilities.get(names[0], 0.0), names[0]: value}
+    probabilities = dict(sorted((verdict.probabilities | swapped).items(), key=lambda item: -item[1]))
+    return verdict._replace(kind="partly", named=None, by_relations=names, probabilities=probabilities)

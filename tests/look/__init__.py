@@ -1,0 +1,1 @@
+"""How exact `stickslip look` is on drawn rigs that nobody tuned it on, beside eight lines of numpy."""

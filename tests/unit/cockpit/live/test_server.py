@@ -1,0 +1,277 @@
+"""The server's door: who is let in, how many, how much they may send, and what a person may say."""
+
+import asyncio
+import socket
+import stat
+import threading
+from collections.abc import Generator
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from bridge.faults import Fault
+from bridge.wire.bus_config import BusConfig
+from cockpit.live import person, server, viewers
+from cockpit.live.gate import refusal
+from cockpit.live.page import Page
+from cockpit.live.server import Server, listening
+from cockpit.live.token import kept_token
+from cockpit.run.operator import Obeyed
+from tests.system.ports import free_endpoint
+from tests.unit.cockpit.live.made import table_of_frame
+
+TOKEN = "the token"  # noqa: S105
+
+
+def door(path: str = "/stream", host: str = "127.0.0.1:8447", origin: str = "http://127.0.0.1:8447") -> int:
+    found = refusal(path, [host], [origin], 8447, upgrades=True)
+    return found.status if found is not None else 200
+
+
+@pytest.mark.parametrize(
+    ("said", "status"),
+    [
+        ({}, 200),
+        ({"host": "localhost:8447", "origin": "http://localhost:8447"}, 200),
+        ({"path": "/", "origin": ""}, 200),
+        ({"origin": "http://evil.example"}, 403),
+        ({"origin": "http://127.0.0.1:9999"}, 403),  # another page of this computer
+        ({"origin": "https://127.0.0.1:8447"}, 403),
+        ({"origin": "null"}, 403),  # a frame in a sandbox, a file
+        ({"origin": ""}, 403),
+        ({"host": "evil.example:8447"}, 421),  # a name that leads to 127.0.0.1
+        ({"host": "127.0.0.1"}, 421),
+        ({"path": "/", "host": "evil.example:8447"}, 421),
+        ({"path": "/../../etc/passwd"}, 404),
+        ({"path": "/stream/"}, 404),
+        ({"path": "/?x"}, 404),
+        ({"path": "/%2e%2e/"}, 404),
+    ],
+)
+def test_only_the_page_of_this_server_is_answered(said: dict[str, str], status: int) -> None:
+    assert door(**said) == status
+
+
+def test_a_header_that_comes_twice_or_never_is_none() -> None:
+    assert refusal("/", ["127.0.0.1:1", "evil:1"], [], 1, upgrades=False) is not None
+    assert refusal("/", [], [], 1, upgrades=False) is not None
+    assert refusal("/stream", ["127.0.0.1:1"], ["http://127.0.0.1:1", "http://x"], 1, upgrades=True) is not None
+    plain = refusal("/stream", ["127.0.0.1:1"], ["http://127.0.0.1:1"], 1, upgrades=False)
+    assert plain is not None
+    assert plain.status == 426
+
+
+@pytest.fixture
+def port() -> Generator[int]:
+    """A server without a rig, at this port."""
+    with listening(0) as sock:
+        at = int(sock.getsockname()[1])
+        stop, ready = threading.Event(), threading.Event()
+        made = Server(BusConfig(endpoint=free_endpoint()), TOKEN, at)
+        thread = threading.Thread(target=made.run, args=(sock, stop, ready.set))
+        thread.start()
+        assert ready.wait(10.0)
+        yield at
+        stop.set()
+        thread.join(10.0)
+        assert not thread.is_alive()
+
+
+def page_of(port: int) -> Any:
+    return connect(f"ws://127.0.0.1:{port}/stream", origin=f"http://127.0.0.1:{port}", max_size=None)  # type: ignore[arg-type]
+
+
+def raw(port: int, request: bytes, timeout_s: float = 10.0) -> bytes:
+    """What the server sends until it closes."""
+    with socket.create_connection(("127.0.0.1", port), timeout=timeout_s) as sock:
+        sock.sendall(request)
+        found = b""
+        while chunk := sock.recv(1 << 16):
+            found += chunk
+        return found
+
+
+async def next_of(socket: Any, kind: str) -> dict[str, Any]:
+    while True:
+        table, _ = table_of_frame(await asyncio.wait_for(socket.recv(), 10.0))
+        if table["kind"] == kind:
+            return table
+
+
+def test_a_page_loads_nothing_and_sees_that_there_is_no_rig(port: int) -> None:
+    head, _, body = raw(port, f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()).partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 200")
+    assert b"default-src 'none'" in head
+    assert f"connect-src ws://127.0.0.1:{port}".encode() in head
+    assert b"X-Frame-Options: DENY" in head
+    text = body.decode()
+    assert "uPlot" in text
+    assert not [
+        word for word in ("src=", "@import", 'href="http', "innerHTML") if word in text.replace("default-src=", "")
+    ]
+
+    async def look() -> None:
+        async with page_of(port) as page:
+            assert "drive_force_N.least" in (await next_of(page, "hello"))["columns"]
+            assert (await next_of(page, "now"))["phase"] == "waiting"
+
+    asyncio.run(look())
+
+
+def test_strangers_are_refused_by_the_running_server(port: int) -> None:
+    async def look() -> None:
+        url = f"ws://127.0.0.1:{port}/stream"
+        for origin in ("http://evil.example", None):
+            with pytest.raises(InvalidStatus, match="403"):
+                async with connect(url, origin=origin):  # type: ignore[arg-type]
+                    pass
+        async with page_of(port) as page:  # more than a word and a token
+            await page.send("x" * 2000)
+            with pytest.raises(ConnectionClosed, match="1009"):
+                await next_of(page, "never")
+        async with page_of(port) as page:
+            await page.send('{"word": "LAUNCH"}')
+            with pytest.raises(ConnectionClosed):
+                await next_of(page, "never")
+
+    asyncio.run(look())
+    assert b" 421 " in raw(port, b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n").partition(b"\r\n")[0]
+    assert (
+        b"200"
+        not in raw(port, b"GET / HTTP/1.1\r\nHost: x\r\nA: " + b"a" * 100_000 + b"\r\n\r\n").partition(b"\r\n")[0]
+    )
+    assert b"200" not in raw(port, f"POST / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()).partition(b"\r\n")[0]
+
+
+def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    words: list[str] = []
+
+    def obey(_bus: BusConfig, word: str) -> Obeyed:
+        words.append(word)
+        return Obeyed("here", word, True, "FAULT", "STOP_BY_PERSON", "a person stopped it", 0.0, 0.1, "", False)
+
+    monkeypatch.setattr(person, "tell", obey)
+
+    async def look() -> None:
+        pages = [await page_of(port) for _ in range(viewers.MOST_VIEWERS)]
+        async with page_of(port) as late:
+            assert "close one" in (await next_of(late, "full"))["line"]
+            await late.send('{"word": "STOP"}')
+            answer = await next_of(late, "answer")
+            assert (answer["word"], answer["done"]) == ("STOP", True)
+        for page in pages:
+            await page.close()
+
+    asyncio.run(look())
+    assert words == ["STOP"]
+
+
+def test_too_many_connections_are_closed_at_once(port: int) -> None:
+    held = [socket.create_connection(("127.0.0.1", port), timeout=5.0) for _ in range(server._MOST_CONNECTIONS)]
+    try:
+        with pytest.raises((ConnectionResetError, AssertionError)):
+            assert raw(port, f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+    finally:
+        for one in held:
+            one.close()
+    assert b" 200 " in raw(port, f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+
+
+def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(person, "_WRONG_S", 0.2)
+    said: list[str] = []
+    armed = threading.Event()
+
+    def obey(_bus: BusConfig, word: str) -> Obeyed:
+        said.append(word)
+        if word == "ARM":
+            armed.wait(5.0)
+        if word == "RESET":
+            raise Fault("NO_PEER", "nobody there\x1b[2J")
+        return Obeyed("here", word, True, "ARMED", "CHECK_PASSED", "", 0.0, 0.1, "", False)
+
+    monkeypatch.setattr(person, "tell", obey)
+
+    async def look() -> None:
+        words = person.Words(BusConfig(), TOKEN)
+        wrong = await words.say(person.Wish("ARM", "guess"))
+        assert not wrong["done"]
+        assert said == []
+        arming = asyncio.create_task(words.say(person.Wish("ARM", TOKEN)))
+        await asyncio.sleep(0.05)
+        assert "under way" in (await words.say(person.Wish("DISARM", TOKEN)))["lines"][0]
+        assert (await words.say(person.Wish("STOP", "")))["done"]  # while the other word is under way
+        armed.set()
+        assert (await arming)["done"]
+        failed = await words.say(person.Wish("RESET", TOKEN))
+        assert failed["lines"] == ["nobody there\\x1b[2J"]
+
+    asyncio.run(look())
+    assert said == ["ARM", "STOP", "RESET"]
+
+
+def test_a_wish_is_a_word_that_is_known() -> None:
+    assert person.wish_of('{"word": "ARM", "token": "x"}') == person.Wish("ARM", "x")
+    for text in (
+        "",
+        "[]",
+        "{}",
+        '{"word": 3}',
+        '{"word": "ARM", "token": 3}',
+        '{"word": "NOTHING"}',
+        "[" * 900,
+        b"\xff",
+    ):
+        assert person.wish_of(text) is None, text
+
+
+def test_a_slow_reader_is_dropped_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    aborted: list[str] = []
+
+    class Socket:
+        def __init__(self, name: str, reads: bool) -> None:
+            self.name, self.reads, self.transport, self.got = name, reads, self, 0
+
+        def abort(self) -> None:
+            aborted.append(self.name)
+
+        async def send(self, _frame: bytes) -> None:
+            if not self.reads:
+                await asyncio.sleep(3600.0)
+            self.got += 1
+
+    async def look() -> None:
+        all_of_them = viewers.Viewers()
+        slow, quick = Socket("slow", False), Socket("quick", True)
+        async with all_of_them.added(slow, [b""]), all_of_them.added(quick, [b""]):  # type: ignore[arg-type]
+            for _ in range(200):
+                all_of_them.tell(b"frame")
+                await asyncio.sleep(0)
+            assert quick.got == 201
+        assert all_of_them.dropped == 1
+
+    asyncio.run(look())
+    assert aborted == ["slow"]
+
+
+def test_the_token_is_in_a_file_of_this_user_alone(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    with kept_token(8447) as (word, path):
+        assert path.read_text() == word
+        assert len(word) == 24
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+        assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+    assert not path.exists()
+
+
+def test_a_port_that_is_taken_is_told() -> None:
+    with listening(0) as sock, pytest.raises(Fault, match="choose another --port") as raised:
+        listening(int(sock.getsockname()[1]))
+    assert raised.value.kind.code == "ENDPOINT_BUSY"
+
+
+def test_every_script_of_the_page_is_in_its_policy() -> None:
+    page = Page(8447)
+    assert page.policy.count("'sha256-") == page.body.decode().count("<script>") == 2

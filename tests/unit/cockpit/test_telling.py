@@ -1,0 +1,34 @@
+"""Life of a process, told without waiting for a terminal."""
+
+import threading
+import time
+
+import pytest
+
+from cockpit.run import telling as module
+from cockpit.run.telling import telling
+
+
+def test_lines_are_printed_in_order_and_all_before_the_end(capsys: pytest.CaptureFixture[str]) -> None:
+    with telling(quiet=False) as tell:
+        tell("waiting", "for a rig")
+        tell("running", "\x1b[2J")
+    assert capsys.readouterr().err == "waiting  for a rig\nrunning  \\x1b[2J\n"
+
+
+def test_a_child_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with telling(quiet=True) as tell:
+        tell("waiting", "for a rig")
+    assert capsys.readouterr().err == ""
+
+
+def test_a_terminal_that_stands_still_holds_up_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    goes_on = threading.Event()
+    monkeypatch.setattr(module, "say", lambda _line: goes_on.wait(10.0))
+    monkeypatch.setattr(module, "_LAST_WORDS_S", 0.05)
+    began_s = time.monotonic()
+    with telling(quiet=False) as tell:
+        for _ in range(100):
+            tell("running", "x")
+    assert time.monotonic() - began_s < 5.0
+    goes_on.set()

@@ -1,0 +1,96 @@
+"""The latent friction: shares of made rows whose truth is known, and rows of made runs."""
+
+import numpy as np
+import pytest
+
+from diagnosis.latent.answer import LatentSignal, latent_of, signal_of
+from diagnosis.latent.components import DIRECTION, FORCE_PLACE, PLACE, SCATTER
+from diagnosis.latent.rows import BREAKAWAY, MOST_ROWS, SLIDING, Rows
+from diagnosis.latent.shares import LatentShare
+from diagnosis.verdict.by_latent import named_by, with_latent
+from diagnosis.verdict.judge import Verdict
+from tests.unit.diagnosis.relations.kinematic import rig, runs
+
+ROWS = 90
+
+
+def one_pass(wave_N: float) -> Rows:
+    """Breakaways along a track, the last third held out."""
+    random = np.random.default_rng(3)
+    place = 1e-4 * np.arange(ROWS)
+    excess_N = wave_N * np.sin(2.0 * np.pi * place / 2.5e-3) + random.normal(0.0, 0.1, ROWS)
+    held_out = np.arange(ROWS) >= 60
+    ones = np.ones(ROWS)
+    return Rows(
+        BREAKAWAY, excess_N, ones, place, 0.1 * np.arange(ROWS), 1e-3 * ones, held_out.astype(int), held_out,
+        None, None, None, 0.02,
+    )  # fmt: skip
+
+
+def to_and_fro(push_N: float, along_N: float) -> Rows:
+    """Sliding of an axis with a constant push, and a force that goes with the place whatever the direction."""
+    random = np.random.default_rng(4)
+    phase = 2.0 * np.pi * 6.0 * np.arange(ROWS) / ROWS
+    place, sign = 0.1 * np.sin(phase), np.where(np.cos(phase) >= 0.0, 1.0, -1.0)
+    excess_N = sign * (push_N + along_N * np.sin(60.0 * place)) + random.normal(0.0, 0.1, ROWS)
+    held_out = np.arange(ROWS) >= 60
+    return Rows(
+        SLIDING, excess_N, sign, place, 0.1 * np.arange(ROWS), 0.1 * np.abs(np.cos(phase)) + 1e-3, held_out.astype(int),
+        held_out, None, None, None, 0.02,
+    )  # fmt: skip
+
+
+def of(found: LatentSignal, what: str) -> LatentShare:
+    return next(one for one in found.shares if one.what == what)
+
+
+def test_a_wave_along_the_track_is_found_with_its_share():
+    found = signal_of(one_pass(0.3))
+    wave = of(found, PLACE)
+    assert wave.share == pytest.approx(0.045 / 0.055, abs=0.1)
+    assert wave.null_90 is not None
+    assert wave.null_90 < wave.interval_90[0] <= wave.interval_90[1]
+    assert sum(one.share for one in found.shares) == pytest.approx(1.0)
+    assert not found.revisited
+    assert named_by([found]) == (PLACE,)
+
+
+def test_scatter_alone_has_no_name():
+    found = signal_of(one_pass(0.0))
+    assert named_by([found]) == ()
+    assert of(found, SCATTER).share > 0.5
+
+
+def test_a_force_with_the_place_is_no_friction():
+    found = signal_of(to_and_fro(0.0, 0.3))
+    assert of(found, FORCE_PLACE).share > 0.7
+    assert of(found, PLACE).share < 0.1
+    assert found.revisited
+
+
+def test_a_push_is_a_matter_of_direction():
+    found = signal_of(to_and_fro(0.4, 0.0))
+    assert of(found, DIRECTION).share == pytest.approx(0.16 / 0.17, abs=0.1)
+
+
+def test_unexplained_becomes_partly_by_what_is_named_and_no_other_verdict_moves():
+    found = signal_of(one_pass(0.3))
+    names = (PLACE, "none", "unexplained")
+    verdict = Verdict("unexplained", None, dict.fromkeys(names, 1.0 / 3.0), None, (), 1.0)
+    after = with_latent(verdict, [found])
+    assert (after.kind, after.names) == ("partly", (PLACE,))
+    assert sum(after.probabilities.values()) == pytest.approx(1.0)
+    assert with_latent(verdict._replace(kind="no-gap"), [found]).kind == "no-gap"
+    assert with_latent(verdict._replace(refuted=(PLACE,)), [found]).kind == "unexplained"
+    assert with_latent(verdict, [found._replace(judged_on_held_out=False)]).kind == "unexplained"
+
+
+def test_every_slip_of_a_run_is_a_row_at_its_place():
+    found = {one.signal: one for one in latent_of(rig(), [_quiet(run) for run in runs()])}
+    assert set(found) == {BREAKAWAY, SLIDING}
+    assert 60 < found[BREAKAWAY].rows <= MOST_ROWS
+
+
+def _quiet(run):
+    commands = run.commands._replace(frequency_Hz=np.zeros_like(run.commands.frequency_Hz))
+    return run._replace(commands=commands, noise=run.noise._replace(pieces={"drive_force_N": np.array([-6e-3, 6e-3])}))
