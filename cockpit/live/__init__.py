@@ -5,6 +5,7 @@ tables     messages of one topic as one array
 buckets    signals as smallest, mean and largest sample of some blocks; what was in force
 trigger    samples at full rate around a slip
 tally      what was lost, how late commands were
+answer     the state of a rig in one sentence, and what its words mean
 view       all of it together: what a person is shown now
 frames     the same as bytes for a browser
 gate       which requests of a browser are answered

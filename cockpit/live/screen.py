@@ -16,8 +16,9 @@ from rich.text import Text
 from bridge.files import strict_json
 from bridge.units import counted, quantity
 from bridge.wire.zenoh_link import BusConfig
+from cockpit.live.answer import BAD, GOOD, LOOK, OFF, help_of
 from cockpit.live.listener import Listener
-from cockpit.live.view import BAD, GOOD, LIVE, LOOK, OFF, Said, View, help_of
+from cockpit.live.view import LIVE, Said, View
 
 _PERIOD_S = 0.1
 _STYLES = {GOOD: "bold green", LOOK: "bold yellow", BAD: "bold red", OFF: "bold"}

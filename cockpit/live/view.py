@@ -2,7 +2,6 @@
 
 import collections
 import contextlib
-import functools
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
@@ -13,16 +12,15 @@ from bridge.faults import Fault
 from bridge.log.pause_events import CORE_PAUSE, PAUSE
 from bridge.log.screen import Screen
 from bridge.plain import plain
-from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.block_numbers import WINDOW
 from bridge.wire.complaints import Complaints
-from bridge.wire.event_codes import EVENTS, FAILURE, LETTERS, OUTSIDE, TRIPS, WEAK_REASONS, harms
+from bridge.wire.event_codes import EVENTS, LETTERS
 from bridge.wire.messages import APPLIED, TRACE, Records
 from bridge.wire.payloads import parsed
-from bridge.wire.words import words
 from bridge.wire.zenoh_link import Inbox, Received
 from cockpit.figures.signals import stroke_limits
+from cockpit.live.answer import BAD, OFF, Answer, known, of_a_live_rig
 from cockpit.live.buckets import Bucketing, Buckets, block_numbers
 from cockpit.live.listener import Presence
 from cockpit.live.tables import SensorTables, table_of
@@ -37,7 +35,6 @@ _EVENTS_AT_ONCE = 50  # of one step; who says more is counted
 _LONGEST_TEXT = 500
 _SLIPS_S = 10.0  # over which the slips of late are counted
 # how the state is: in words for a person, in colours for a page
-GOOD, LOOK, BAD, OFF = "good", "look", "bad", "off"
 WAITING, LIVE, SILENT, LEFT, ENDED = "waiting", "live", "silent", "left", "ended"
 
 
@@ -80,13 +77,6 @@ class Step(NamedTuple):
     buckets: Buckets | None
     capture: Capture | None
     events: list[Said]
-
-
-class Answer(NamedTuple):
-    """The state in one sentence."""
-
-    level: str  # GOOD, LOOK, BAD; OFF: there is nothing to be told of a rig now
-    text: str
 
 
 class _Run:
@@ -345,7 +335,7 @@ class View:
             return Answer(OFF, f"the run ended {silent_s:.0f} s ago, at {self._ended_at_s:.1f} s; waiting for the next")
         if phase == LEFT:
             return Answer(BAD, f"the rig left {silent_s:.0f} s ago, without an END; waiting for it")
-        return _of_a_live_rig(figures, *self._slips_of_late())
+        return of_a_live_rig(figures, *self._slips_of_late())
 
     def _slips_of_late(self) -> tuple[int, float]:
         """Slips, and over how long [s]: less than usual where it has not listened for so long."""
@@ -353,41 +343,9 @@ class View:
         return (slips[-1][1] - slips[0][1], round(self._clock() - slips[0][0], 1)) if slips else (0, 0.0)
 
 
-def _of_a_live_rig(figures: Mapping[str, Any], slips: int, over_s: float) -> Answer:
-    guard, cause = figures.get("guard_state"), figures.get("cause")
-    mode, reason = figures.get("mode"), figures.get("reason")
-    if guard == "FAULT":
-        why = help_of("cause", str(cause))
-        more = "" if "reset" in why else "; nothing vibrates until a reset, then arm"
-        return Answer(BAD, f"FAULT: {cause}: {why.partition(': ')[2]}{more}")
-    if mode is None:
-        return Answer(BAD, "no controller: nobody decides, and the rig fades out by itself")
-    if figures.get("fallback") and guard in {"ARMED", "ACTIVE", "NO_GUARD"}:
-        return Answer(BAD, "the rig has no fresh command and ramps the vibration to zero by itself")
-    if guard in {"DISARMED", "CHECKING", "READY"}:
-        letter, _, why = help_of("cause", str(cause)).partition(": ")
-        more = f"; since {cause}: {why}" if letter in {FAILURE, OUTSIDE} else ""
-        return Answer(LOOK, f"{guard}: {help_of('guard_state', guard)}{more}")
-    told = f"{counted(slips, 'slip') if slips else 'no slip'} in the last {over_s:.0f} s"
-    told += f"; {mode}: {help_of('mode', str(mode))}"
-    if reason in {*WEAK_REASONS, *TRIPS}:
-        return Answer(BAD if harms(str(reason)) else LOOK, f"{reason}: {help_of('reason', str(reason))}; {told}")
-    return Answer(LOOK if slips else GOOD, told)
-
-
-@functools.cache
-def _known() -> dict[tuple[str, int], tuple[str, str]]:
-    return {(one.column, one.number): (one.word, one.help.replace("`", "")) for one in words()}
-
-
-def help_of(column: str, word: str) -> str:
-    """What a word of a column means."""
-    return next((told for (of, _), (one, told) in _known().items() if (of, one) == (column, word)), "not known here")
-
-
 def _word(column: str, record: Any, field: str = "") -> str:
     number = int(record[field or column])
-    return _known().get((column, number), (str(number), ""))[0]
+    return known().get((column, number), (str(number), ""))[0]
 
 
 def _number(value: Any) -> float | None:

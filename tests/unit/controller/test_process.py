@@ -16,7 +16,6 @@ from bridge.wire.messages import sensor_block
 from bridge.wire.topics import ANNOUNCE, COMMAND, CONTROLLER_EVENT, OPERATOR, PLANT_EVENT, SENSORS, Topic
 from bridge.wire.zenoh_link import Received
 from controller.app import ControllerProcess
-from controller.codes import BLOCK, LATE
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
 
@@ -129,21 +128,6 @@ def test_an_announcement_that_is_no_velocity_is_refused(wrong_mps: float) -> Non
     with pytest.raises(Fault, match=r"BAD_MESSAGE: announce: drive_velocity_mps"):
         node.announcement(said.SerializeToString())
     assert node._state[0]["announced_count"] == 0
-
-
-def test_a_reset_forgets_a_pause_in_which_vibration_did_not_help() -> None:
-    node = ControllerNode(CONFIG)
-    state = node._state[0]
-    for number, action in enumerate([None, None, wire.Operator.RESET]):
-        if number == 1:
-            state["off_left_s"][:], state["needless_from_mps"][:] = 60.0, 1e-4
-        if action is not None:
-            node.operator(action)
-        node.block(block(number), 0)
-        if number == 1:
-            assert state["off_left_s"].min() > 59.0
-    assert state["off_left_s"].max() == 0.0
-    assert state["needless_from_mps"].max() == 0.0
 
 
 def test_a_repeated_block_is_not_fresh() -> None:
@@ -280,17 +264,6 @@ def test_a_controller_in_lockstep_refuses_a_rig_that_does_not_wait() -> None:
     bus.say(PLANT_EVENT, wire.Event(source="plant", code="START", text="SCHED_FIFO 50").SerializeToString())
     with pytest.raises(Fault, match=r"CONFIG: event/plant: START says 'SCHED_FIFO 50': must say 'lockstep'"):
         controller.loop(threading.Event(), "")
-
-
-@pytest.mark.parametrize("lockstep", [False, True])
-def test_a_pause_makes_a_block_late_only_where_the_rig_does_not_wait(lockstep: bool) -> None:
-    """A late block changes what trips see: in lockstep the same run would have other bytes on a busy machine."""
-    node = ControllerNode(CONFIG, lockstep)
-    events: list[int] = []
-    for number, arrival_ms in enumerate([1.0, 2.0, 103.0, 103.1]):
-        node.block(block(number), round(arrival_ms * 1e6))
-        events.append(wire.Trace.FromString(node.rest(0)[0].payload).events)
-    assert events == [BLOCK, BLOCK, *([BLOCK] * 2 if lockstep else [BLOCK | LATE] * 2)]
 
 
 def test_what_cannot_be_read_is_dropped_and_told_once_a_second() -> None:

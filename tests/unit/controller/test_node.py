@@ -1,0 +1,34 @@
+"""What a block does to the memory of the controller, without a bus."""
+
+import pytest
+
+from bridge.wire import stickslip_pb2 as wire
+from controller.codes import BLOCK, LATE
+from controller.node import ControllerNode
+from tests.unit.controller.test_process import CONFIG, block
+
+
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_a_pause_makes_a_block_late_only_where_the_rig_does_not_wait(lockstep: bool) -> None:
+    """A late block changes what trips see: in lockstep the same run would have other bytes on a busy machine."""
+    node = ControllerNode(CONFIG, lockstep)
+    events: list[int] = []
+    for number, arrival_ms in enumerate([1.0, 2.0, 103.0, 103.1]):
+        node.block(block(number), round(arrival_ms * 1e6))
+        events.append(wire.Trace.FromString(node.rest(0)[0].payload).events)
+    assert events == [BLOCK, BLOCK, *([BLOCK] * 2 if lockstep else [BLOCK | LATE] * 2)]
+
+
+def test_a_reset_forgets_a_pause_in_which_vibration_did_not_help() -> None:
+    node = ControllerNode(CONFIG)
+    state = node._state[0]
+    for number, action in enumerate([None, None, wire.Operator.RESET]):
+        if number == 1:
+            state["off_left_s"][:], state["needless_from_mps"][:] = 60.0, 1e-4
+        if action is not None:
+            node.operator(action)
+        node.block(block(number), 0)
+        if number == 1:
+            assert state["off_left_s"].min() > 59.0
+    assert state["off_left_s"].max() == 0.0
+    assert state["needless_from_mps"].max() == 0.0
