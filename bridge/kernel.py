@@ -1,5 +1,6 @@
 """Compilation of hot code: numba, cached on disk, without the flags that change bits."""
 
+import hashlib
 import os
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
@@ -22,6 +23,19 @@ Record = Any
 _settings: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
 _settings.CACHE_DIR = os.environ[FOLDER] = str(usable_folder())  # for this process and its children
 _settings.CACHE_LOCATOR_CLASSES = "bridge.kernel_cache.SourcesLocator"
+
+
+def _named_by_content(layout: Any) -> tuple[str, tuple[str]]:
+    """The name of a layout in the symbols of compiled kernels.
+
+    Numba takes a number there that each process counts anew (`Record.mangling_args`). So two processes may keep kernels for two
+    lengths of a block under one symbol, and a third one that loads both runs the one on the samples of the other.
+    """
+    return "Record", (hashlib.sha256(str(layout).encode()).hexdigest()[:16],)
+
+
+_layouts: Any = numba.types.Record
+_layouts.mangling_args = property(_named_by_content)
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
