@@ -8,7 +8,7 @@ SEED ?= 1
 GENERATOR ?= independent
 BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 
-.PHONY: demo quick test test-realtime test-others nightly mutants coverage-guard control faults warm check docs reference bench bench-quick blind real bless lock proto schemas clean
+.PHONY: demo quick test test-realtime test-others nightly mutants coverage-guard control faults soak warm check docs reference bench bench-quick blind real bless lock proto schemas clean
 
 demo: $(READY)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
@@ -37,8 +37,8 @@ nightly: check warm bench $(VENV)/.ready-viewers ## everything: an hour or so
 	@$(PARALLEL) -m "not realtime"
 	@$(MAKE) --no-print-directory coverage-guard control faults
 
-mutants: $(READY) ## an hour or so: of the changed conditions of the guard at most a tenth may go unnoticed by its unit tests
-	@$(NICE) $(BIN)/python -m tests.mutants
+mutants: $(READY) ## ten minutes to an hour: of the changed conditions of the guard at most a tenth may go unnoticed by its unit tests
+	@$(NICE) $(BIN)/python -m tests.mutants --report docs/quality/mutants.md
 
 coverage-guard: $(READY) ## every branch of the guard, by its unit tests alone
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest tests/unit/bridge/guard -p no:cacheprovider --cov=bridge.guard --cov-branch --cov-report=term-missing --cov-fail-under=100
@@ -48,6 +48,9 @@ control: $(READY) ## the controller on the whole bank, beside its rivals; fails 
 
 faults: $(READY) ## every fault of deploy/faults in simulated time: docs/quality/faults.md
 	@$(BIN)/stickslip bench faults --report docs/quality/faults.md
+
+soak: $(READY) ## one hour of a loop: memory, lost blocks, latency over time: docs/quality/soak.md
+	@$(BIN)/stickslip soak --hours 1 --report docs/quality/soak.md
 
 warm: $(READY)
 	@$(BIN)/python -m tests.warm_up

@@ -32,7 +32,9 @@ FAULTS = {
             "NO_PEER",
             4,
             "A process waited for its peer on the bus and nobody came, or the peer went away or did not answer. Check that the "
-            "plant runs, that every process names the same --endpoint and --prefix, and look at the peer's own last line. With "
+            "plant runs, that every process names the same --endpoint and --prefix, and look at the peer's own last line. Where "
+            "the line says that what listens stands still, its process is frozen or gets no processor time: let it go on, or end "
+            "it. If something vibrates meanwhile, stop the exciter's amplifier by hand: no word reaches the rig. With "
             "--cluster: no Dask scheduler answers at that address, or it has no worker.",
         ),
         FaultKind(

@@ -97,7 +97,7 @@ def compile_once(what: str, compiling: Callable[[], object]) -> None:
         except OSError:  # a file system without locks: each process compiles
             pass
         if not done.exists():
-            _say(f"{COMPILING}{what}, once for this version")
+            _say(f"{COMPILING}{what} (first start of this version, about a minute)")
         compiling()
         for old in folder.glob(f"{what}-*"):
             old.unlink(missing_ok=True)

@@ -12,6 +12,8 @@ _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u
 COMPILING = "compiling the kernels of "
 ANOTHER_COMPILES = "another process compiles the kernels of "
 COMPILED = "compiled are the kernels of "
+# and once it has loaded all that it needs, and only waits for the others
+LOADED = "loaded"
 
 
 def plain(text: str) -> str:

@@ -1,5 +1,5 @@
 """`python -m cockpit` is `stickslip`."""
 
-from cockpit.cli import main
+from cockpit.entry import main
 
 main()

@@ -1,9 +1,6 @@
 """The `stickslip` command, put together. Each command imports what it needs when it runs, so that `--help` is quick."""
 
-import logging
-import os
 import platform
-import sys
 from typing import Annotated
 
 import typer
@@ -17,7 +14,7 @@ from cockpit.commands.explain import explain
 from cockpit.commands.live import serve, watch
 from cockpit.commands.log import log_app
 from cockpit.commands.look import look
-from cockpit.commands.person import arm, disarm, reset, status, stop
+from cockpit.commands.person import add_words
 from cockpit.commands.pictures import plot, reproduce, review, stability
 from cockpit.commands.processes import controller, plant, record
 from cockpit.commands.replay import replay_command
@@ -27,7 +24,6 @@ from cockpit.commands.schema import schema
 from cockpit.commands.stress.bench import bench_app
 from cockpit.commands.stress.fault import fault
 from cockpit.commands.stress.soak import soak
-from cockpit.run.child_process import guarded, prepare_stdout
 
 app = typer.Typer(
     cls=JsonGroup,
@@ -57,11 +53,7 @@ app.command("plant")(plant)
 app.command("controller")(controller)
 app.command("record")(record)
 app.command("recorder", hidden=True)(record)  # a child is named by its role
-app.command("arm")(arm)
-app.command("disarm")(disarm)
-app.command("stop")(stop)
-app.command("reset")(reset)
-app.command("status")(status)
+add_words(app)
 app.command(
     "serve",
     epilog=_examples(
@@ -166,26 +158,3 @@ def about(
     ] = False,
 ) -> None:
     """Take what stands before the name of a command."""
-
-
-def main() -> None:
-    """Entry point of the `stickslip` command."""
-    # for joblib, which starts its workers with `python -m`: the folder of the person who calls would be searched first, and
-    # may hold a plant.py or numpy.py of that person's own
-    os.environ["PYTHONSAFEPATH"] = "1"
-    os.environ["MPLBACKEND"] = (
-        "Agg"  # pictures are files; matplotlib refuses to start where the variable names none it knows
-    )
-    # a picture looks the same where a read-only home keeps no cache of its fonts, of which matplotlib warns in two lines
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    prepare_stdout()
-    sys.exit(guarded(_status))
-
-
-def _status() -> int:
-    """Exit status of the command line; help and version are guarded as results are."""
-    try:
-        app()
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else 0
-    return 0

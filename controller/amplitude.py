@@ -73,14 +73,19 @@ def listen(p: Record, s: Record, late: bool) -> None:
 
     A block that comes `late` shows a v_a that was commanded longer ago than is known: it teaches nothing.
     """
+    if (
+        s.guard_state == CHECKING
+    ):  # what vibrates are the tones of the rig's check: they teach nothing of what is commanded
+        s.silent_steps, s.heard_steps, s.loud_steps, s.even_steps = 0, 0, 0, 0
+        s.expected_mps, s.in_phase_mps2, s.quadrature_mps2 = 0.0, 0.0, 0.0
+        return
     at = s.steps % REMEMBERED
     delay = s.loop_delay_steps if s.loop_delay_steps >= 0 else 0
     sent_m = s.sent_m[(at - 1 - delay) % REMEMBERED]
     expected_mps = TWO_PI * s.allowed_Hz * sent_m
     note_command(s, expected_mps)
     s.expected_mps += p.filter_share * (expected_mps - s.expected_mps)
-    silent = s.allowed_m == 0.0 and s.guard_state != CHECKING  # the rig's own check vibrates
-    s.silent_steps = s.silent_steps + 1 if silent and not late else 0
+    s.silent_steps = s.silent_steps + 1 if s.allowed_m == 0.0 and not late else 0
     if s.silent_steps > p.silence_steps:
         _note_silence(s)
         s.onset_steps, s.listening = -1, 1
@@ -143,7 +148,7 @@ def _note_delay(s: Record) -> None:
         s.loop_delay_steps = s.onset_steps
     else:
         s.loop_delay_steps += (s.onset_steps - s.loop_delay_steps) // 2
-    s.listening = 0
+    s.listening, s.even_steps = 0, 0
     # both low-passes begin here, as the delay was not known before
     s.expected_mps, s.in_phase_mps2, s.quadrature_mps2 = 0.0, 0.0, 0.0
 

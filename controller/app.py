@@ -344,11 +344,13 @@ class ControllerProcess:
                 self.event("FRESH", "every sample is a number again")
 
     def _obey(self, payload: bytes) -> None:
-        """Take an operator's message, and say so, a repeated one once in a while. Raises Fault BAD_MESSAGE."""
+        """Take an operator's message; say so where the rig does not, a repeated one once in a while. Raises Fault BAD_MESSAGE."""
         word = parsed(wire.Operator, payload, OPERATOR.name)
         if word.action not in wire.Operator.Action.values():
             raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {word.action}: not known")
         self._node.operator(word.action)
+        if self._node.rig_tells and not self._stale:  # a rig with a guard says what it takes; once is enough
+            return
         said = f"{wire.Operator.Action.Name(word.action)} by {word.who[:_LONGEST_WHO] or 'somebody'}"
         now_s = time.monotonic()
         if now_s - self._said_s.get(said, -_SAID_AGAIN_S) < _SAID_AGAIN_S:

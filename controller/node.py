@@ -9,7 +9,7 @@ from bridge.wire.block_numbers import BlockNumbers, Verdict
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
-from bridge.wire.messages import sensor_block
+from bridge.wire.messages import has_checksum, is_whole, sensor_block
 from bridge.wire.payloads import sequence_and_time
 from bridge.wire.topics import ANNOUNCE, COMMAND, SENSORS, SNAPSHOT, STATE, TRACE, Outgoing
 from controller.announced import take_announcement
@@ -55,6 +55,7 @@ class ControllerNode:
         self._lateness_ns = self._trace["lateness_ns"]
         self._numbers = BlockNumbers()
         self.block_t_ns = 0  # of the last block
+        self._seals = False  # whether the rig gives its blocks a checksum
         self._length_checked = False
         self._wrong_lengths_ns: list[int] = []
         self._operator_events = 0
@@ -69,6 +70,11 @@ class ControllerNode:
     def amplitude_m(self) -> float:
         """Amplitude of the last command [m]."""
         return float(self._state[0]["allowed_m"])
+
+    @property
+    def rig_tells(self) -> bool:
+        """Whether the rig has a guard, which takes a person's words and says so."""
+        return int(self._state[0]["guard_state"]) != wire.NO_GUARD
 
     @property
     def unreadable(self) -> bool:
@@ -122,6 +128,7 @@ class ControllerNode:
     def rig_was_away(self) -> None:
         """The rig left the bus and came back: blocks that count from 0 again are those of a new run."""
         self._numbers.sender_was_away()
+        self._seals = False
 
     def block(self, payload: bytes, arrival_ns: int = 0) -> Outgoing | None:
         """Consume a sensor block; return the command that answers it, or None for a block that is late, repeated or a stranger's.
@@ -129,6 +136,8 @@ class ControllerNode:
         Send the command first; then `rest` gives the other messages of the step.
         """
         payload = self._layout.canonical(payload, SENSORS.name)
+        if self._seals or has_checksum(payload):
+            self._refuse_changed(payload)
         sequence, t_ns = sequence_and_time(payload, SENSORS.message)
         expected = self._numbers.expected
         verdict = self._numbers.judge(sequence, arrival_ns)
@@ -155,6 +164,13 @@ class ControllerNode:
             BLOCK | (GAP if gap_blocks else 0) | (LATE if self.age.late_ns > MARGIN_NS else 0) | self._operator_events
         )
         return self._step(sensors, events, gap_blocks)
+
+    def _refuse_changed(self, payload: bytes) -> None:
+        """Raise Fault BAD_MESSAGE for a block that was changed on its way; a rig that gave one checksum gives all."""
+        if not is_whole(payload):
+            line = f"{SENSORS.name}: checksum: is not that of the block's bytes, which were changed on their way"
+            raise Fault("BAD_MESSAGE", f"{line}; look at link and adapter")
+        self._seals = True
 
     def _check_clock(self, apart_ns: int, lost: int) -> None:
         """Compare t_ns with the number of the block.

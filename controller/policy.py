@@ -61,7 +61,7 @@ _STICK_STEP, _SLIP_STEP = 0.08, 0.4  # by which the ratio rises at a stick, and 
 _STARTS_S, _WOUND, _AHEAD = 0.2, 0.5, 1.25  # of a move; of the force at which it slides; of the ratio meanwhile
 _BEGINS_S = 0.02  # of a move in which the spring is looked at
 _RISING = 1.05  # held over measured v_d up to which the drive does not slow down
-_ABOVE_SLIDE, _FASTEST = 1.1, 1.6  # v_a over v_s of a slide that is late, up to this share of v_d
+_ABOVE_SLIDE = 1.1  # v_a over v_s of a slide that is late
 _TURNING_S = 0.05  # that a drive stands at most where it turns
 _STARTING_S = 0.15  # of a vibration in which the contact still lets go of what it held
 _REAL_STICK = (
@@ -89,7 +89,7 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> N
     speed_mps = math.fabs(s.drive_velocity_mps)
     ahead_mps = announced_ahead(s, t_ns, t_ns + round(1e9 * _look_ahead_s(p, s)))
     s.wanted_speed_mps = max(speed_mps, s.rising_mps, math.fabs(ahead_mps))
-    sliding_mps = _still_sliding_mps(s, speed_mps)
+    sliding_mps = _still_sliding_mps(s)
     if s.moving == 0 and ahead_mps != 0.0:
         s.direction = 1 if ahead_mps > 0.0 else -1
         way = way_of(s)
@@ -130,13 +130,16 @@ def decide(p: Record, s: Record, t_ns: int, force_N: float, block_s: float) -> N
 
 
 @kernel
-def _still_sliding_mps(s: Record, speed_mps: float) -> float:
-    """Velocity of a slide that is late to follow its drive: a v_a that falls below it does not hold the slide any more."""
+def _still_sliding_mps(s: Record) -> float:
+    """Velocity of a slide that is late to follow its drive: a v_a that falls below it does not hold the slide any more.
+
+    A slide that is late only slows down. One that becomes faster is let go by the vibration itself: more lets go of more.
+    """
     if s.steady_s > STEADY_S or s.mode != EXCITE or s.mode_s < STEADY_S:
+        s.late_mps = math.inf
         return 0.0
-    if s.level < 0:
-        return s.held_mps
-    return min(math.fabs(s.sliding_mps), max(s.held_mps, _FASTEST * speed_mps))
+    s.late_mps = min(s.late_mps, s.held_mps if s.level < 0 else min(math.fabs(s.sliding_mps), s.held_mps))
+    return s.late_mps
 
 
 @kernel

@@ -93,6 +93,7 @@ STATE = np.dtype(
         ("drive_velocity_sigma_mps", "f8"),
         ("held_mps", "f8"),  # |v_d|, rises at once, falls slowly
         ("rising_mps", "f8"),  # |v_d|, ahead of its windows where it grows
+        ("late_mps", "f8"),  # least |v_s| of a slide since its drive changes its speed
         ("steady_mps", "f8"),
         ("steady_s", "f8"),  # since v_d last changed
         ("moved_s", "f8"),  # since the drive started or turned
@@ -155,6 +156,8 @@ STATE = np.dtype(
         ("waiting_s", "f8"),
         ("swing", "f8"),  # share of v_d by which the slide was off while vibrating, forgotten in time
         ("even_s", "f8"),  # with little of it, in this mode
+        ("swung", "f8"),  # mean square of what v_s swings by, over v_d
+        ("swung_least", "f8"),  # the least of it since a fade began that asks; infinite in one that follows an answer
         ("fade", "f8"),  # ratio of a vibration that fades
         ("fade_from_N", "f8"),
         ("fade_per_s", "f8"),
@@ -252,6 +255,7 @@ STATE = np.dtype(
         ("bend_m", "f8"),  # of the drive's place from sample to sample, mean
         ("bent", "i8"),  # looks in a row with much more of it
         ("slip_count", "f8"),  # in the last second
+        ("slips_wound", "f8"),  # for which the spring could wind up in it
         ("unbelieved_s", "f8"),  # for which slips count as noise
         ("noise_told_s", "f8"),  # for which it is told that noise became larger
         ("slide_accel_unread", "i8"),  # whether the slide's accelerometer shows no numbers

@@ -7,10 +7,12 @@ the relations, put the answer together.
 import math
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 from bridge.log.finding import Finding
 from diagnosis.evidence.folder import Evidence, Run
+from diagnosis.fits.fit import Fit
 from diagnosis.fits.retuning import retuned_rig
 from diagnosis.gap.excerpt import excerpt
 from diagnosis.gap.prepare import Prepared, prepare
@@ -19,7 +21,8 @@ from diagnosis.hypotheses.trials import cannot_show, trials
 from diagnosis.latent.answer import LatentSignal, latent_of
 from diagnosis.processes import one_thread
 from diagnosis.relations.answer import Relations, relations_of
-from diagnosis.relations.decide import Decision, decision_of
+from diagnosis.relations.decide import Decision, decision_of, ruled_out
+from diagnosis.relations.relation import OUTSIDE
 from diagnosis.report.assemble import assembled
 from diagnosis.report.latent_block import latent_line
 from diagnosis.report.relations_block import in_a_line, with_relations
@@ -28,8 +31,9 @@ from diagnosis.result import Diagnosis
 from diagnosis.verdict.by_latent import with_latent
 from diagnosis.verdict.by_relations import Closed, in_view_of
 from diagnosis.verdict.confirmation import borne_out
+from diagnosis.verdict.held_out import HeldOut
 from diagnosis.verdict.judge import Verdict, although_outside
-from diagnosis.verdict.selection import Contest, Progress
+from diagnosis.verdict.selection import Contest, Known, Progress
 
 _FOR_FITS = 0.7  # share of the time that the fits may take; the held-out runs, the next experiment and the pictures take the rest
 _NO_FIT = Finding("budget", "fits", "none was made: names and shares are those of relations and friction alone")
@@ -65,13 +69,13 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: floa
     began = time.monotonic()
     runs = prepare(evidence)
     relations = relations_of(evidence.rig, runs)
-    seen = _Seen(runs, relations, decision_of(relations), latent_of(evidence.rig, runs))
+    seen = _Seen(runs, relations, decision_of(relations, evidence.rig), latent_of(evidence.rig, runs))
     for told in (in_a_line(seen.decision), latent_line(seen.latent)):
         if told:
             progress(told, 0.02)
     done = None
     if comparable(runs):
-        done = _by_fits(evidence, seen, progress, jobs, (began, began + _FOR_FITS * budget_s))
+        done = _by_fits(evidence, seen, progress, jobs, (began, began + budget_s))
     if done is None:
         verdict = with_latent(in_view_of(unfitted(), seen.decision, [], Closed(None, None)), seen.latent)
         verdict = with_vibration_findings(verdict, evidence.runs)
@@ -91,27 +95,31 @@ def _by_fits(
     evidence = excerpt(whole)
     runs = seen.runs if evidence is whole else prepare(evidence)
     problem = Problem(evidence.rig, [run for run in runs if not run.holdout])
-    problem.until_s = until_s
-    hidden = set(cannot_show(evidence.rig, runs, evidence.assumed))
+    problem.until_s = began + _FOR_FITS * (until_s - began)
+    hidden = set(cannot_show(evidence.rig, runs, evidence.assumed)) | ruled_out(seen.relations, seen.decision)
     tried = [trial for trial in trials(problem) if not hidden & set(trial.hypothesis.effects)]
     try:
-        contest = Contest(retuned_rig(evidence, problem, progress, jobs), tried, jobs)
+        contest = Contest(retuned_rig(evidence, problem, progress, jobs), tried, jobs, _known(seen))
     except OutOfTimeError:
         return None
     findings: tuple[Finding, ...] = ()
     try:
         contest.decide(progress)
-        problem.until_s = contest.rig.fitter.problem.until_s = math.inf
     except OutOfTimeError:
-        problem.until_s = math.inf
         contest.stop()
         findings = (_CUT_SHORT,)
+    contest.rig.fitter.problem.until_s = until_s
     held_out = [run for run in runs if run.holdout]
-    outcome = borne_out(contest, Problem(evidence.rig, held_out) if held_out else None, jobs)
+    judged_on = Problem(evidence.rig, held_out) if held_out else None
+    if judged_on is not None:
+        judged_on.until_s = until_s
+    try:
+        outcome = borne_out(contest, judged_on, jobs)
+    except OutOfTimeError:
+        outcome = borne_out(contest, None, jobs)
+        findings = (_CUT_SHORT,)
     nearest = outcome.gone or outcome.verdict.runner_up
-    closes = (
-        outcome.held_out.closed_by(nearest).shrinkage if outcome.held_out is not None and nearest is not None else None
-    )
+    closes = _closed(outcome.held_out, nearest)
     verdict = in_view_of(outcome.verdict, seen.decision, [*contest.singles, *contest.pairs], Closed(nearest, closes))
     verdict = with_latent(verdict, seen.latent)
     verdict = with_vibration_findings(verdict, evidence.runs)
@@ -119,6 +127,20 @@ def _by_fits(
     progress(f"verdict: {outcome.verdict.kind}", 0.8)
     done = assembled(evidence, runs, contest, outcome, tried, began, jobs)
     return done._replace(findings=(*done.findings, *findings))
+
+
+def _closed(held_out: HeldOut | None, fit: Fit | None) -> float | None:
+    """Share of the held-out gap that a fit closes; None where that is not known."""
+    if held_out is None or fit is None:
+        return None
+    with suppress(OutOfTimeError):
+        return held_out.closed_by(fit).shrinkage
+    return None
+
+
+def _known(seen: _Seen) -> Known:
+    shown = {cause for one in seen.relations.answered for cause in one.chosen.causes if cause not in OUTSIDE}
+    return Known(frozenset(shown), bool(seen.decision.outside))
 
 
 def with_vibration_findings(verdict: Verdict, runs: Sequence[Run]) -> Verdict:

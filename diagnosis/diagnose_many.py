@@ -5,6 +5,7 @@ A worker reads its folder by the absolute path, so the workers of a cluster need
 
 import re
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Generator, Iterable
@@ -26,6 +27,8 @@ from diagnosis.result import Diagnosis
 
 Progress = Callable[[str, float], None]
 Diagnose = Callable[[Evidence, Progress, int], Diagnosis]
+# For joblib's tracker, a process of its own: a worker that is ended amid its jobs leaves folders that it removes, and warns of.
+_NO_WARNING = "ignore:resource_tracker:UserWarning"
 _CLUSTER_WAIT_S = 5  # time for the scheduler to answer, and again for a first worker; too short fails on a busy network
 
 
@@ -74,8 +77,12 @@ def diagnose_many(
     cluster: str = "",
     diagnose: Diagnose = real_diagnose,
     certs: str = "",
+    shared: bool = True,
 ) -> Generator[FolderResult]:
     """Yield the result of every source, in the order in which they finish.
+
+    A folder has one process. Last folders, where they are at most half as many as the processes, come when all others are
+    done, and share the processes: two folders on eight have four each.
 
     A folder that cannot be diagnosed, or that kills its worker again and again, yields a fault and stops no other folder. Closing
     the generator, or Ctrl-C, ends the local workers; a cluster drops the folders that it has not begun.
@@ -88,50 +95,81 @@ def diagnose_many(
         cluster: address of a Dask scheduler; empty: none.
         diagnose: a function at the top level of a module, so that it can be sent to a worker.
         certs: folder of the certificates for a cluster at tls://; empty: the user's own.
+        shared: whether last folders share the processes; else each has one, as where times are compared.
 
     """
-    waiting = {source.name: source for source in sources}
+    waiting = list(sources)
     with _workers(jobs, cluster, certs) as workers:
-        while waiting:
-            try:
-                for outcome in workers.pool(workers.dispatched)(
-                    delayed(_one)(source, diagnose) for source in list(waiting.values())
-                ):
-                    del waiting[outcome.source.name]
-                    yield outcome
-            except workers.breakdowns:
-                # Which folder killed its worker is not known: all that may have been under way are done again, one by one.
-                for source in list(waiting.values())[: workers.dispatched]:
-                    yield _alone(source, diagnose, workers)
-                    del waiting[source.name]
+        last = len(waiting) % workers.cores
+        if not shared or 2 * last > workers.cores:  # one process each is all that they could have
+            last = 0
+        first = len(waiting) - last
+        yield from _several(waiting[:first], _Task(diagnose, 1, workers.inner), workers)
+        if last:
+            yield from _several(waiting[first:], _Task(diagnose, workers.cores // last, workers.inner), workers)
 
 
-def _alone(source: EvidenceFolder, diagnose: Diagnose, workers: "_Workers") -> FolderResult:
+class _Task(NamedTuple):
+    """How a worker diagnoses a folder."""
+
+    diagnose: Diagnose
+    jobs: int  # for one folder
+    inner: dict[str, Any]  # for joblib's `parallel_config`, where there are several jobs
+
+
+def _several(sources: list[EvidenceFolder], task: _Task, workers: "_Workers") -> Generator[FolderResult]:
+    waiting = {source.name: source for source in sources}
+    while waiting:
+        try:
+            for outcome in workers.pool(workers.dispatched)(
+                delayed(_one)(source, task) for source in list(waiting.values())
+            ):
+                del waiting[outcome.source.name]
+                yield outcome
+        except workers.breakdowns:
+            # Which folder killed its worker is not known: all that may have been under way are done again, one by one.
+            for source in list(waiting.values())[: workers.dispatched]:
+                yield _alone(source, task, workers)
+                del waiting[source.name]
+
+
+def _alone(source: EvidenceFolder, task: _Task, workers: "_Workers") -> FolderResult:
     try:
-        return next(iter(workers.pool(1)([delayed(_one)(source, diagnose)])))
+        return next(iter(workers.pool(1)([delayed(_one)(source, task)])))
     except workers.breakdowns as error:
-        line = f"{source.folder}: its worker process died ({type(error).__name__}); out of memory? Try fewer or shorter runs"
-        return FolderResult(source, None, ("PEER_DIED", line))
+        return _died(source, error)
 
 
-def _one(source: EvidenceFolder, diagnose: Diagnose) -> FolderResult:
+def _one(source: EvidenceFolder, task: _Task) -> FolderResult:
     try:
-        # sequential inside a worker: Dask would spread the work of one folder over its workers again
-        with parallel_config("sequential"):
-            return FolderResult(source, diagnose(load_evidence(source.folder), lambda _text, _share: None, 1), None)
+        # sequential for one job: Dask would spread the work of the folder over its workers
+        with parallel_config(**({"backend": "sequential"} if task.jobs == 1 else task.inner)):
+            diagnosis = task.diagnose(load_evidence(source.folder), lambda _text, _share: None, task.jobs)
+        return FolderResult(source, diagnosis, None)
     except Fault as fault:
         return FolderResult(source, None, (fault.kind.code, fault.line))
+    except BrokenProcessPool as error:
+        return _died(source, error)
     except Exception as error:  # an error in one folder must not end the work on the others
         at = traceback.extract_tb(error.__traceback__)[-1]
         line = f"{type(error).__name__}: {error} ({Path(at.filename).name}, line {at.lineno})"
         return FolderResult(source, None, ("DIAGNOSIS_BROKE", line))
 
 
+def _died(source: EvidenceFolder, error: Exception) -> FolderResult:
+    line = (
+        f"{source.folder}: its worker process died ({type(error).__name__}); out of memory? Try fewer or shorter runs"
+    )
+    return FolderResult(source, None, ("PEER_DIED", line))
+
+
 class _Workers(NamedTuple):
     """A pool of workers, local or on a cluster."""
 
     pool: Callable[[int], Any]  # a joblib.Parallel with at most this number of tasks under way
+    cores: int
     dispatched: int  # largest useful number of tasks under way
+    inner: dict[str, Any]  # of `_Task`
     breakdowns: tuple[type[Exception], ...]  # the exceptions that are raised when a worker has died for good
 
 
@@ -161,8 +199,11 @@ def _cluster_security(cluster: str, certs: str) -> Any:
 @contextmanager
 def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
     if not cluster:
+        if _NO_WARNING not in sys.warnoptions:
+            sys.warnoptions.append(_NO_WARNING)
         config = {"backend": "loky", "n_jobs": jobs, "initializer": _leave_interrupt_to_parent}
-        yield _Workers(partial(_pool, config), 2 * jobs, (BrokenProcessPool,))
+        inner = {"backend": "loky", "initializer": _leave_interrupt_to_parent}
+        yield _Workers(partial(_pool, config), jobs, 2 * jobs, inner, (BrokenProcessPool,))
         return
     try:
         from distributed import Client, KilledWorker  # noqa: PLC0415
@@ -193,8 +234,9 @@ def _workers(jobs: int, cluster: str, certs: str) -> Generator[_Workers]:
         def pool(dispatched: int) -> Any:
             return _pool({"backend": Cluster(client=client, wait_for_workers_timeout=_CLUSTER_WAIT_S)}, dispatched)
 
-        # TimeoutError: not one worker is left
-        yield _Workers(pool, 2 * sum(client.ncores().values()), (KilledWorker, TimeoutError))
+        cores = sum(client.ncores().values())
+        # nothing inside a worker, where joblib spreads over the workers of the cluster; TimeoutError: not one worker is left
+        yield _Workers(pool, cores, 2 * cores, {}, (KilledWorker, TimeoutError))
 
 
 def _pool(config: dict[str, Any], dispatched: int) -> Any:

@@ -17,7 +17,7 @@ from cockpit import cli
 from cockpit.run.scenario import Scenario
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest import Manifest
-from docs import zenoh_files
+from docs import constants, zenoh_files
 from plant.effects.library import EFFECTS
 from plant.effects.row import Form
 from plant.pairs import PAIRS
@@ -71,7 +71,21 @@ _VALUES = {"str": "TEXT", "int": "N", "float": "NUMBER", "Path": "PATH"}
 def pages() -> dict[str, str]:
     """Text of every made page, by file name in docs/reference."""
     made = {"commands.md": _commands(), "effects.md": _effects(), "faults.md": _faults(), "files.md": _files()}
+    made["constants.md"] = _constants()
     return {name: "\n".join((title, "", _MADE, *lines, "")) for name, (title, *lines) in made.items()}
+
+
+def _constants() -> list[str]:
+    rows = dict(constants.sections())
+    numbers = [row for own in rows.values() for row in own]
+    lines = [
+        "# Constants of the diagnosis",
+        f"The diagnosis decides by {len(numbers)} numbers in {len({row[1] for row in numbers})} files of `diagnosis/`. Where no"
+        " count is named, the number follows from what is said of it, or is a step of the computation.", "",
+    ]  # fmt: skip
+    for room, own in rows.items():
+        lines += [f"## {room}", "", *_table(("constant", "file", "value", "what it does", "counted in"), own)]
+    return lines[:-1]
 
 
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:

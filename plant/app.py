@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from bridge.faults import Fault
 from bridge.guard.codes import RESET, STOP
 from bridge.guard.config import wider
+from bridge.guard.kept_gain import KeptGain
 from bridge.guard.latch import StopLatch
 from bridge.guard.received import Commands
 from bridge.guard.tell import Teller
@@ -64,11 +65,14 @@ def run(
     why_not = latch.can_be_set() if latch is not None else ""
     run_number = 1 if lockstep else secrets.randbits(63) | 1  # in lockstep the same run gives the same log
     node = PlantNode(rig, seed, run_number, arm and not why_not, latch is not None and latch.is_set, faults)
+    kept = None if latch is None else KeptGain(rig.name, node.check_tones_Hz)
+    if kept is not None:
+        node.accept_gain(kept.load())
     node.warm_up()
     blocks = round(duration_s / rig.solver.block_s) if duration_s > 0 else 2**62
     with Bus(bus_config, "plant", lockstep) as bus:
         bus.serve_header(header)
-        process = PlantProcess(node, bus, latch, tell)
+        process = PlantProcess(node, bus, latch, tell, kept)
         # before the other processes hear of this one: claimed later, the link may lapse on busy cores (docs/method/plant.md)
         if lockstep:
             realtime.claim(realtime.core(bus_config.port), realtime.LOCKSTEP_PRIORITY)
@@ -117,11 +121,15 @@ class PlantProcess:
         bus: its session.
         latch: where a person's stop is kept; None: nowhere.
         say: of what is more than news, for a person.
+        kept: where the exciter's gain is kept that was accepted; None: nowhere.
 
     """
 
-    def __init__(self, node: PlantNode, bus: Bus, latch: StopLatch | None, say: Tell = untold) -> None:
+    def __init__(
+        self, node: PlantNode, bus: Bus, latch: StopLatch | None, say: Tell = untold, kept: KeptGain | None = None
+    ) -> None:
         self._node = node
+        self._kept, self._accepted_gain = kept, node.accepted_gain
         self._say = say
         self._latch = latch
         self._teller = Teller()
@@ -230,10 +238,20 @@ class PlantProcess:
             self.event("STATE_FOLDER", text)
             say(f"stickslip: warning: STATE_FOLDER: {text}")
 
+    def _keep_gain(self, kept: KeptGain, gains: list[float]) -> None:
+        try:
+            kept.save(gains)
+        except (OSError, Fault) as error:
+            self.event("STATE_FOLDER", f"{kept.path}: {error}: the next run of this rig compares its gain with nothing")
+
     def _tell(self) -> None:
         applied = self._node.applied
         for code, text in self._teller.news(applied):
-            self.event(code, text)
+            changed = f"by a factor of {self._node.gain_change:.2f}; " if code == "GAIN_CHANGED" else ""
+            self.event(code, f"{changed}{text}")
+            if code == "GUARD" and self._kept is not None and self._accepted_gain != self._node.accepted_gain:
+                self._accepted_gain = self._node.accepted_gain
+                threading.Thread(target=self._keep_gain, args=(self._kept, self._accepted_gain), name="gain").start()
         if refused := int(applied.commands_refused):
             text = "of another run, or not newer than the last: refused; is a controller of an earlier run still there?"
             self._complaints.note(FOREIGN, f"{COMMAND.name} of another run", text, refused)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from bridge.faults import Fault
+from bridge.guard.check import gain_change
 from bridge.guard.codes import LEAVE
 from bridge.guard.core import accept
 from bridge.guard.senses import expect_drive
@@ -14,7 +15,7 @@ from bridge.guard.states import obey
 from bridge.kernel_cache import compile_once
 from bridge.wire.messages import ANNOUNCE as ANNOUNCE_LAYOUT
 from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
-from bridge.wire.messages import CHANNELS, sensor_block
+from bridge.wire.messages import CHANNELS, sealed, sensor_block
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, SENSORS, Outgoing
 from plant.config import RigConfig
@@ -131,11 +132,32 @@ class PlantNode:
         if not math.isfinite(self.truth[_VELOCITY, -1]):  # NaN anywhere in the state reaches the velocity within a step
             raise no_number(self._config, self.block)
         self.block += 1
-        return Outgoing(SENSORS, self._sensors.tobytes()), Outgoing(APPLIED, self._applied.tobytes())
+        return Outgoing(SENSORS, sealed(self._sensors.tobytes())), Outgoing(APPLIED, self._applied.tobytes())
 
     def obey(self, word: int) -> bool:
         """Take a person's word (`wire.Operator.Action`), or LEAVE of `bridge.guard.codes`; whether it changed the state."""
         return bool(obey(self._guard_state[0], word))
+
+    @property
+    def check_tones_Hz(self) -> list[float]:
+        """Frequencies of the loop check."""
+        p = self._guard_params[0]
+        return [float(tone_Hz) for tone_Hz in p.tone_Hz[: int(p.tones)]]
+
+    def accept_gain(self, gains: Sequence[float]) -> None:
+        """Compare later checks with gains that an earlier run accepted, one a tone; none: with nothing."""
+        self._guard_state[0].accepted[: len(gains)] = gains
+
+    @property
+    def accepted_gain(self) -> list[float]:
+        """Of the exciter at each tone of the loop check, as it was accepted; none before the first check."""
+        gains = [float(gain) for gain in self._guard_state[0].accepted[: int(self._guard_params[0].tones)]]
+        return gains if all(gains) else []
+
+    @property
+    def gain_change(self) -> float:
+        """Largest factor, either way, between the gains of the last check and those accepted."""
+        return gain_change(self._guard_params[0], self._guard_state[0])
 
     @property
     def applied(self) -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from diagnosis.evidence.folder import Evidence
+from diagnosis.processes import each
 from diagnosis.result import (
     Candidate,
     Cell,
@@ -55,12 +56,12 @@ drive_velocity_mps = 0.0005
 
 
 def evidence_folder(at: Path) -> Path:
-    """The smallest evidence that is read without a fault."""
+    """The smallest evidence that is read without a fault; its content differs by the folder's name."""
     at.mkdir(parents=True)
     t_s = np.arange(2000) / 2000
     force_N = 15 + 2 * np.sin(9 * t_s)
     lines = [f"{t:.6f},{force:.6f}" for t, force in zip(t_s, force_N, strict=True)]
-    (at / "manifest.toml").write_text(MANIFEST)
+    (at / "manifest.toml").write_text(f"{MANIFEST}# {at.name.encode(errors='replace').decode()}\n")
     (at / "run-01.csv").write_text("t_s,drive_force_N\n" + "\n".join(lines) + "\n")
     return at
 
@@ -176,6 +177,26 @@ def dies(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | No
         mark.write_text(str(os.getpid()))
         os.kill(os.getpid(), signal.SIGKILL)
     time.sleep(0.1)
+    return quick(evidence, progress, jobs)
+
+
+def spreads(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
+    """Like `quick`, but says 0 jobs where several did not get processes of their own."""
+    told = quick(evidence, progress, jobs)
+    own = jobs == 1 or os.getpid() not in each(jobs, _who, None, range(jobs))
+    return told if own else told._replace(elapsed_s=0.0)
+
+
+def _who(_shared: None, _item: int) -> int:
+    return os.getpid()
+
+
+def marks(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
+    """Like `quick`, but leaves a line in the evidence's folder each time, and `slow` takes a minute."""
+    with (evidence.folder / "done").open("a") as file:
+        file.write("once\n")
+    if "slow" in evidence.folder.name and not (evidence.folder / "fast").exists():
+        time.sleep(60.0)
     return quick(evidence, progress, jobs)
 
 

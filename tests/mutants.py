@@ -1,4 +1,6 @@
-"""`make mutants`: every condition of the guard is changed in turn, and its unit tests must notice; `python -m tests.mutants`.
+"""`make mutants`: every condition of the guard is changed in turn, and its unit tests must notice.
+
+`python -m tests.mutants --report FILE` writes the page of it.
 
 Cosmic Ray changes the files of a copy: each comparison gets its edge moved and is turned round, each `and` becomes `or` and the
 other way round, each condition gets a `not`. Kernels run interpreted, as a change would compile them anew.
@@ -10,6 +12,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,14 +30,45 @@ CHANGES = (
     "ReplaceComparisonOperator_(Eq_NotEq|NotEq_Eq|Lt_LtE|LtE_Lt|Gt_GtE|GtE_Gt|Lt_GtE|LtE_Gt|Gt_LtE|GtE_Lt)$",
     "ReplaceAndWithOr|ReplaceOrWithAnd|AddNot|ReplaceUnaryOperator_Delete_Not|ReplaceTrueWithFalse|ReplaceFalseWithTrue",
 )
+# changes after which the guard does the same, by the changed line: no test can notice them
+SAME = {
+    "if frequency_Hz < p.tone_Hz[0]:": "the line between the tones goes through them",
+    "if frequency_Hz < p.tone_Hz[i]:": "the line between the tones goes through them",
+    "if velocity_mps >= fastest_mps:": "of two equal velocities either is the larger",
+    "elif velocity_mps >= second_mps:": "of two equal velocities either is the larger",
+    "if determinant <= 1e-9:": "a measured number is never equal to the last bit",
+    "if s.tone_mps2 <= _HEARD * s.quiet_mps2:": "a measured number is never equal to the last bit",
+    "elif not 1.0 / _WILD <= s.gain[at] < _WILD:": "a measured number is never equal to the last bit",
+    "elif not 1.0 / _WILD < s.gain[at] <= _WILD:": "a measured number is never equal to the last bit",
+}
+_ABOUT = (
+    "Made by `python -m tests.mutants --report docs/quality/mutants.md`; `make mutants` runs the same and fails where more than "
+    f"{MOST_SURVIVE:.0%} of the",
+    "changes go unnoticed. Each comparison of the guard's kernels gets its edge moved and is turned round, each `and` becomes "
+    "`or`",
+    "and the other way round, each condition gets a `not`, each `True` becomes `False`; after each change its unit tests run.",
+)
 _LONGEST_S = 600.0  # of the tests after a change, as some changes never end
+
+
+class Survivor(NamedTuple):
+    """A change that no test noticed."""
+
+    place: str  # file and line
+    change: str  # the line as it was changed
+
+    @property
+    def why(self) -> str:
+        """Why no test can notice it; empty where one could."""
+        return SAME.get(self.change, "")
 
 
 class Count(NamedTuple):
     """Of one file."""
 
+    module: str
     changed: int
-    survived: list[str]  # place and change of each
+    survived: list[Survivor]
 
 
 def copy_to(folder: Path) -> None:
@@ -69,31 +103,56 @@ def run(module: str, folder: Path) -> Count:
         subprocess.run([str(tools / words[0]), *words[1:]], cwd=folder, env=environment, check=True)
     with sqlite3.connect(session) as found:
         rows = found.execute(
-            "SELECT start_pos_row, operator_name, test_outcome, diff FROM work_results JOIN mutation_specs USING (job_id) "
+            "SELECT start_pos_row, test_outcome, diff FROM work_results JOIN mutation_specs USING (job_id) "
             "WHERE worker_outcome != 'SKIPPED'"
         ).fetchall()
     survived = [
-        f"bridge/guard/{module}.py:{row}: {operator.removeprefix('core/')}\n{diff}"
-        for row, operator, outcome, diff in rows
+        Survivor(f"bridge/guard/{module}.py:{row}", next(_added(diff)))
+        for row, outcome, diff in rows
         if str(outcome).endswith("SURVIVED")
     ]
-    return Count(len(rows), survived)
+    return Count(module, len(rows), sorted(survived))
+
+
+def _added(diff: str) -> Iterator[str]:
+    return (line[1:].strip() for line in diff.splitlines() if line.startswith("+") and not line.startswith("+++"))
+
+
+def page(counts: Sequence[Count]) -> str:
+    """The result in Markdown."""
+    rows = [(f"`bridge/guard/{one.module}.py`", one.changed, one.survived) for one in counts]
+    rows.append(("all", sum(row[1] for row in rows), [one for row in rows for one in row[2]]))
+    table = [
+        f"| {name} | {changed} | {len(survived)} | {len(survived) / changed:.1%} | {sum(not one.why for one in survived)} |"
+        for name, changed, survived in rows
+    ]
+    left = [f"| `{one.place}` | `{one.change}` | {one.why or 'a test could notice it'} |" for one in rows[-1][2]]
+    return "\n".join([
+        "# Mutants of the guard", "",
+        *_ABOUT, "",
+        "| file | changed conditions | survive | share | of them a test could notice |", "|---|---|---|---|---|", *table, "",
+        "## Those that survive", "",
+        *(["| line | as changed | why |", "|---|---|---|", *left] if left else ["None."]), "",
+    ])  # fmt: skip
 
 
 def main() -> int:
     """Exit status 1: too many survived."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("modules", nargs="*", default=list(MODULES), help="Of the guard; all five if not given.")
-    modules = options.parse_args().modules
+    options.add_argument("--report", type=Path, metavar="FILE", help="Write the page, one .md file.")
+    given = options.parse_args()
     folder = Path("runs/mutants")
     copy_to(folder)
     counts: list[Count] = []
-    for module in modules:
+    for module in given.modules:
         counts.append(run(module, folder))
         print(f"{module}: {len(counts[-1].survived)} of {counts[-1].changed} changed conditions survive", flush=True)
     changed, survived = sum(one.changed for one in counts), [line for one in counts for line in one.survived]
-    print("\n".join(survived))
+    print("\n".join(f"{one.place}: {one.change}  ({one.why or 'a test could notice it'})" for one in survived))
     print(f"{len(survived)} of {changed} changed conditions survive: at most {MOST_SURVIVE:.0%} may")
+    if given.report is not None:
+        given.report.write_text(page(counts))
     return int(len(survived) > MOST_SURVIVE * changed)
 
 

@@ -2,7 +2,17 @@
 
 import math
 
-from bridge.guard.codes import ARMED, CHECK_PASSED, EXCITER_SILENT, EXCITER_WILD, SENSOR_FROZEN, SENSOR_NOT_FINITE
+from bridge.guard.codes import (
+    ARMED,
+    CHECK_PASSED,
+    EXCITER_SILENT,
+    EXCITER_WILD,
+    FIRST_CHECK,
+    GAIN_CHANGED,
+    READY,
+    SENSOR_FROZEN,
+    SENSOR_NOT_FINITE,
+)
 from bridge.guard.states import enter, trip
 from bridge.kernel import Record, kernel
 
@@ -35,7 +45,7 @@ def _blocks(p: Record, time_s: float) -> int:
 
 @kernel
 def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> None:
-    """Take a block of samples of the check; go to ARMED at its end, or to FAULT.
+    """Take a block of samples of the check; go to ARMED at its end, to READY where the gain is another one, or to FAULT.
 
     Args:
         p, s: records of `bridge.guard.records`.
@@ -59,7 +69,8 @@ def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> Non
     s.check_blocks += 1
     if at >= p.tones:
         if s.amplitude_m == 0.0:
-            enter(s, ARMED, CHECK_PASSED)
+            s.square_mps2, s.vibration_mps = 0.0, 0.0  # of its own tones; what vibrates next is not louder by them
+            _end(p, s)
         return
     if at < 0:
         s.quiet_mps2 += square_mps2 / quiet_blocks
@@ -76,6 +87,28 @@ def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> Non
         s.tone_mps2 += square_mps2 / (tone_blocks - (tone_blocks + 1) // 2)
     if done == tone_blocks - 1:
         _judge(p, s, at)
+
+
+@kernel
+def _end(p: Record, s: Record) -> None:
+    """Compare the gain with the one that was accepted last, and arm where it is the same, or there is none."""
+    if s.accepted[0] == 0.0:
+        s.accepted[:] = s.gain
+        enter(s, ARMED, FIRST_CHECK)
+    elif gain_change(p, s) > p.gain_change:
+        enter(s, READY, GAIN_CHANGED)
+    else:  # the accepted gain stays what it was, or small changes would add up
+        enter(s, ARMED, CHECK_PASSED)
+
+
+@kernel
+def gain_change(p: Record, s: Record) -> float:
+    """Largest factor, either way, between the gains of the last check and those that were accepted."""
+    largest = 1.0
+    for at in range(p.tones):
+        ratio = s.gain[at] / s.accepted[at]
+        largest = max(largest, ratio, 1.0 / ratio)
+    return largest
 
 
 @kernel

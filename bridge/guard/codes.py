@@ -26,12 +26,19 @@ OVERTRAVEL, DRIVE_MAX, DRIVE_RATIO, LOUD, BAND, HEAT, DUTY, SLEW_RATE = (
         *(wire.BAND, wire.HEAT, wire.DUTY, wire.SLEW_RATE),
     )
 )
+FIRST_CHECK, GAIN_CHANGED, GAIN_ACCEPTED = (
+    int(cause) for cause in (wire.FIRST_CHECK, wire.GAIN_CHANGED, wire.GAIN_ACCEPTED)
+)
 SENSOR_FROZEN, SENSOR_NOT_FINITE, EXCITER_SILENT, EXCITER_WILD = (
     int(cause) for cause in (wire.SENSOR_FROZEN, wire.SENSOR_NOT_FINITE, wire.EXCITER_SILENT, wire.EXCITER_WILD)
 )
 LIMITS = OVERTRAVEL, DRIVE_MAX, DRIVE_RATIO, LOUD, BAND, HEAT, DUTY  # those with a level and a time to hold
 
-STOP, RESET, ARM, DISARM = (
-    int(word) for word in (wire.Operator.STOP, wire.Operator.RESET, wire.Operator.ARM, wire.Operator.DISARM)
+STOP, RESET, ARM, DISARM, ACCEPT_GAIN = (
+    int(word)
+    for word in (
+        *(wire.Operator.STOP, wire.Operator.RESET, wire.Operator.ARM, wire.Operator.DISARM),
+        wire.Operator.ACCEPT_GAIN,
+    )
 )
 LEAVE = -1  # the rig's process ends

@@ -71,6 +71,10 @@ class GuardConfig(Strict):
     check_Hz: Annotated[list[Positive], Field(max_length=8)] = Field(
         default=[], description="Frequencies of the loop check, rising. Not given: five over piezo's range."
     )
+    gain_change: Annotated[float, Field(ge=1.05, le=2.0)] = Field(
+        default=1.25,
+        description="Factor either way from the gain that was accepted last, beyond which a loop check asks for a person's word.",
+    )
     check_share: Share = Field(default=0.1, description="Of the stroke, at which the loop check vibrates.")
 
     @model_validator(mode="after")
@@ -83,7 +87,7 @@ class GuardConfig(Strict):
         return self
 
 
-_WEAKER_IF_LARGER = ("velocity_ratio", "loud_ratio", "band_hold_s", "drive_memory_s", "command_lost_s")
+_WEAKER_IF_LARGER = ("velocity_ratio", "loud_ratio", "band_hold_s", "drive_memory_s", "command_lost_s", "gain_change")
 
 
 def wider(config: GuardConfig) -> str:

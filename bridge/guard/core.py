@@ -3,7 +3,7 @@
 import math
 
 from bridge.guard.check import check_tone, follow_check
-from bridge.guard.codes import ACTIVE, ARMED, CHECK_PASSED, CHECKING, COMMAND_LOST, DISARMED, NO_CAUSE, SLEW_RATE
+from bridge.guard.codes import ACTIVE, ARMED, ARMED_BY_SCENARIO, CHECKING, COMMAND_LOST, DISARMED, NO_CAUSE, SLEW_RATE
 from bridge.guard.limits import held, watch
 from bridge.guard.senses import see_drive, see_vibration
 from bridge.guard.states import enter, note_vibration
@@ -46,7 +46,7 @@ def allow(p: Record, s: Record, command_block: int, frequency_Hz: float, amplitu
             s.heard, s.lost_blocks = 1, 0
             target_Hz, target_m = frequency_Hz, held(p, s, frequency_Hz, amplitude_m)
         elif (
-            s.heard == 1 or s.cause == CHECK_PASSED
+            s.heard == 1 or s.cause != ARMED_BY_SCENARIO
         ):  # whom a person arms has a controller; a simulated rig may wait for its own
             s.limit = COMMAND_LOST
             s.lost_blocks += 1

@@ -15,6 +15,12 @@ def state_folder() -> Path:
     return (Path(given) if given else Path.home() / ".local" / "state") / "stickslip"
 
 
+def state_file(what: str, rig: str) -> Path:
+    """Where something is kept of a rig by its name; two names that differ in other letters alone are two rigs."""
+    name = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in rig)[:60]
+    return state_folder() / f"{what}-{name}-{hashlib.sha256(rig.encode()).hexdigest()[:8]}.json"
+
+
 class StopLatch:
     """The stop of one rig.
 
@@ -24,9 +30,7 @@ class StopLatch:
     """
 
     def __init__(self, rig: str) -> None:
-        name = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in rig)[:60]
-        # two names that differ in other letters alone are two rigs
-        self.path = state_folder() / f"stop-{name}-{hashlib.sha256(rig.encode()).hexdigest()[:8]}.json"
+        self.path = state_file("stop", rig)
         self._rig = rig
 
     @property

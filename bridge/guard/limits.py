@@ -48,6 +48,7 @@ def _inside(p: Record, frequency_Hz: float) -> bool:
 def held(p: Record, s: Record, frequency_Hz: float, amplitude_m: float) -> float:
     """The commanded amplitude, held at the limits [m]."""
     if amplitude_m == 0.0:
+        s.ratio_blocks = 0
         passes(p, s, BAND, 0.0)
         return 0.0
     if not passes(p, s, BAND, 0.0 if _inside(p, frequency_Hz) else 1.0):
@@ -61,8 +62,14 @@ def held(p: Record, s: Record, frequency_Hz: float, amplitude_m: float) -> float
     if s.verified == 1:
         per_m *= exciter_gain(p, s, frequency_Hz)
         ratio = per_m * amplitude_m / max(s.drive_mps, 1e-12)
-        if not passes(p, s, DRIVE_RATIO, ratio):
+        told = s.limit
+        if passes(p, s, DRIVE_RATIO, ratio):
+            s.ratio_blocks = 0
+        else:
             result_m = min(result_m, p.alarm[DRIVE_RATIO - FIRST] * s.drive_mps / per_m)
+            s.ratio_blocks += 1
+            if s.ratio_blocks <= p.window_blocks:
+                s.limit = told  # a start of the drive, which is seen as late as that
     return result_m
 
 

@@ -42,7 +42,7 @@ PARAMS = np.dtype(
         for name in (
             *("block_s", "sample_s", "slew_m_per_block", "frequency_min_Hz", "frequency_max_Hz"),
             *("loud_share", "memory_keep", "duty_share"),
-            *("heat_per_Hz_m2", "heat_share", "check_m"),
+            *("heat_per_Hz_m2", "heat_share", "check_m", "gain_change"),
         )
     ]
     + [(name, "i8") for name in ("timeout_blocks", "lost_blocks", "window_blocks", "bands", "tones")]
@@ -56,7 +56,7 @@ STATE = np.dtype(
         for name in (
             *("block", "state", "cause", "limit", "fresh", "heard", "last_sequence", "refused"),
             *("seen_blocks", "lost_blocks", "check_blocks", "verified", "frozen_channel"),
-            "loud_blocks",
+            *("loud_blocks", "ratio_blocks"),
         )
     ]
     + [
@@ -67,6 +67,7 @@ STATE = np.dtype(
         )
     ]
     + [("over_blocks", "i8", (len(LIMITS),)), ("drive_m", "f8", (_RING,)), ("gain", "f8", (MOST_TONES,))]
+    + [("accepted", "f8", (MOST_TONES,))]  # gains of the tones that later checks are compared with; 0: none yet
     + [(name, "f8", (CHANNELS,)) for name in ("lowest", "highest")],
     align=True,
 )
@@ -127,6 +128,7 @@ def build(
     losses_W = math.pi * warm.loss_tangent * warm.capacitance_F / warm.stroke_m_per_V**2  # over f u0^2
     p.heat_per_Hz_m2 = losses_W * warm.resistance_K_per_W / warm.rise_max_K
     p.heat_share = 1.0 - math.exp(-exciter.block_s / warm.time_s)
+    p.gain_change = config.gain_change
     p.check_m = config.check_share * stroke.alarm
     p.timeout_blocks = round(exciter.command_timeout_s / exciter.block_s)
     p.window_blocks = min(max(round(_DRIVE_WINDOW_S / exciter.block_s), 2), _RING - 1)

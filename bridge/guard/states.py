@@ -1,6 +1,7 @@
 """The states of a rig, and what leads from one to another. Nothing arms by itself: not after a freeze, a restart, a new link."""
 
 from bridge.guard.codes import (
+    ACCEPT_GAIN,
     ACTIVE,
     ARM,
     ARMED,
@@ -10,6 +11,8 @@ from bridge.guard.codes import (
     DISARMED,
     DISARMED_BY_PERSON,
     FAULT,
+    GAIN_ACCEPTED,
+    GAIN_CHANGED,
     LEAVE,
     READY,
     RESET,
@@ -43,8 +46,9 @@ def trip(s: Record, cause: int) -> None:
 def obey(s: Record, word: int) -> bool:
     """Take a person's word, or that of the process that ends; whether it changed the state.
 
-    A stop is taken in every state. ARM is taken in DISARMED, and in ARMED without a check, where it begins one, and in READY; a
-    rig in FAULT must be reset first.
+    A stop is taken in every state. ARM is taken in DISARMED, in ARMED without a check, and in READY where the gain has changed:
+    it begins a check; in READY else it arms. ACCEPT_GAIN does the same, and arms where the gain has changed. A rig in FAULT must
+    be reset first.
     """
     before = s.state
     if word == STOP:
@@ -52,10 +56,15 @@ def obey(s: Record, word: int) -> bool:
         return True
     if word == RESET and before == FAULT:
         enter(s, DISARMED, RESET_BY_PERSON)
-    elif word == ARM and (before == DISARMED or (before == ARMED and s.verified == 0)):
-        enter(s, CHECKING, ARMED_BY_PERSON)
-    elif word == ARM and before == READY:
-        enter(s, ARMED, ARMED_BY_PERSON)
+    elif word in (ARM, ACCEPT_GAIN):
+        changed = before == READY and s.cause == GAIN_CHANGED
+        if changed and word == ACCEPT_GAIN:
+            s.accepted[:] = s.gain
+            enter(s, ARMED, GAIN_ACCEPTED)
+        elif changed or before == DISARMED or (before == ARMED and s.verified == 0):
+            enter(s, CHECKING, ARMED_BY_PERSON)
+        elif before == READY:
+            enter(s, ARMED, ARMED_BY_PERSON)
     elif word in (DISARM, LEAVE) and before not in (DISARMED, FAULT):
         enter(s, DISARMED, DISARMED_BY_PERSON if word == DISARM else RUN_ENDED)
     return before != s.state

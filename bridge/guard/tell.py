@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridge.guard.codes import FAULT, LIMITS, STOP_BY_PERSON, STOP_KEPT
+from bridge.guard.codes import FAULT, GAIN_CHANGED, LIMITS, READY, STOP_BY_PERSON, STOP_KEPT
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.words import words
 
@@ -51,6 +51,8 @@ class Teller:
             text = f"{before}{wire.GuardState.Name(state)}: {self._help[('cause', int(applied.cause))]}"
             tripped = state == FAULT and int(applied.cause) not in (STOP_BY_PERSON, STOP_KEPT)
             found.append(("FAULT" if tripped else "GUARD", text))
+            if (state, int(applied.cause)) == (READY, GAIN_CHANGED):
+                found.append(("GAIN_CHANGED", self._help[("cause", GAIN_CHANGED)].partition(": ")[2]))
         t_s = int(applied.t_ns) * 1e-9
         if limit != self._limit and limit in LIMITS and t_s - self._told_s.get(limit, -_AGAIN_S) >= _AGAIN_S:
             self._told_s[limit] = t_s

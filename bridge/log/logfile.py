@@ -1,6 +1,7 @@
 """A run log, whole or cut: its topics as arrays, at once or chunk by chunk."""
 
 import contextlib
+import mmap
 import os
 from collections import Counter
 from collections.abc import Iterator
@@ -29,8 +30,7 @@ STREAMING = ("sensors", "applied", "command", "trace", "state", "announce")
 _LAYOUTS = {"applied": APPLIED, "command": COMMAND, "trace": TRACE, "state": STATE, "announce": ANNOUNCE}
 _DEFAULT_SAMPLES = 20
 _COUNTED_BLOCKS = 100  # for their number of samples; a chunk of a run in real time holds as many
-_ROOM = 1.1  # of the memory for a topic over what the part that was read lets expect
-_LARGEST_GUESS_BYTES = 1 << 28  # a damaged log may let expect anything
+_FIRST_BYTES = 1 << 26  # of the memory for a topic: that of a short run does not grow
 
 
 class Piece(NamedTuple):
@@ -158,27 +158,31 @@ class RunData(NamedTuple):
 class _Stack:
     """Bytes of one topic, joined piece by piece.
 
-    Numpy's own memory comes in large pages: to fill 40 MB takes 10 ms of processor time, and 30 to 80 ms in memory of Python.
+    The memory grows in its place: the system moves its pages to where there is room, and copies nothing, so that a log is never
+    in memory twice. In large pages to fill 40 MB takes 10 ms of processor time, and 30 to 80 ms in small ones.
     """
 
     def __init__(self) -> None:
-        self._data = np.empty(0, np.uint8)
+        self._memory = mmap.mmap(-1, _FIRST_BYTES, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+        self._in_large_pages()
         self._used = 0
 
-    def add(self, data: Bytes, share: float) -> None:
-        """Put bytes after those that are there; `share` of the log was read, so about that share of the bytes is there then."""
+    def add(self, data: Bytes) -> None:
+        """Put bytes after those that are there."""
         end = self._used + len(data)
-        if end > len(self._data):
-            expected = min(int(_ROOM * end / share), _LARGEST_GUESS_BYTES)  # memory that is not filled costs nothing
-            larger = np.empty(max(expected, 2 * end), np.uint8)
-            larger[: self._used] = self._data[: self._used]
-            self._data = larger
-        self._data[self._used : end] = data
+        if end > len(self._memory):
+            self._memory.resize(2 * end)  # memory that is not filled costs nothing
+            self._in_large_pages()
+        np.frombuffer(self._memory, np.uint8)[self._used : end] = data
         self._used = end
+
+    def _in_large_pages(self) -> None:
+        with contextlib.suppress(OSError):  # of a system that has none
+            self._memory.madvise(mmap.MADV_HUGEPAGE)
 
     def records(self, dtype: np.dtype[Any]) -> Records:
         """All of it as messages, [messages]."""
-        return np.frombuffer(self._data[: self._used], dtype)
+        return np.frombuffer(self._memory, np.uint8)[: self._used].view(dtype)
 
 
 def read_run(path: Path) -> RunData:
@@ -205,7 +209,7 @@ def _read(reader: LogReader, path: Path, chain: "Future[Chain]") -> RunData:
     for piece in iter_pieces(reader):
         if piece.topic in stored:
             dtypes[piece.topic] = piece.records.dtype
-            stored[piece.topic].add(np.frombuffer(piece.records, np.uint8), reader.position_bytes / reader.size_bytes)
+            stored[piece.topic].add(np.frombuffer(piece.records, np.uint8))
         elif piece.topic in payloads:
             payloads[piece.topic].extend(piece.payloads)
     tables = {name: stored[name].records(dtypes[name]) for name in STREAMING}

@@ -57,7 +57,8 @@ class PauseWriter:
         self._due_s = 0.0
         if not watch.refused:
             cores = ", ".join(map(str, watch.cores))
-            self._tell(WATCH, f"pauses of the machine are watched on {counted(len(watch.cores), 'core')}: {cores}")
+            text = f"pauses of the machine are watched on {counted(len(watch.cores), 'core')}: {cores}"
+            log.add_event(WATCH, text, holds=True)
 
     def note(self, received: Received) -> None:
         """Set the clock after a message of the plant, and tell of pauses where it is time to look."""
@@ -83,10 +84,7 @@ class PauseWriter:
             from_ns = self._clock.run_ns(pause.from_ns)
             if from_ns is not None and from_ns >= 0:
                 code = PAUSE if pause.core is None else CORE_PAUSE
-                self._tell(code, in_words(pause.until_ns - pause.from_ns, pause.core), from_ns)
+                self._log.add_event(code, in_words(pause.until_ns - pause.from_ns, pause.core), from_ns)
         if self._watch.refused and not self._refused:
             self._refused = self._watch.refused
-            self._tell(WATCH, NOT_WATCHED + self._refused)
-
-    def _tell(self, code: str, text: str, t_ns: int | None = None) -> None:
-        self._log.add_event(code, text, t_ns)
+            self._log.add_event(WATCH, NOT_WATCHED + self._refused, holds=True)

@@ -54,6 +54,7 @@ class RunLog:
         self._on_event = on_event
         self._next: dict[str, int] = {}
         self._events = 0
+        self._holding: dict[str, str] = {}  # texts of events that hold for the whole log, by code
         self._due_s = time.monotonic() + FLUSH_PERIOD_S
         self._scope = ScopeMaker()
         self._tables: dict[str, dict[str, str]] = {}  # of metadata, which every file has
@@ -151,8 +152,13 @@ class RunLog:
             self._due_s = time.monotonic() + FLUSH_PERIOD_S
             self.flush()
 
-    def add_event(self, code: str, text: str, t_ns: int | None = None) -> wire.Event:
-        """Write an event of the recorder, and return it; its time is `t_ns`, or that of the latest message."""
+    def add_event(self, code: str, text: str, t_ns: int | None = None, holds: bool = False) -> wire.Event:
+        """Write an event of the recorder, and return it; its time is `t_ns`, or that of the latest message.
+
+        `holds`: for the whole log, so that it is said again where the file that begins with it was taken away.
+        """
+        if holds:
+            self._holding[code] = text
         at_ns = self.t_ns if t_ns is None else t_ns
         event = wire.Event(sequence=self._events, t_ns=at_ns, source="recorder", code=code, text=text)
         self._add(RECORDER_EVENT, event.SerializeToString(), self._events, at_ns)
@@ -161,6 +167,11 @@ class RunLog:
         if self._on_event is not None:
             self._on_event(event)
         return event
+
+    def say_again(self) -> None:
+        """Write the events again that hold for the whole log."""
+        for code, text in self._holding.items():
+            self.add_event(code, text)
 
     def _add(self, topic: Topic, payload: bytes, sequence: int, t_ns: int) -> None:
         writer = self._files.writer

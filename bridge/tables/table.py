@@ -69,7 +69,7 @@ class Table:
         """One column, float64 [rows]; what is no number is NaN. Raises Fault BAD_TABLE when it is missing or not of numbers."""
         key = self.find(name)
         values, found = numbers(self.columns[key], f"{self.path.name}: column {key}", self.decimal, self.thousands)
-        self.findings.extend(found)
+        self.findings.extend(one for one in found if one not in self.findings)
         return values
 
     def seconds(self, name: str | int) -> tuple[Floats, bool]:
@@ -82,7 +82,7 @@ class Table:
         times_s, found = seconds(self.columns[key], where)
         if times_s is None:
             return self.column(key), False
-        self.findings.extend(found)
+        self.findings.extend(one for one in found if one not in self.findings)
         return times_s, True
 
     def unit(self, name: str | int) -> str:

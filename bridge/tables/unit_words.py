@@ -96,6 +96,14 @@ def known_unit(text: str) -> tuple[str, float] | None:
     return None
 
 
+def weight_unit(text: str) -> tuple[str, float] | None:
+    """As `known_unit`, of a column of forces: gram and kilogram are weights there, as load cells show them."""
+    known = known_unit(text)
+    word = text.strip().strip("[](){}").translate(_SAME)
+    grams = {"g": 1e-3, "kg": 1.0, "mg": 1e-6, "t": 1e3}.get(word)
+    return ("force", _UNITS["force"][1]["kgf"] * grams) if grams is not None else known
+
+
 def si_unit(what: str) -> str:
     """The SI unit of what is measured, such as `N` of `force`."""
     return _UNITS[what][0]

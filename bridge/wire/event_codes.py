@@ -60,6 +60,14 @@ EVENTS = {
             "the guard tripped, or a check failed; the text has the cause. Nothing vibrates until "
             "`stickslip reset`, and then `stickslip arm`",
         ),
+        EventCode(
+            "GAIN_CHANGED",
+            "plant",
+            OUTSIDE,
+            "the loop check measured another gain of the exciter than the one before, beyond guard.gain_change: exciter or mount "
+            "deliver less or more, or the base accelerometer shows another share. Nothing vibrates until a new check finds the "
+            "old gain, or `stickslip arm --accept-gain`, where the new one is right",
+        ),
         EventCode("HELD_BACK", "plant", OUTSIDE, "a limit of the guard holds the command back; the text has which"),
         EventCode(
             "FALLBACK",

@@ -6,6 +6,7 @@ or change the order of the fields; the protobuf library first brings such bytes 
 """
 
 from typing import Any, cast
+from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,8 @@ _SCALARS = {
     FieldDescriptor.TYPE_ENUM: ("u1", 0),  # a varint, which is one byte up to 127; a zero is written, too
 }
 _PACKED_WIRE_TYPE = 2
+_SUM_BYTES = 4  # of a checksum, at the end of a sensor block; its tag is one more
+_NO_SUM = bytes(_SUM_BYTES)
 
 
 def _varint(value: int) -> bytes:
@@ -150,3 +153,24 @@ def sensor_block(samples: int) -> Layout:
     if samples not in _sensor_layouts:
         _sensor_layouts[samples] = Layout(wire.SensorBlock, samples)
     return _sensor_layouts[samples]
+
+
+def sealed(block: bytes) -> bytes:
+    """A canonical sensor block with its checksum, from the rig to whoever uses it: what carries it cannot change it unseen."""
+    return block[:-_SUM_BYTES] + crc32(block[: -_SUM_BYTES - 1]).to_bytes(_SUM_BYTES, "little")
+
+
+def seal_all(blocks: Records) -> None:
+    """Give each sensor block its checksum, in place."""
+    data, size = memoryview(blocks.tobytes()), blocks.dtype.itemsize
+    blocks["checksum"] = [crc32(data[at : at + size - _SUM_BYTES - 1]) for at in range(0, len(data), size)]
+
+
+def has_checksum(block: bytes) -> bool:
+    """Whether a canonical sensor block says a checksum of itself."""
+    return block[-_SUM_BYTES:] != _NO_SUM
+
+
+def is_whole(block: bytes) -> bool:
+    """Whether a canonical sensor block is as its checksum says."""
+    return crc32(block[: -_SUM_BYTES - 1]) == int.from_bytes(block[-_SUM_BYTES:], "little")

@@ -61,6 +61,9 @@ class Cause(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     SENSOR_NOT_FINITE: _ClassVar[Cause]
     EXCITER_SILENT: _ClassVar[Cause]
     EXCITER_WILD: _ClassVar[Cause]
+    FIRST_CHECK: _ClassVar[Cause]
+    GAIN_CHANGED: _ClassVar[Cause]
+    GAIN_ACCEPTED: _ClassVar[Cause]
 
 class Limit(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -153,6 +156,9 @@ SENSOR_FROZEN: Cause
 SENSOR_NOT_FINITE: Cause
 EXCITER_SILENT: Cause
 EXCITER_WILD: Cause
+FIRST_CHECK: Cause
+GAIN_CHANGED: Cause
+GAIN_ACCEPTED: Cause
 NO_LIMIT: Limit
 RANGE: Limit
 SLEW: Limit
@@ -198,7 +204,7 @@ LOOSE: Reason
 GAIN_OTHER: Reason
 
 class SensorBlock(_message.Message):
-    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state", "check_Hz", "check_gain")
+    __slots__ = ("sequence", "t_ns", "drive_force_N", "mass_accel_mps2", "base_accel_mps2", "mass_position_m", "drive_position_m", "run", "guard_state", "check_Hz", "check_gain", "checksum")
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
     T_NS_FIELD_NUMBER: _ClassVar[int]
     DRIVE_FORCE_N_FIELD_NUMBER: _ClassVar[int]
@@ -210,6 +216,7 @@ class SensorBlock(_message.Message):
     GUARD_STATE_FIELD_NUMBER: _ClassVar[int]
     CHECK_HZ_FIELD_NUMBER: _ClassVar[int]
     CHECK_GAIN_FIELD_NUMBER: _ClassVar[int]
+    CHECKSUM_FIELD_NUMBER: _ClassVar[int]
     sequence: int
     t_ns: int
     drive_force_N: _containers.RepeatedScalarFieldContainer[float]
@@ -221,7 +228,8 @@ class SensorBlock(_message.Message):
     guard_state: int
     check_Hz: float
     check_gain: float
-    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ..., run: _Optional[int] = ..., guard_state: _Optional[int] = ..., check_Hz: _Optional[float] = ..., check_gain: _Optional[float] = ...) -> None: ...
+    checksum: int
+    def __init__(self, sequence: _Optional[int] = ..., t_ns: _Optional[int] = ..., drive_force_N: _Optional[_Iterable[float]] = ..., mass_accel_mps2: _Optional[_Iterable[float]] = ..., base_accel_mps2: _Optional[_Iterable[float]] = ..., mass_position_m: _Optional[_Iterable[float]] = ..., drive_position_m: _Optional[_Iterable[float]] = ..., run: _Optional[int] = ..., guard_state: _Optional[int] = ..., check_Hz: _Optional[float] = ..., check_gain: _Optional[float] = ..., checksum: _Optional[int] = ...) -> None: ...
 
 class Command(_message.Message):
     __slots__ = ("sequence", "t_ns", "block", "frequency_Hz", "amplitude_m", "mode", "limit", "reason", "run")
@@ -484,11 +492,13 @@ class Operator(_message.Message):
         RESET: _ClassVar[Operator.Action]
         ARM: _ClassVar[Operator.Action]
         DISARM: _ClassVar[Operator.Action]
+        ACCEPT_GAIN: _ClassVar[Operator.Action]
     NOTHING: Operator.Action
     STOP: Operator.Action
     RESET: Operator.Action
     ARM: Operator.Action
     DISARM: Operator.Action
+    ACCEPT_GAIN: Operator.Action
     ACTION_FIELD_NUMBER: _ClassVar[int]
     WHO_FIELD_NUMBER: _ClassVar[int]
     action: Operator.Action

@@ -108,12 +108,17 @@ def _family(path: Path) -> list[BankScenario]:
 
 
 def _scenario(path: Path, table: dict[str, Any]) -> BankScenario:
-    source = f"{path.name}: {table.get('name', 'unnamed')}"
+    table, _ = with_rig(path, table)
+    return scenario_of(path.stem, f"{path.name}: {table.get('name', 'unnamed')}", table)
+
+
+def scenario_of(family: str, source: str, table: dict[str, Any]) -> BankScenario:
+    """A scenario from its table, with what the controller is told of the rig. Raises Fault CONFIG, which names `source`."""
     bank = validate(BankConfig, table.get("bank", {}), source)
-    table, _ = with_rig(path, {key: value for key, value in table.items() if key != "bank"})
+    table = {key: value for key, value in table.items() if key != "bank"}
     rig = validate(RigConfig, table["rig"], source)
-    table = table | {"controller": merged(_told(rig, bank.told), table.get("controller", {}))}
-    return BankScenario(path.stem, str(table["name"]), str(table["description"]), bank, rig, table, source)
+    table |= {"controller": merged(_told(rig, bank.told), table.get("controller", {}))}
+    return BankScenario(family, str(table["name"]), str(table["description"]), bank, rig, table, source)
 
 
 def _told(rig: RigConfig, told: ToldConfig) -> dict[str, Any]:

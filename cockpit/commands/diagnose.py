@@ -1,11 +1,9 @@
 """`stickslip diagnose`: what makes a rig differ from its description; for one evidence folder or for many."""
 
-import os
 import sys
 from collections.abc import Callable
 from contextlib import closing
 from functools import partial
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -13,18 +11,16 @@ import typer
 
 from bridge.faults import FAULTS, Fault
 from bridge.files import write_json
-from bridge.plain import plain
+from bridge.plain import plain, say
 from cockpit.commands.as_json.option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import Certs
 from cockpit.run.child_process import end_like_ctrl_c, report
 from cockpit.run.writable import JSON, PAGE, RIG, check_output, check_output_folder, writing
 
 if TYPE_CHECKING:
-    from diagnosis.diagnose_many import EvidenceFolder, FolderResult
+    from diagnosis.diagnose_many import EvidenceFolder
     from diagnosis.evidence.folder import Evidence
     from diagnosis.result import Diagnosis
-
-_LONGEST_NAME_BYTES = 200  # of 255 that a disk takes; a number and `.html.part` follow
 
 
 class _Wishes(NamedTuple):
@@ -64,7 +60,10 @@ def diagnose(
         ),
     ],
     report: Annotated[
-        Path | None, typer.Option(help="Write a report, one .html file; for many folders a folder of them.")
+        Path | None,
+        typer.Option(
+            help="Write a report, one .html file; for many folders a folder of them with an index, in which each result is kept."
+        ),
     ] = None,
     apply: Annotated[
         Path | None, typer.Option(help="Write a rig file, .toml, that has the effect that was found.")
@@ -244,60 +243,47 @@ def _result(
 
 def _write_report(source: "EvidenceFolder", diagnosis: "Diagnosis", path: Path) -> None:
     """Write the report, with the files of the evidence at its foot. Raises Fault BAD_EVIDENCE, OSError."""
-    from diagnosis.evidence.manifest import MANIFEST, read_manifest
+    from cockpit.fleet.kept import evidence_files
     from diagnosis.report.page import write_report
 
-    runs = dict.fromkeys(run.file for run in read_manifest(source.folder).run)  # several may be parts of one file
-    files = [source.folder / MANIFEST, *(source.folder / file for file in runs)]
-    write_report(diagnosis, source.name, path, files)
+    write_report(diagnosis, source.name, path, evidence_files(source.folder))
 
 
 def _diagnose_many(sources: list["EvidenceFolder"], wishes: _Wishes) -> int:
+    """All folders; with --report what is kept there from before is not done again."""
     from cockpit.commands.diagnose_output import in_a_line, many_as_json, watched
+    from cockpit.fleet.work import INDEX, FleetFolder, with_estimate, without_pictures
     from diagnosis import diagnose_many as many
 
-    found: dict[str, FolderResult] = {}
-    refused: list[Fault] = []
-    reports = _report_names([source.name for source in sources])
-    with (
-        watched() as progress,
-        closing(many.diagnose_many(sources, wishes.jobs, wishes.cluster, wishes.way, wishes.certs)) as outcomes,
-    ):
-        for outcome in outcomes:
-            name = outcome.source.name
-            if outcome.diagnosis is not None and wishes.report is not None:
-                page = partial(_write_report, outcome.source, outcome.diagnosis)
-                _written(wishes.report / reports[name], page, refused)
-            found[name] = _without_pictures(outcome)
-            progress(f"{len(found)} of {len(sources)}: {in_a_line(outcome)}", len(found) / len(sources))
+    fleet = None if wishes.report is None else FleetFolder(wishes.report, sources, wishes.budget_s)
+    found = {outcome.source.name: outcome for outcome in (fleet.kept() if fleet else [])}
+    missing = [source for source in sources if source.name not in found]
+    if found:
+        say(f"{len(found)} of {len(sources)} are kept from before: the same files, the same version")
+    try:
+        with (
+            watched() as progress,
+            closing(many.diagnose_many(missing, wishes.jobs, wishes.cluster, wishes.way, wishes.certs)) as outcomes,
+        ):
+            for outcome, estimate in with_estimate(outcomes, len(missing)):
+                found[outcome.source.name] = without_pictures(outcome)
+                if fleet is not None:
+                    fleet.add(outcome)
+                told = f"{len(found)} of {len(sources)}: {in_a_line(outcome)}{estimate and f'; {estimate}'}"
+                progress(told, len(found) / len(sources))
+    except KeyboardInterrupt:
+        if fleet is not None:
+            say(f"{len(found)} of {len(sources)} are in {wishes.report}; the same command goes on from there")
+        raise
     results = [found[source.name] for source in sources]
+    refused = [] if fleet is None else fleet.refused
     table = many_as_json(results)
     if wishes.json_file is not None:
         _written(wishes.json_file, lambda path: write_json(path, table), refused)
     words = [in_a_line(outcome) for outcome in results]
-    if wishes.report is not None and any(outcome.diagnosis is not None for outcome in results):
-        words.append(f"reports    {wishes.report}")
+    if wishes.report is not None:
+        words.append(f"reports    {wishes.report / INDEX}")
     tell(wishes.only_json, table, words, indent=1)
     statuses = [FAULTS[outcome.fault[0]].exit_status for outcome in results if outcome.fault is not None]
     # bad evidence first: that is what the person who called can mend
     return min((status for status in (*statuses, _told(refused)) if status), default=0)
-
-
-def _without_pictures(outcome: "FolderResult") -> "FolderResult":
-    """Pictures are by far the largest part, and hundreds of folders are meant to fit into memory."""
-    return outcome._replace(diagnosis=outcome.diagnosis and outcome.diagnosis._replace(pictures=()))
-
-
-def _report_names(names: list[str]) -> dict[str, str]:
-    """A file name for the report of each; a name may be a path, because several folders have the same."""
-    found: dict[str, str] = {}
-    taken: set[str] = set()
-    for name in names:
-        whole = name.strip("/").replace("/", "_")
-        while len(os.fsencode(whole)) > _LONGEST_NAME_BYTES:  # of a path the end tells most
-            whole = whole[1:]
-        tries = (whole if number == 1 else f"{whole}-{number}" for number in count(1))
-        one = next(one for one in tries if one.casefold() not in taken)  # some disks take a and A for the same
-        taken.add(one.casefold())
-        found[name] = f"{one}.html"
-    return found

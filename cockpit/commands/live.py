@@ -1,5 +1,6 @@
 """`stickslip serve` and `watch`: a rig looked at while it runs, in a browser and in a terminal."""
 
+import contextlib
 import json
 import signal
 from pathlib import Path
@@ -42,6 +43,12 @@ def serve(
     endpoint: Endpoint = None,
     prefix: Prefix = None,
     certs: Certs = None,
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Serve the signals to Foxglove and Lichtblick as well (extra foxglove).")
+    ] = False,
+    foxglove_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of 127.0.0.1 for them; 0: any that is free.")
+    ] = 8765,
     log: _Log = None,
     as_json: Json = None,
 ) -> None:
@@ -64,19 +71,30 @@ def serve(
         _never_suspended()
         bus = load_bus(scenario, as_settings([], None, endpoint, prefix, certs))
         role_security(bus, "viewer")  # a certificate that is not there is told here
-        with listening(port) as sock:
+        with contextlib.ExitStack() as ending:
+            sock = ending.enter_context(listening(port))
             at = int(sock.getsockname()[1])
-            with kept_token(at) as (word, path):
+            other = None
+            if foxglove:
+                from cockpit.live.foxglove_server import Foxglove
 
-                def ready() -> None:
-                    if as_json is not None:
-                        table = {"page": f"http://{HOST}:{at}/", "endpoint": bus.endpoint, "token_file": str(path)}
-                        print(json.dumps(table), flush=True)
-                        return
-                    say(f"page     http://{HOST}:{at}/ shows the rig at {bus.endpoint}; Ctrl-C ends it")
-                    say(f"token    {word} arms, disarms and resets from the page; it is in {path}")
+                other = ending.enter_context(Foxglove(foxglove_port))
+            word, path = ending.enter_context(kept_token(at))
+            viewers = f"ws://{HOST}:{other.port}" if other is not None else ""
 
-                Server(bus, word, at).run(sock, stop_event(), ready)
+            def ready() -> None:
+                if as_json is not None:
+                    table = {"page": f"http://{HOST}:{at}/", "endpoint": bus.endpoint, "token_file": str(path)}
+                    print(json.dumps(table | ({"foxglove": viewers} if viewers else {})), flush=True)
+                    return
+                say(f"page     http://{HOST}:{at}/ shows the rig at {bus.endpoint}; Ctrl-C ends it")
+                if viewers:
+                    say(
+                        f"foxglove {viewers} is the address for Foxglove and Lichtblick, which can read and not command"
+                    )
+                say(f"token    {word} arms, disarms and resets from the page; it is in {path}")
+
+            Server(bus, word, at, other.tell if other is not None else None).run(sock, stop_event(), ready)
 
     carry_out(work, as_json)
 

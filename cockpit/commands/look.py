@@ -8,7 +8,7 @@ import typer
 from bridge.faults import Fault
 from bridge.files import check_file, refuse_to_lose
 from cockpit.commands.as_json.option import Json, carry_out, tell
-from cockpit.look.quantity import quantity
+from cockpit.look.quantity import quantity, turns
 from cockpit.run.writable import PAGE, PICTURE, RIG, check_output, writing
 
 _OUTPUTS = (*PAGE, ".csv", ".xlsx", *PICTURE, *RIG)
@@ -54,6 +54,7 @@ def look(
             time,
             force,
             channel_map,
+            turns(speed) if speed else None,
         )
         record = read_record(path, asked)
         seen = look_at(record.t_s, record.force_N, record.position_m, record.known)

@@ -27,10 +27,17 @@ def arm(
     endpoint: Endpoint = None,
     prefix: Prefix = None,
     certs: Certs = None,
+    accept_gain: Annotated[
+        bool,
+        typer.Option("--accept-gain", help="The gain that the last check measured is right, though it is another one."),
+    ] = False,
     as_json: Json = None,
 ) -> None:
-    """Check a rig's sensors and exciter, then let its controller vibrate; exit status 1: the check failed, or a fault holds."""
-    _say("ARM", scenario, endpoint, prefix, certs, as_json)
+    """Check a rig's sensors and exciter, then let its controller vibrate.
+
+    Exit status 1: the check failed, it measured another gain than the one before, or a fault holds.
+    """
+    _say("ACCEPT_GAIN" if accept_gain else "ARM", scenario, endpoint, prefix, certs, as_json)
 
 
 def disarm(
@@ -93,3 +100,12 @@ def status(
         return 0 if seen.controlled else 1
 
     carry_out(work, as_json)
+
+
+WORDS = {"arm": arm, "disarm": disarm, "stop": stop, "reset": reset, "status": status}
+
+
+def add_words(app: typer.Typer) -> None:
+    """Add these commands to others."""
+    for name, command in WORDS.items():
+        app.command(name)(command)

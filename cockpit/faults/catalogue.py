@@ -19,7 +19,7 @@ Positive = Annotated[float, Field(gt=0)]
 class Said(Strict):
     """A person's word during a run."""
 
-    word: Literal["STOP", "RESET", "ARM", "DISARM"]
+    word: Literal["STOP", "RESET", "ARM", "DISARM", "ACCEPT_GAIN"]
     at_s: NotNegative = Field(default=0.0, description="After the entry's begin.")
 
 

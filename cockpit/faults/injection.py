@@ -37,7 +37,7 @@ class Injected(NamedTuple):
 
     def in_words(self) -> list[str]:
         """Lines for a person."""
-        return [f"{self.name:<8} {line}" for line in self.done]
+        return [f"{self.name:<8} {line.removeprefix(f'{self.name}: ')}" for line in self.done]
 
 
 def inject(bus_config: BusConfig, name: str, tables: Sequence[FaultTable], clear: bool = False) -> Injected:

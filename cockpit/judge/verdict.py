@@ -221,7 +221,7 @@ def settled_from_s(enabled_from_s: float) -> float:
 def _gain_is_verified(run: RunData) -> bool:
     """Whether v_a is known from more than the accelerometer: one that was wrong from the start cannot be seen otherwise."""
     told = bool(run.configuration("controller").get("amplitude", {}).get("known_gain"))
-    return told or bool((run.applied["cause"] == wire.CHECK_PASSED).any())
+    return told or bool(np.isin(run.applied["cause"], (wire.CHECK_PASSED, wire.GAIN_ACCEPTED)).any())
 
 
 def _judge_imported(run: RunData, source: str) -> RunVerdict:

@@ -56,8 +56,8 @@ def in_words(verdict: RunVerdict, without: Phase | None = None) -> list[str]:
         lines.append(f"v_a/v_d  {v.velocity_ratio_min:.2f} to {v.velocity_ratio_max:.2f} while vibrating ({low})")
         if not v.gain_verified:
             lines.append(
-                "exciter  gain not verified: v_a is what the base accelerometer says; neither a loop check (`stickslip arm`) nor "
-                "amplitude.known_gain"
+                "exciter  gain not verified: v_a is what the base accelerometer says; no loop check (`stickslip arm`) confirms "
+                "an earlier one, nor is amplitude.known_gain told"
             )
     if v.latency is not None:
         latency = v.latency

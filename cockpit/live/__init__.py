@@ -12,6 +12,7 @@ gate       which requests of a browser are answered
 token      the word that lets a person arm a rig from the page
 viewers    browsers that are connected; one that is too slow is dropped
 server     one port of this computer: the page, the frames, a person's words
+foxglove   the same for Foxglove and Lichtblick, by the extra `foxglove`
 page       the page: uPlot and the curves of `cockpit.review` inside
 screen     the same in a terminal
 

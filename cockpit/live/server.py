@@ -34,7 +34,7 @@ from cockpit.review.panels import PANELS
 HOST = "127.0.0.1"
 PERIOD_S = 0.05  # of a frame
 _LATENCY_S = 1.0  # between two histograms
-_MOST_CONNECTIONS = 48  # those that say nothing are ended after `_OPEN_S`; further ones are refused
+_MOST_CONNECTIONS = 48  # of more, the oldest that asked for nothing yet gives way, and the newest where all are pages
 _OPEN_S = 5.0
 _MOST_BYTES = 1024  # of a message of a page; the longest has a word and a token
 _MOST_WISHES = 4  # of one page that wait for an answer
@@ -66,17 +66,19 @@ class Server:
         bus: of the rig.
         token: that arms from the page.
         port: that it listens at.
+        also: gets each step, as another server does.
 
     """
 
-    def __init__(self, bus: BusConfig, token: str, port: int) -> None:
-        self._port = port
+    def __init__(self, bus: BusConfig, token: str, port: int, also: Callable[[Step], None] | None = None) -> None:
+        self._port, self._also = port, also
         self._words = Words(bus, token)
         self._listener = Listener(bus)
         self._view = View(self._listener, bus.endpoint)
         self._page = Page(port)
         self._viewers = Viewers()
         self._connections = 0
+        self._silent: dict[ServerConnection, None] = {}  # connections that are no page yet, oldest first
         self._latency_s = 0.0
 
     def run(self, sock: socket.socket, stop: threading.Event, ready: Callable[[], None]) -> None:
@@ -94,16 +96,20 @@ class Server:
         outer = self
 
         class Counted(ServerConnection):
-            """A connection that is refused at once where there are too many."""
+            """A connection that is counted, for whose sake another is ended where there are too many."""
 
             def connection_made(self, transport: asyncio.BaseTransport) -> None:
                 outer._connections += 1
+                outer._silent[self] = None
                 super().connection_made(transport)
                 if outer._connections > _MOST_CONNECTIONS:
-                    self.transport.abort()
+                    gives_way = next(iter(outer._silent))
+                    del outer._silent[gives_way]
+                    gives_way.transport.abort()
 
             def connection_lost(self, exc: Exception | None) -> None:
                 outer._connections -= 1
+                outer._silent.pop(self, None)
                 super().connection_lost(exc)
 
         async with serve(
@@ -145,6 +151,8 @@ class Server:
 
     def _tick(self) -> None:
         step = self._view.step()
+        if self._also is not None:
+            self._also(step)
         if not len(self._viewers):
             return
         if step.anew:
@@ -184,6 +192,7 @@ class Server:
 
     async def _attend(self, socket: ServerConnection) -> None:
         """Show a page the rig, and do what it asks for."""
+        self._silent.pop(socket, None)
         tasks: set[asyncio.Task[None]] = set()
         async with contextlib.AsyncExitStack() as seen:
             if len(self._viewers) < MOST_VIEWERS:

@@ -77,6 +77,7 @@ class Step(NamedTuple):
     buckets: Buckets | None
     capture: Capture | None
     events: list[Said]
+    tables: Mapping[str, Records]  # messages by topic: sensors, trace, applied; none where nothing came
 
 
 class _Run:
@@ -112,6 +113,7 @@ class View:
         self._screen = Screen(Complaints(self._note_strange, clock))
         self._heard_s: dict[str, float] = {}
         self._newest: dict[str, Records] = {}
+        self._taken: dict[str, Records] = {}  # in this step
         self._ended_at_s: float | None = None  # time of the run of the rig's END
         self._began_s = clock()
 
@@ -131,13 +133,15 @@ class View:
                     waiting[one.topic.name].append(one.payload)
                 else:
                     said.append(one)
+        self._taken = {}
         anew = self._take_blocks(waiting["sensors"])
         self._take("trace", waiting["trace"])
         self._take("applied", waiting["applied"])
         run = self.run
         capture = run.scope.ready() if run is not None else None
         self.capture = capture or (None if anew else self.capture)
-        return Step(anew, run.buckets.ready() if run is not None else None, capture, self._take_events(said))
+        buckets = run.buckets.ready() if run is not None else None
+        return Step(anew, buckets, capture, self._take_events(said), self._taken)
 
     def take_now(self) -> None:
         """Trigger the scope by hand."""
@@ -172,6 +176,7 @@ class View:
         self.run.newest["sensors"] = int(numbers[-1])
         self._heard_s["sensors"] = self._clock()
         self._newest["sensors"] = table[-1:]
+        self._taken["sensors"] = table
         self.run.buckets.add("sensors", table, numbers)
         self.run.scope.add_blocks(table, numbers)
         self.run.tally.add_blocks(numbers)
@@ -193,6 +198,7 @@ class View:
         self.run.newest[topic] = int(numbers[-1])
         self._heard_s[topic] = self._clock()
         self._newest[topic] = table[-1:]
+        self._taken[topic] = table
         self.run.buckets.add(topic, table, numbers)
         if topic == "applied":
             self.run.tally.add_applied(table)

@@ -41,7 +41,11 @@ def rig_of(seen: Look, file: str) -> tuple[RigTable, list[str]]:
     mass = numbers.get("mass_kg")
     if seen.known.mass_kg is None and (mass is None or not np.isfinite(mass.low) or mass.low <= 0.0):
         raise Fault("CONFIG", f"{file}: its slips are too quick to show the mass of the slide; add --mass 1.5kg")
-    table = {"drive": "spring", "tolerance": {}, "stribeck_velocity_mps": _GUESSED_MPS}
+    table = {
+        "drive": "torsion" if seen.known.torsion else "spring",
+        "tolerance": {},
+        "stribeck_velocity_mps": _GUESSED_MPS,
+    }
     tolerance: dict[str, float] = {"stribeck_velocity_mps": _STRIBECK_TOLERANCE}
     wanted = (
         ("drive_stiffness_N_per_m", numbers["stiffness_N_per_m"], _LEAST_TOLERANCE),

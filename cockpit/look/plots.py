@@ -51,7 +51,7 @@ def whole(seen: Look, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figure":
         axes.plot(ends[:, 0], sign * ends[:, 1], "^", color=_BLUE, markersize=4, label="re-stick")
         axes.legend(loc="lower right", frameon=False, ncols=2)
     axes.set_xlabel("time [s]")
-    axes.set_ylabel("friction coefficient" if seen.known.coefficient else "force [N]")
+    axes.set_ylabel("friction coefficient" if seen.known.coefficient else f"force [{seen.known.force_unit}]")
     return figure
 
 
@@ -67,7 +67,9 @@ def laid_over(seen: Look) -> "Figure":
         own = (part.t_s >= cycle.breakaway_t_s - cycle.dwell_s) & (part.t_s <= cycle.restick_t_s + slip_s)
         _draw(axes, part.t_s[own] - cycle.breakaway_t_s, part.force_N[own], alpha=max(0.08, 1.0 / len(cycles) ** 0.5))
     axes.set_xlabel("time from breakaway [s]")
-    axes.set_ylabel("friction coefficient" if seen.known.coefficient else "force along the motion [N]")
+    axes.set_ylabel(
+        "friction coefficient" if seen.known.coefficient else f"force along the motion [{seen.known.force_unit}]"
+    )
     return figure
 
 
@@ -82,7 +84,7 @@ def histograms(seen: Look) -> "Figure":
         (
             left,
             np.array([cycle.breakaway_force_N for cycle in seen.cycles]),
-            "coefficient at breakaway" if seen.known.coefficient else "force at breakaway [N]",
+            "coefficient at breakaway" if seen.known.coefficient else f"force at breakaway [{seen.known.force_unit}]",
         ),
         (right, dwells[np.isfinite(dwells)], "stick time [s]"),
     ):
@@ -117,8 +119,8 @@ def over_speed(seen: Look) -> "Figure":
             [v for v, _ in rows], scale * values, scale * errors, fmt="o-", color=color, capsize=3, label=label
         )
     axes.set_xscale("log")
-    axes.set_xlabel("speed of the drive [mm/s]")
-    axes.set_ylabel("friction coefficient" if load or seen.known.coefficient else "force [N]")
+    axes.set_xlabel(f"speed of the drive [m{seen.known.speed_unit}]")
+    axes.set_ylabel("friction coefficient" if load or seen.known.coefficient else f"force [{seen.known.force_unit}]")
     axes.legend(frameon=False)
     return figure
 

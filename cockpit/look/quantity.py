@@ -8,6 +8,14 @@ from bridge.tables.unit_words import known_unit, si_unit
 
 _EXAMPLES = {"velocity": "0.5mm/s", "force": "94.5N", "mass": "1.5kg", "frequency": "1kHz", "time": "30s"}
 _GRAMS = {"g": 1e-3, "mg": 1e-6}  # where a mass is asked for, g is no acceleration
+# of a rig that turns
+_TURNING = {"velocity": "angular velocity", "mass": "inertia"}
+
+
+def turns(text: str) -> bool:
+    """Whether a quantity that `quantity` takes is one of a rig that turns: rad/s, rpm, kg m²."""
+    found = re.search(r"[^-+.\deE\s].*", text)
+    return found is not None and (known_unit(found[0]) or ("",))[0] in _TURNING.values()
 
 
 def quantity(option: str, text: str, what: str) -> float | None:
@@ -24,6 +32,6 @@ def quantity(option: str, text: str, what: str) -> float | None:
     known = (what, _GRAMS[unit]) if what == "mass" and unit in _GRAMS else known_unit(unit)
     if not unit:
         raise Fault("CONFIG", f"{option} {text}: has no unit, and may be in {si_unit(what)} or not; {example}")
-    if not value > 0.0 or not math.isfinite(value) or known is None or known[0] != what:
+    if not value > 0.0 or not math.isfinite(value) or known is None or known[0] not in (what, _TURNING.get(what)):
         raise Fault("CONFIG", f"{option} {text}: is no {what} above 0; {example}")
     return value * known[1]

@@ -14,10 +14,11 @@ from bridge.tables.kinds import kind_of
 from bridge.tables.readers import read_table
 from bridge.tables.table import Table
 from bridge.tables.unit_words import known_unit
-from cockpit.look.told import of_time, without_outliers
+from cockpit.look.tare import tare_of
+from cockpit.look.told import of_time
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import ChannelMap
-from diagnosis.evidence.mapped import mapped
+from diagnosis.evidence.mapped import has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess
 from diagnosis.look.look import Known
@@ -36,6 +37,7 @@ class Asked(NamedTuple):
     time: str = ""
     force: str = ""
     map: Path | None = None
+    speed_turns: bool | None = None  # the speed is that of an angle; None: no speed is given
 
 
 class Record(NamedTuple):
@@ -62,20 +64,31 @@ def read_record(path: Path, asked: Asked) -> Record:
         columns, findings = mapped(table, wanted.channels, asked.rate_Hz or wanted.source.sample_rate_Hz)
         speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
         mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
-        _leave_out(path, columns, findings)
+        findings += of_time(columns["t_s"], f"{path.name}: t_s")
         if asked.speed_mps is not None:
             columns.pop("drive_position_m", None)
         return _record(path, columns, Known(speed, asked.load_N, mass), findings, "")
     table = read_table(path)
     found = guess(table, {"time": asked.time, "force": asked.force})
     channels = _channels(table, found)
+    if asked.rate_Hz is None and not has_time(table, channels):
+        known = ", ".join(f'"{name}"' for name in table.columns)
+        line = f"{path.name}: no time: which column is it, or how many rows a second are there?"
+        raise Fault("CONFIG", f'{line} Add --time "NAME" or --rate 1kHz; columns here: {known}')
+    torsion = bool(found.force) and (known_unit(table.unit(found.force)) or ("",))[0] == "torque"
+    if asked.speed_turns not in (None, torsion):
+        what, example = ("torque", "10mrad/s or 5rpm") if torsion else ("force", "0.5mm/s")
+        raise Fault("CONFIG", f"--speed: {found.force!r} is a {what}: must be a speed such as {example}")
+    if torsion and found.position and (known_unit(table.unit(found.position)) or ("",))[0] == "length":
+        del channels["drive_position_m"]  # a way along the axis
+        found = found._replace(position="")
     columns, findings = mapped(table, channels, asked.rate_Hz)
     findings = [Finding("assumed", path.name, "; ".join(found.reasons)), *findings, *_unitless(table, channels)]
-    if found.force and (known_unit(table.unit(found.force)) or ("",))[0] == "torque":
-        text = f"{found.force!r} is a torque: read N as N m, N/m as N m/rad, kg as kg m2, and an angle is not taken as the way"
+    if torsion:
+        text = f"{found.force!r} is a torque: the rig turns, so ways are angles in rad"
         findings.append(Finding("assumed", path.name, text))
     load_N, of_load = asked.load_N, not found.force and bool(found.coefficient)
-    if load_N is None and found.load:
+    if load_N is None and found.load and not torsion:
         load_N = _mean_load(table, found.load)
         findings.append(Finding("assumed", path.name, f"load = mean of {found.load!r}, {load_N:.6g} N"))
     if of_load:
@@ -87,7 +100,12 @@ def read_record(path: Path, asked: Asked) -> Record:
         if load_N is None:
             text = f"{found.coefficient!r} is told as a coefficient: the load is not known; add --load 94.5N"
         findings.append(Finding("assumed", path.name, text))
-    _leave_out(path, columns, findings)
+    findings += of_time(columns["t_s"], f"{path.name}: t_s")
+    zero_N, told = tare_of(columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N")
+    findings += told
+    if zero_N:
+        columns["drive_force_N"] = columns["drive_force_N"] - zero_N
+        channels["drive_force_N"] = channels["drive_force_N"].model_copy(update={"offset": -zero_N})
     if found.position and asked.speed_mps is not None:
         del columns["drive_position_m"], channels["drive_position_m"]
         findings.append(Finding("assumed", path.name, f"the speed is that of --speed: {found.position!r} is not used"))
@@ -103,7 +121,7 @@ def read_record(path: Path, asked: Asked) -> Record:
         and len(table.columns[found.speed]) == len(columns["t_s"])
     ):
         columns["drive_position_m"] = _way(columns["t_s"], _si(table, found.speed))
-    known = Known(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None)
+    known = Known(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
     return _record(path, columns, known, findings, map_text(table, channels, asked), of_load)
 
 
@@ -129,15 +147,6 @@ def _record(
     ):
         position = None
     return Record(path, columns["t_s"], columns["drive_force_N"], position, known, findings, text, of_load)
-
-
-def _leave_out(path: Path, columns: dict[str, Floats], findings: list[Finding]) -> None:
-    """Put NaN for values that are no measurement, and tell which rows the times leave out."""
-    findings += of_time(columns["t_s"], f"{path.name}: t_s")
-    for name in ("drive_force_N", "drive_position_m"):
-        if name in columns:
-            columns[name], told = without_outliers(columns[name], f"{path.name}: {name}")
-            findings += told
 
 
 def _channels(table: Table, found: Guess) -> dict[str, ChannelMap]:
@@ -209,6 +218,8 @@ def map_text(table: Table, channels: dict[str, ChannelMap], asked: Asked) -> str
             keys.append(f"scale = {channel.scale!r}")
         elif unit and known_unit(unit):
             keys.append(f"unit = {json.dumps(unit, ensure_ascii=False)}")
+        if channel.offset:
+            keys.append(f"offset = {channel.offset!r}")
         lines.append(f"{name} = {{ {', '.join(keys)} }}")
     if asked.speed_mps is not None:
         lines += ["", "[run]", f"drive_velocity_mps = {asked.speed_mps!r}"]

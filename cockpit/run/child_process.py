@@ -67,8 +67,12 @@ def handle_endings(handler: Callable[[int, Any], Any]) -> dict[signal.Signals, A
 
 def end_like_ctrl_c() -> None:
     """Let SIGTERM and SIGHUP end the command as Ctrl-C does: it stops its workers, keeps whole files, and says INTERRUPTED."""
+
+    def on_signal(number: int, _frame: Any) -> None:
+        raise KeyboardInterrupt(signal.Signals(number).name)
+
     for number in _like_ctrl_c():
-        signal.signal(number, signal.default_int_handler)
+        signal.signal(number, on_signal)
 
 
 @contextlib.contextmanager
@@ -177,8 +181,8 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         return work() or 0
     except Fault as fault:
         return report(fault, as_json)
-    except KeyboardInterrupt:
-        return report(Fault("INTERRUPTED", "stopped by Ctrl-C"), as_json)
+    except KeyboardInterrupt as ended:
+        return report(Fault("INTERRUPTED", f"stopped by {str(ended) or 'Ctrl-C'}"), as_json)
     except MemoryError:
         files = ", ".join(word for word in sys.argv[1:] if os.access(word, os.F_OK)) or "the command"
         line = f"{files}: needs more memory than there is; end other programs, or use a machine with more or a smaller file"
@@ -190,7 +194,8 @@ def _status(work: Callable[[], int | None], as_json: bool) -> int:
         return report(Fault("CONFIG", line), as_json)
     except ModuleNotFoundError as error:
         module = (error.name or "").partition(".")[0]
-        if module not in EXTRA_MODULES:
+        if module not in EXTRA_MODULES and module != "foxglove":  # which is large, and of one option: no part of [all]
             raise
-        line = f"this command needs {module}, which is not installed; pip install 'stickslip[all]'"
+        extra = "foxglove" if module == "foxglove" else "all"
+        line = f"this command needs {module}, which is not installed; pip install 'stickslip[{extra}]'"
         return report(Fault("MISSING_EXTRA", line), as_json)

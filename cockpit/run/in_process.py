@@ -12,6 +12,7 @@ from bridge.guard.config import wider
 from bridge.guard.tell import Teller, changes
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import seal_all
 from bridge.wire.topics import (
     ANNOUNCE,
     APPLIED,
@@ -148,6 +149,7 @@ def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: Blocks, mem
     begin = end - len(made.trace)
     for row in range(len(made.announce)):
         log.write(ANNOUNCE, made.announce[row : row + 1].tobytes())
+    seal_all(made.sensors)
     news = say.of(made)
     tables = {SENSORS: made.sensors, APPLIED: made.applied, COMMAND: made.command, TRACE: made.trace}
     # a stretch that was cut short begins and ends with blocks that have no whole period of the state message

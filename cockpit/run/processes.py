@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge.faults import FAULTS, Fault
-from bridge.plain import ANOTHER_COMPILES, COMPILED, COMPILING, say
+from bridge.plain import ANOTHER_COMPILES, COMPILED, COMPILING, LOADED, say
 from cockpit.run.child_process import handle_endings
 
 _GRACE_S = 6.0  # to fade out, say goodbye on the bus and close the log
@@ -21,6 +21,8 @@ _LOOK_S = 0.05
 _TOLD_S = 30.0  # between two words about a run that has not begun
 _FOREVER_S = 1e6  # for a child: who has started it sees how the others are, and ends it
 _WARNING = "stickslip: warning: "  # how a line of a child begins that a person must see at once
+# how far a child is, as a person is told
+STARTS, COMPILES, READY = "starts", "compiles", ""
 # in this order they are asked to stop: the plant fades the vibration out and tells the others
 _ROLES = ("plant", "controller", "recorder")
 
@@ -41,7 +43,7 @@ class Child:
             start_new_session=True,
         )
         self._lines: list[str] = []
-        self.compiles = False
+        self.still = STARTS
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -52,7 +54,12 @@ class Child:
                     self._lines.append(line.rstrip())
                     words = line.removeprefix("stickslip: ")
                     begins = words.startswith((COMPILING, ANOTHER_COMPILES))
-                    self.compiles = begins or (self.compiles and not words.startswith(COMPILED))
+                    if begins:
+                        self.still = COMPILES
+                    elif words.startswith(COMPILED):
+                        self.still = STARTS
+                    elif words.rstrip() == LOADED:
+                        self.still = READY
                     if begins or line.startswith(_WARNING):
                         say(line.rstrip())
 
@@ -169,15 +176,21 @@ class Beginning:
         if self._begun:
             return
         waited_s = now_s - self._since_s
-        compiling = [child.role for child in self._children if child.compiles]
-        who = f"the {' and the '.join(compiling)} still compile{'s' if len(compiling) == 1 else ''}"
-        what = who if compiling else "plant, controller and recorder have not found each other"
+        what = self._what_is_missing()
         if late:
             raise Fault(
                 "NO_PEER", f"{what} after {waited_s:.0f} s; give the start longer: --wait S, or no --wait at all"
             )
         say(f"waiting  {what}, since {waited_s:.0f} s; Ctrl-C ends it")
         self._due_s = now_s + _TOLD_S
+
+    def _what_is_missing(self) -> str:
+        who: list[str] = []
+        for still in (COMPILES, STARTS):
+            roles = [child.role for child in self._children if child.still == still]
+            if roles:
+                who.append(f"the {' and the '.join(roles)} still {still if len(roles) == 1 else still[:-1]}")
+        return ", ".join(who) or "plant, controller and recorder have not found each other"
 
 
 def _until_the_end(children: list[Child], beginning: Beginning) -> None:

@@ -106,7 +106,9 @@ class Soaked(NamedTuple):
 
     def page(self) -> str:
         """The same and each period, in Markdown."""
-        lines = [f"# Soak of {self.scenario}", "", *(f"    {line}" for line in self.in_words()), ""]
+        made = f"stickslip soak --scenario {self.scenario} --hours {self.wanted_s / 3600.0:g} --report FILE"
+        lines = [f"# Soak of {self.scenario}", "", f"Made by `{made}`.", ""]
+        lines += [*(f"    {line}" for line in self.in_words()), ""]
         lines += [
             "| until, s | blocks | unheard | p50, us | p99, us | p99.9, us | longest, us | over 1 ms |",
             f"|{'---|' * 8}",
@@ -242,12 +244,12 @@ class _Watch:
 
 
 def _resident(t_s: float, pid: int) -> list[tuple[float, float]]:
-    """Time and resident memory [MB]; nothing for a process that is gone."""
+    """Time and resident memory [MB]; nothing for a process that is gone, or has ended and still has a number."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError, ValueError):
         return []
-    return [(t_s, pages * os.sysconf("SC_PAGE_SIZE") * 1e-6)]
+    return [(t_s, pages * os.sysconf("SC_PAGE_SIZE") * 1e-6)] if pages else []
 
 
 def _memory(role: str, points: list[tuple[float, float]]) -> Memory:

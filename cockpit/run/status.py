@@ -10,13 +10,13 @@ from typing import NamedTuple, TypeVar
 from google.protobuf.message import Message
 
 from bridge.faults import Fault
-from bridge.units import quantity
+from bridge.units import counted, quantity
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import WEAK_REASONS
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT, STATE, Topic
 from bridge.wire.words import words
-from bridge.wire.zenoh_link import Bus, BusConfig, Received
+from bridge.wire.zenoh_link import Bus, BusConfig, Received, stands_still
 
 _DIAL_S = 0.4  # a rig on this machine answers in milliseconds, one in the same network in tens of them
 _ROLES_S = 0.2  # who is there is known as soon as the link is; only who is not there is waited for
@@ -52,7 +52,7 @@ class Status(NamedTuple):
     reason: str | None
     limit: str | None
     contact: str | None
-    slips: int | None  # since the start of the run
+    slips: int | None  # since the controller began, which may have seen several runs of the rig
     drive_force_N: float | None
     drive_velocity_mps: float | None
     vibration_velocity_mps: float | None
@@ -82,7 +82,8 @@ class Status(NamedTuple):
             lines.append(f"state    {self.state}: {_help('guard_state', self.state)}")
             lines.append(f"cause    {self.cause}: {_help('cause', self.cause)}")
         if self.t_s is not None:
-            lines.append(f"run      {self.t_s:.1f} s, {self.slips} slips")
+            counted_slips = counted(self.slips or 0, "slip")
+            lines.append(f"run      {self.t_s:.1f} s of the rig; {counted_slips} since the controller began")
         for name, column, word in (
             ("mode", "mode", self.mode),
             ("reason", "reason", self.reason),
@@ -164,6 +165,11 @@ def look(bus_config: BusConfig) -> Status:
     except Fault as fault:
         if fault.kind.code != "NO_PEER":
             raise
+        if stands_still(bus_config):
+            line = f"{where}: what listens there stands still (frozen or overloaded): must run"
+            raise Fault(
+                "NO_PEER", f"{line}; look at the rig's process, and take it that it vibrates as before"
+            ) from None
         line = f"{where}: no rig answers there within {_DIAL_S:g} s: --endpoint must be that of a run under way"
         raise Fault("NO_PEER", f"{line}; start one, or give its --endpoint") from None
     with bus:

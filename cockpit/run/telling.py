@@ -5,7 +5,7 @@ import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from bridge.plain import Tell, say, untold
+from bridge.plain import LOADED, Tell, say
 
 _LAST_WORDS_S = 1.0  # for what is still to be printed at the end
 
@@ -15,11 +15,11 @@ def telling(quiet: bool) -> Generator[Tell]:
     """A function that prints a line on stderr, `waiting  for a rig`, in a thread: Ctrl-S on the terminal must not hold up a loop.
 
     Args:
-        quiet: print nothing, as a child of `stickslip run`, which has a line of its own.
+        quiet: say only at the first line that all is loaded, as a child of `stickslip run`, which has a line of its own.
 
     """
     if quiet:
-        yield untold
+        yield _once_loaded()
         return
     lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
 
@@ -35,3 +35,15 @@ def telling(quiet: bool) -> Generator[Tell]:
     finally:
         lines.put(None)
         thread.join(_LAST_WORDS_S)
+
+
+def _once_loaded() -> Tell:
+    told = False
+
+    def tell(_what: str, _text: str) -> None:
+        nonlocal told
+        if not told:
+            told = True
+            say(f"stickslip: {LOADED}")
+
+    return tell

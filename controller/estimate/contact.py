@@ -10,7 +10,7 @@ stick that is to be expected, the controller is blind and says so.
 import math
 
 from bridge.kernel import Record, kernel
-from controller.codes import SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
+from controller.codes import CHECKING, SLIP, SMOOTH, STANDSTILL, STICK, UNKNOWN
 from controller.estimate.windows import BINS, DRIVE, FORCE, OF_STEP, SLIDE, WELL_KNOWN
 
 _SIGMAS = 6.0  # 1e-9 a window: less than one false announcement in 100 hours of windows of 1 ms
@@ -103,9 +103,10 @@ def _follow(s: Record, tick_s: float, slipping: bool, speed_mps: float) -> None:
         s.slipping = 0
     if slipping and s.slipping == 0:
         s.slipping = 1
-        s.slip_began = 1
+        loosened = s.moving == 0 and s.guard_state == CHECKING  # the tones of the rig's check let the spring relax
+        s.slip_began = 0 if loosened else 1
         if s.since_stick_s <= 2.0 * s.window_s or not vibrated:
-            s.slips += 1
+            s.slips += s.slip_began
         else:
             s.surges += 1
     if s.slipping == 1:

@@ -10,9 +10,21 @@ import math
 
 from bridge.kernel import Record, kernel
 from controller.codes import EXCITE, HELD, NOT_NEEDED, PROBE, SMOOTH, STICK, STILL_NEEDED, WATCH
+from controller.estimate.windows import BINS
 from controller.modes import enter, excite
 from controller.needs.need import is_needed, note_needed, note_needless, settling_s, swing_held
-from controller.needs.wobble import EVEN, FALLS, LEAST_ASKED, MOST_ASKED, UNSURE, answer, begin_wobble, can_ask, wobble
+from controller.needs.wobble import (
+    EVEN,
+    FALLS,
+    LEAST_ASKED,
+    MOST_ASKED,
+    UNSURE,
+    answer,
+    begin_wobble,
+    can_ask,
+    slide_mps,
+)
+from controller.needs.wobble import wobble as ask
 
 STEADY_S = 0.2  # of constant v_d before and during a probe
 _LAST = 1.02  # ratio of a fading vibration down to which the mean friction grows
@@ -25,6 +37,10 @@ _LAG, _SWING = 0.5, 0.2  # shares of v_d by which the slide may lag in the first
 # the fall is too small to be told.
 _SLOWEST_S = 5.0
 _NEARLY = 0.98  # of the ratio at which it is asked
+# A slide swings about its mean, more and more, before it sticks or runs ahead: what windows of v_s show of it beside windows
+# 2^4 times as long, over a time of two of those.
+_LONGER, _MEMORY = 4, 2.0
+_GROWN, _FELT = 2.0, 0.1  # times the least since the fade began, and share of v_d, both rms, from which it is a swing
 _ASKED_FASTER = 2.0  # a fade after a wobble that found no fall of friction, over one that has to find out
 
 
@@ -32,11 +48,12 @@ _ASKED_FASTER = 2.0  # a fade after a wobble that found no fall of friction, ove
 def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float) -> None:
     """Ask where a probe is due and the slide slides evenly; begin the fade after an answer that allows it."""
     s.unasked_s += p.block_s
+    _note_swing(p, s, speed_mps)
     follows = s.contact == SMOOTH and s.slip_began == 0 and s.steady_s > STEADY_S and s.mode == EXCITE
     if s.wobbles == 1:
         if not follows:
             s.wobbles = 0
-        elif wobble(p, s, speed_mps):
+        elif ask(p, s, speed_mps):
             told = answer(s)
             if told != UNSURE:
                 s.wobbles = 0
@@ -64,7 +81,18 @@ def begin_probe(p: Record, s: Record, way: int, force_N: float, speed_mps: float
 def _fade(p: Record, s: Record, force_N: float, faster: float) -> None:
     s.fade, s.fade_from_N = s.ratio_now, math.fabs(force_N)
     s.fade_per_s = faster * 0.5 / p.probe_fade_s
+    s.swung_least = s.swung if faster == 1.0 else math.inf  # after an answer the slide may lag, and that is no swing
     enter(s, PROBE, HELD)
+
+
+@kernel
+def _note_swing(p: Record, s: Record, speed_mps: float) -> None:
+    """Follow the mean square of what v_s swings by, over v_d."""
+    longer = s.level + _LONGER
+    if s.level < 0 or longer >= p.levels or s.pushed[longer] < BINS:
+        return
+    off = (slide_mps(p, s, s.level, speed_mps) - slide_mps(p, s, longer, speed_mps)) / speed_mps
+    s.swung += min(p.block_s / (_MEMORY * p.window_s[longer]), 1.0) * (off * off - s.swung)
 
 
 @kernel
@@ -83,7 +111,11 @@ def probe(p: Record, s: Record, way: int, speed_mps: float, block_s: float) -> N
     # below v_d the slide may be as slow as v_a, until the spring pulls with all of the friction
     off_mps = _SWING * speed_mps + 3.0 * s.fine_sigma_mps
     slow = s.fade < _LAST and s.fine_mps < min(s.vibration_velocity_mps, speed_mps) - off_mps
-    swings = s.level >= 0 and (slow or s.fine_mps > speed_mps + off_mps)
+    _note_swing(p, s, speed_mps)
+    if s.swung_least < math.inf:
+        s.swung_least = min(s.swung_least, s.swung)
+    grown = s.swung > _GROWN * _GROWN * s.swung_least + _FELT * _FELT
+    swings = s.level >= 0 and (slow or grown or s.fine_mps > speed_mps + off_mps)
     if s.contact == STICK or s.slip_began == 1 or swings:
         _still_needed(p, s, way, speed_mps)
         excite(p, s, STILL_NEEDED, p.v_ratio)

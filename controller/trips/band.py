@@ -51,7 +51,7 @@ def note_check(p: Record, s: Record, tone_Hz: float, gain: float) -> None:
 def _use_check(p: Record, s: Record) -> None:
     other = p.told_gain > 0.0
     for i in range(p.candidates):
-        low, high = _checked(s, i)
+        low, high = _checked(p, s, i)
         alike = high < p.gain_band * low
         s.known_gain[i] = math.sqrt(low * high)
         s.known_steps[i] = p.known_steps if alike else 0
@@ -60,11 +60,21 @@ def _use_check(p: Record, s: Record) -> None:
 
 
 @kernel
-def _checked(s: Record, i: int) -> tuple[float, float]:
-    """The lower and the higher of the gains at the tones beside a candidate; below and above all tones there is one."""
-    below = s.tone_gain[i, 0] if s.tone_gain[i, 0] > 0.0 else s.tone_gain[i, 1]
-    above = s.tone_gain[i, 1] if s.tone_gain[i, 1] > 0.0 else s.tone_gain[i, 0]
-    return min(below, above), max(below, above)
+def _checked(p: Record, s: Record, i: int) -> tuple[float, float]:
+    """The lowest and the highest gain that the check allows at a candidate: those at the tones beside it.
+
+    Beyond the last tone the gain may go on to change by as much as between the last two.
+    """
+    way = 1 if s.tone_gain[i, 1] == 0.0 else -1
+    j = i
+    while s.tone_gain[j, 0] == 0.0 or s.tone_gain[j, 1] == 0.0:
+        j -= way
+        if j < 0 or j >= p.candidates:  # one tone alone
+            only = max(s.tone_gain[i, 0], s.tone_gain[i, 1])
+            return only, only
+    low, high = min(s.tone_gain[j, 0], s.tone_gain[j, 1]), max(s.tone_gain[j, 0], s.tone_gain[j, 1])
+    beyond = high / low if j != i else 1.0
+    return low / beyond, high * beyond
 
 
 @kernel
@@ -81,7 +91,7 @@ def note_known(p: Record, s: Record, i: int, gain: float) -> None:
         s.known_steps[i] += 1
         s.known_gain[i] += (gain - s.known_gain[i]) / s.known_steps[i]
         if s.checked_blocks >= CHECK_BLOCKS:
-            low, high = _checked(s, i)
+            low, high = _checked(p, s, i)
             s.known_gain[i] = min(max(s.known_gain[i], low), high)
 
 

@@ -20,6 +20,7 @@ _LONGER = 4  # levels of longer windows for feeds that do not stand out
 _EXACT = 0.05  # noise of both places over v_d, at most
 _APART = 1.2  # by which they are apart; scales are better
 _MARGIN = 1.1  # of v_a over what is confirmed, once they are
+_RISES_S = 1.0  # time constant in which more is confirmed while they are apart: v_a that changes moves slide and force
 _WINDOWS = 5.0 * BINS  # that taught a stiffness: BINS in a row overlap, and in hum five of them agree on a wrong one
 _SURE = 0.03  # of a learnt stiffness, over itself; the first ones are a third too large
 # Share of v_d below which the slide sticks, and what is confirmed of it then at least: all the rest hangs on the stiffness.
@@ -62,7 +63,8 @@ def watch_confirmed(p: Record, s: Record) -> None:
     if s.apart_by in (SLIDE, FORCE) or share >= 1.0:
         s.confirmed = 1.0
     else:
-        s.confirmed = max(share, 0.0) * _MARGIN
+        now = max(share, 0.0) * _MARGIN
+        s.confirmed = min(now, s.confirmed + some_s / _RISES_S * max(now - s.confirmed, 0.0))
     explained = s.apart_by == _NONE and slide_mps + _SOFTER * winds_mps > drive_mps / _APART and share < 1.0
     if s.apart_s > TRIP_S and not explained:
         if s.apart_by == DRIVE:

@@ -37,7 +37,12 @@ def note_command(s: Record, expected_mps: float) -> None:
 
 @kernel
 def is_even(p: Record, s: Record) -> bool:
-    """Whether the measured v_a can be compared with the commanded one, whichever of the delays that were seen holds."""
+    """Whether the measured v_a can be compared with the commanded one, whichever of the delays that were seen holds.
+
+    Before the first of a vibration is heard, its delay may be any that the loop is made for.
+    """
+    if s.listening == 1 and s.onset_steps <= p.slot_steps * p.slots:
+        return False
     return s.even_steps > p.settle_steps + s.loop_delay_steps // 2 and s.demodulated_Hz == s.allowed_Hz
 
 
@@ -45,7 +50,7 @@ def is_even(p: Record, s: Record) -> bool:
 def watch_delivered(p: Record, s: Record, block: Record) -> None:
     """Compare; trip where v_a is too little for its hold time, and count for how long it is too much."""
     i = s.candidate
-    if s.followed != i:
+    if s.followed != i or not is_known(p, s, i):
         s.followed, s.followed_gain, s.low_steps = i, s.known_gain[i], 0
     if not is_known(p, s, i) or not is_even(p, s):
         s.high_steps = min(s.high_steps + 1, 0)

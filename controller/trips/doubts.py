@@ -19,8 +19,8 @@ CHANNELS = 4
 
 @kernel
 def trip(s: Record, reason: int, doubts: int) -> None:
-    """Doubt signals; the first trip is the one that is told until it ends."""
-    if s.trip == 0:
+    """Doubt signals; the first trip is the one that is told until it ends, unless a later one ends the vibration."""
+    if s.trip == 0 or (doubts == DRIVE and s.doubted & DRIVE == 0):
         s.trip = reason
     s.doubted |= doubts
 

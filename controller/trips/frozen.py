@@ -27,6 +27,9 @@ HOLD_S, FEWEST = (
     0.05,
     40,
 )  # of equal samples, and blocks of them, until it trips: at a noise of one step half of all are equal
+_ALL_PARTS = (
+    2  # of this time, for one of which all channels repeat: what reads them hangs, as a rig that is silent for so long
+)
 _FASTEST_MPS = 100.0  # of a drive; a place that goes faster was not gone through
 _LOOK_STEPS = 16  # blocks from one look at the noise of a channel to that of the next
 _LOOKS = 8  # until a channel counts as one with noise
@@ -62,6 +65,8 @@ def watch_frozen(p: Record, s: Record, block: Record) -> None:
         trip(s, FROZEN, DRIVE)
     if _repeats(p, s, OF_BASE, float(block.base_accel_mps2[0])):
         trip(s, FROZEN, ACCELEROMETER)
+    if s.same_steps[OF_BASE] > 0 and _all_repeat(p, s):
+        trip(s, FROZEN, ACCELEROMETER | CONTACT | DRIVE)
     _watch_drops(p, s, block.base_accel_mps2)
 
 
@@ -129,7 +134,21 @@ def _goes_up_and_down(samples: Record) -> bool:
 def _repeats(p: Record, s: Record, channel: int, first: float) -> bool:
     same = s.same_steps[channel] + 1 if first == s.first_sample[channel] else 0
     s.same_steps[channel], s.first_sample[channel] = same, first
-    if same <= p.frozen_steps:
-        return False
+    return same > p.frozen_steps and _has_noise(s, channel)
+
+
+@kernel
+def _has_noise(s: Record, channel: int) -> bool:
     way = _state(s, channel)
     return s.looks[channel, way] == _LOOKS and s.lively[channel, way] > _LIVELY
+
+
+@kernel
+def _all_repeat(p: Record, s: Record) -> bool:
+    """Whether all channels repeat their numbers, and the accelerometer of the base has noise: one without may stand."""
+    fewest = min(s.same_steps[OF_BASE], s.same_steps[OF_DRIVE])
+    if p.use_force == 1:
+        fewest = min(fewest, s.same_steps[OF_FORCE])
+    if p.use_slide_position == 1:
+        fewest = min(fewest, s.same_steps[OF_SLIDE])
+    return _ALL_PARTS * fewest > p.frozen_steps and _has_noise(s, OF_BASE)

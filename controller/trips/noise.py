@@ -12,7 +12,7 @@ from controller.trips.delivered import SOME
 _LOUDER = 4.0  # bend of the drive's place from sample to sample, over what it was, from which its noise is another
 _LEARN = 1.0 / 16.0  # share of one look
 _SLIPS_S = 1.0  # time constant of the count of slips
-_MOST_SLIPS, _TIMES = 8.0, 3.0  # in it, besides what the spring can wind up for, and times that
+_MOST_SLIPS, _TIMES = 8.0, 3.0  # in it, besides what the spring could wind up for, and times that
 _UNBELIEVED_S = 2.0  # for which slips are not believed after too many of them
 _TOLD_S = 2.0  # for which noise that became larger is told
 
@@ -41,8 +41,12 @@ def look_at_noise(s: Record, samples: Record) -> None:
 def watch_slips(p: Record, s: Record) -> None:
     """Do not believe slips for a while where there are too many. Once in SOME steps."""
     some_s = SOME * p.block_s
-    s.slip_count *= 1.0 - min(some_s / _SLIPS_S, 1.0)
+    keep = 1.0 - min(some_s / _SLIPS_S, 1.0)
+    s.slip_count *= keep
+    s.slips_wound *= keep
+    if s.moving == 1:  # at the speed of then: a drive that slows down has slipped as often as it could
+        s.slips_wound += some_s / max(s.expected_stick_s, some_s)
     s.unbelieved_s = max(s.unbelieved_s - some_s, 0.0)
     s.noise_told_s = max(s.noise_told_s - some_s, 0.0)
-    if s.slip_count > _MOST_SLIPS and s.slip_count * s.expected_stick_s > _TIMES * _SLIPS_S:
+    if s.slip_count > _MOST_SLIPS and s.slip_count > _TIMES * s.slips_wound:
         s.unbelieved_s = _UNBELIEVED_S

@@ -32,6 +32,7 @@ class TripTeller:
         self._reasons = {number: (name, help_of[("reason", number)]) for number, name in names.items()}
         self._limits = {number: (name, help_of[("limit", number)]) for number, name in _LIMITS.items()}
         self._reason = self._limit = 0
+        self._open: list[str] = []  # trips since the last reason that is none; one may hide another
         self._limit_since_ns = 0
         self._limit_told = True
         self._told_ns: dict[str, int] = {}
@@ -44,11 +45,15 @@ class TripTeller:
         t_ns = int(trace.t_ns)
         found: list[tuple[str, str]] = []
         if reason != self._reason:
-            before, self._reason = self._reasons.get(self._reason), reason
-            if before is not None and before[0] in TRIPS:
-                found.append(("CLEARED", f"{before[0]} is over"))
-            if reason in self._reasons:
-                found += self._once(*self._reasons[reason], t_ns)
+            self._reason = reason
+            name, text = self._reasons.get(reason, ("", ""))
+            if name in TRIPS:
+                self._open = [*self._open, *([] if name in self._open else [name])]
+            elif self._open:
+                found.append(("CLEARED", f"{' and '.join(self._open)} {'is' if len(self._open) == 1 else 'are'} over"))
+                self._open = []
+            if name:
+                found += self._once(name, text, t_ns)
         if limit != self._limit:
             self._limit, self._limit_since_ns, self._limit_told = limit, t_ns, limit not in self._limits
         elif not self._limit_told and t_ns - self._limit_since_ns >= _HELD_S * 1e9:

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from joblib import Parallel, delayed  # pyright: ignore[reportUnknownVariableType]
 
 from bridge.files import write_json
@@ -19,11 +18,9 @@ from diagnosis.blind.scoring import Oracle
 from diagnosis.blind.version import tool_version
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.fits.fit import Fit
-from diagnosis.fits.gauss_newton import FAR_KNEE
 from diagnosis.fits.retuning import retuned_rig
-from diagnosis.fits.screening import Origin, screened
+from diagnosis.fits.screening import screened
 from diagnosis.fits.search import refitted
-from diagnosis.gap.floor import KNEE
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
 from diagnosis.hypotheses.trials import trials
@@ -76,10 +73,7 @@ def shrinkage_with(folder: Path, effects: list[str]) -> float | None:
     best: Fit = baseline
     for effect in effects:  # each effect is added to the fit with the effects before it
         own = [trial for trial in tried if trial.hypothesis.effects == (effect,)]
-        origins = [Origin(best, KNEE)]
-        if best is baseline:
-            origins.append(Origin(fitter.described(np.zeros(len(fitter.nuisances))), FAR_KNEE))
-        found = refitted(fitter, origins, screened(fitter, origins, own))
+        found = refitted(fitter, best.chi2, screened(fitter, best, own, paired=False))
         if not found:
             return None
         best = found[0]

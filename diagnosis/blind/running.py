@@ -42,7 +42,7 @@ def run(folder: Path, jobs: int) -> Generator[FolderResult]:
             )
             raise Fault("BAD_SET", f"{line} go on with that one, or delete {folder / RESULTS} and begin anew")
     sources = [EvidenceFolder(name, folder / name) for name in missing(folder)]
-    with closing(many.diagnose_many(sources, jobs, "", many.real_diagnose)) as outcomes:
+    with closing(many.diagnose_many(sources, jobs, "", many.real_diagnose, shared=False)) as outcomes:
         for outcome in outcomes:
             write_json(result_file(folder, outcome.source.name), _as_json(outcome) | {"tool": tool})
             yield outcome

@@ -1,5 +1,6 @@
 """Import of measured data of other programs, with a channel map, into an evidence folder or a run log of this project."""
 
+import json
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -17,6 +18,8 @@ from bridge.log.runlog import RunLog
 from bridge.tables.export import CHANNELS
 from bridge.tables.kinds import Kind
 from bridge.tables.readers import Dialect, read_table
+from bridge.tables.table import Table
+from bridge.tables.unit_words import known_unit
 from bridge.units import counted, unit_of
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
@@ -31,6 +34,7 @@ from diagnosis.evidence.unknown_mass import shown_mass_kg
 
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
+_AGAINST = 0.3  # share of all work that the drive would get back; a loaded spring gives back some at the end
 _BLOCK_SAMPLES = 20
 _GAP_STEPS = 10.0  # usual steps, beyond which nothing is interpolated
 _IRREGULAR_SHARE = 0.01  # of a step, up to which time counts as even: rounding of a printed column of a DAQ
@@ -120,9 +124,33 @@ def import_file(path: Path, map_path: Path, out: Path) -> Imported:
             done = _to_log(path, columns, out)
         else:
             done = _to_folder(path, columns, wanted, map_path.name, out)
-        return done._replace(findings=findings + done.findings)
+        return done._replace(findings=findings + _with_sign(done.findings, path.name, columns, wanted, table))
     except OSError as error:
         raise Fault("LOG_WRITE", f"{out}: {error.strerror or error}; choose another --out") from None
+
+
+def _with_sign(found: list[Finding], file: str, columns: Columns, wanted: ImportMap, table: Table) -> list[Finding]:
+    """The findings, with a line to copy where the force has the other sign."""
+    others = [one for one in found if one.kind != "sign" or not one.where.endswith("drive_force_N")]
+    if len(others) == len(found) and not _pulls_back(columns):
+        return found
+    channel = wanted.channels["drive_force_N"]
+    known = known_unit(channel.unit or table.unit(channel.column))
+    scale = channel.scale if channel.scale is not None else known[1] if known is not None else 1.0
+    offset = f", offset = {-channel.offset!r}" if channel.offset else ""
+    line = (
+        f"drive_force_N = {{ column = {json.dumps(channel.column, ensure_ascii=False)}, scale = {-scale!r}{offset} }}"
+    )
+    text = "pulls against the drive's motion: its sign is the other one, and a diagnosis leaves it out; under [channels] write"
+    return [*others, Finding("sign", f"{file}: drive_force_N", f"{text} {line}")]
+
+
+def _pulls_back(columns: Columns) -> bool:
+    """Whether the drive would get work back all the way: friction gives none, whatever the rig is."""
+    if not {"drive_force_N", "drive_position_m"} <= columns.keys():
+        return False
+    work_J = np.nan_to_num(columns["drive_force_N"][1:] * np.diff(columns["drive_position_m"]))
+    return float(work_J.sum()) < -_AGAINST * float(np.abs(work_J).sum())
 
 
 def _turns(rig: dict[str, Any]) -> bool | None:

@@ -9,9 +9,10 @@ from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_rows
 from bridge.tables.table import Table
-from bridge.tables.unit_words import known_unit, si_unit
+from bridge.tables.unit_words import known_unit, si_unit, weight_unit
 from bridge.units import counted
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
+from diagnosis.evidence.sentinels import SMOOTH, without_sentinels
 
 Floats = npt.NDArray[np.float64]
 Columns = dict[str, Floats]
@@ -104,7 +105,10 @@ def _same_length(table: Table, channels: dict[str, ChannelMap], values: Columns,
 
 def _in_si(table: Table, name: str, channel: ChannelMap, found: list[Finding], rotary: bool | None) -> Floats:
     """A channel in its SI unit: by its scale, by the unit of the map, or by that of the file."""
-    values = table.column(channel.column)
+    values, told = without_sentinels(
+        table.column(channel.column), f"{table.path.name}: column {channel.column}", name in SMOOTH
+    )
+    found += told
     return values * _factor(table, name, channel, found, rotary) + channel.offset
 
 
@@ -112,7 +116,7 @@ def _factor(table: Table, name: str, channel: ChannelMap, found: list[Finding], 
     if channel.scale is not None:
         return channel.scale
     unit = channel.unit or table.unit(channel.column)
-    known = known_unit(unit) if unit else None
+    known = None if not unit else weight_unit(unit) if _MEASURES[name][0] == "force" else known_unit(unit)
     if known is None:
         return 1.0
     what, factor = known

@@ -31,12 +31,14 @@ _MOST_TOLERANCES = 3.3
 _MOST_OF_CHAIN = 5.0
 # Gain in chi2 below which a step counts as none. Too small: fits creep on. Too large: fits stop before they are done.
 _WORTH_A_STEP = 0.5
+# The same as a share of chi2, but for the baseline, which every fit is compared with: creeping on costs time and changes no name.
+_WORTH_OF_CHI2 = 0.01
 # Shares of the Newton step that are tried, until one gains. Without the small share a curved valley stops the fit; each further
 # share costs a prediction where nothing gains. Counted: docs/method/fits.md.
 _SHARES = (1.0, 0.3, 0.1)
 # `going_further` refits at most so often, and while a refit leaves this share of chi2 or less. A larger share, or more refits,
 # gains little for more time; a smaller one stops fits that still move. Counted: docs/method/fits.md, `going_further`.
-_MORE_REFITS, _GAINED = 5, 0.97
+_MORE_REFITS, _GAINED = 5, 0.9
 
 
 class Stage(NamedTuple):
@@ -47,6 +49,7 @@ class Stage(NamedTuple):
     knee: float  # of the compression, in noise floors
     # whether to compute the derivatives where the fit ends; otherwise those of the last step stay
     columns: bool = True
+    worth: float = _WORTH_OF_CHI2  # gain below which a step counts as none, as a share of chi2
 
 
 # Knee of the compression for a start far from the runs, in noise floors. Too small: far differences are cut flat and give no
@@ -55,7 +58,7 @@ FAR_KNEE = 60.0
 _FAR = Stage(4, 1, FAR_KNEE)
 _NEAR = Stage(6, 1, KNEE)
 # of the baseline: more steps and renewals than other fits, as every fit is compared with it
-_RETUNE = Stage(9, 3, KNEE)
+_RETUNE = Stage(9, 3, KNEE, worth=0.0)
 _QUICK = Stage(2, 0, FAR_KNEE, columns=False)
 # Largest difference, in noise floors, from which a refit begins with the far stage. Too small: fits that are near lose time
 # there. Too large: fits start where the compression is nearly flat.
@@ -148,15 +151,6 @@ class Fitter:
         there = yield Question([(one, {}) for one in aside])
         self._rates = self._nuisance_rates(fit.deviations, here, aside, there)
         return fit
-
-    def described(self, deviations: Floats) -> Fit:
-        """The rig without effects at these deviations, not refitted, with derivatives under the knee of a far start."""
-        here = self.predicted(deviations, {})
-        residual, slope = self.whitened(here, FAR_KNEE)
-        aside = self._aside(deviations, _STEPS[0])
-        rates = self._nuisance_rates(deviations, here, aside, self.predicted_many([(one, {}) for one in aside]))
-        chi2 = self._chi2(np.ones(len(deviations)), residual, deviations)
-        return Fit(NOTHING, deviations, np.zeros(0), chi2, residual, self.floor.whitening @ (rates * slope[:, None]))
 
     def refit(self, hypothesis: Hypothesis, deviations: Floats, w: Floats) -> Fit:
         """Fit a hypothesis to the end, from a start that may be far from the runs.
@@ -258,14 +252,15 @@ class Fitter:
                     gain = here.chi2 - there.chi2
                     here = there
                     break
-            if gain < _WORTH_A_STEP:
+            worth = max(_WORTH_A_STEP, stage.worth * here.chi2)
+            if gain < worth:
                 if without_gain == stage.renewals:
                     finished = without_gain > 0  # no step gains, not even with renewed derivatives
                     break
                 size = _STEPS[renewed % len(_STEPS)]
                 nuisance_rates, there = yield from self._renewed(hypothesis, here, stage.knee, size)
                 renewed += 1
-                if there.chi2 < here.chi2 - _WORTH_A_STEP:
+                if there.chi2 < here.chi2 - worth:
                     here = there
                 else:
                     without_gain += 1

@@ -22,7 +22,7 @@ from diagnosis.processes import each
 
 Floats = npt.NDArray[np.floating[Any]]
 EFFECT, FORM = "normal-load-fluctuation", "sine"
-_PHASES_RAD = 2.0 * math.pi * np.arange(8) / 8.0
+_PHASES_RAD = 2.0 * math.pi * np.arange(8) / 8.0  # that a run may begin in
 _RATIOS = (0.007, 0.02, 0.06)  # amplitudes that are tried, over the mean load: from hardly visible to large
 _MOST = 3  # frequencies that get a refit; each more costs one refit, fewer may miss the right frequency
 

@@ -33,8 +33,8 @@ RANDOM_EFFECTS: Final = tuple(_OVER)
 # turns in the longest run of 10 s or so: 1, 2.5, 6 Hz; in the longest way, which is of some mm: every 5, 2, 0.8 mm
 _TURNS: Final = {"time": (10.0, 25.0, 60.0), "position": (1.0, 2.5, 6.0)}
 _SIZES = (0.3, 0.5, 0.7, 1.0, 1.4, 2.0)  # of the scatter that breakaways and levels show
-_LEAST_RATIO = 0.005
-_DRAWS = 16
+_LEAST_RATIO = 0.005  # scatter, relative, that the paths have at least
+_DRAWS = 16  # paths of each length
 _INDEPENDENT = 0.3  # share of the covariance that is taken as independent, as so few draws know few correlations
 _SPREAD: Final = {"ratio": 0.35, "length": 0.45}  # of the estimates, relative: the grid's
 # Third and fourth standardized moment of what breakaways scatter by: 0 and 1.5 of a sine, 0 and 3 of noise. Of 12 made rigs each

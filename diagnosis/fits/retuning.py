@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bridge.faults import Fault
 from diagnosis.evidence.folder import Evidence
+from diagnosis.features.grid import BLOCK_S
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.gauss_newton import Fitter
@@ -31,8 +32,10 @@ _SLIPS_OF_OTHERS = 8.0
 # Rougher than 0.5 % is no surface but an effect: friction that varies along the track makes the breakaways scatter too, and would
 # be in the floor. Of 28 rigs without a gap the scatter said 0.04 to 0.53 %, of 13 with friction or load that vary 0.47 to 2.7 %.
 _SMOOTHEST, _ROUGHEST = 0.002, 0.005
-FIRST_REPLICATES, REPLICATES = 12, 32
+FIRST_REPLICATES, REPLICATES = 12, 32  # for the roughness, and for the floor
 _NEW_REPLICATES = 24  # that the floor does not know
+# Predictions of all fitted runs that a diagnosis takes: counted on 9 made rigs (docs/method/fits.md); for an estimate of the time
+_FEW, _MANY = 600, 1500
 # of chi2 a compared feature: what the least floors promise is not held against a rig that is better
 _LEAST_EXPECTED = 0.2
 
@@ -52,6 +55,9 @@ def retuned_rig(evidence: Evidence, problem: Problem, progress: Callable[[str, f
     described = np.zeros(len(nuisances))
     point = nuisances.point(described, {})
     first = replicates(problem, point, ROUGHNESS, FIRST_REPLICATES, 1)
+    one_s = problem.pace * sum(len(run.commands.drive) for run in problem.runs) * BLOCK_S / jobs
+    about = f"{_FEW * one_s:.0f} to {_MANY * one_s:.0f} s"
+    progress(f"the simulated fits take about {about}", 0.05)
     roughness = roughness_of(problem, first)
     floor = floor_of(problem, point, first)
     if not floor.compared.any():

@@ -1,4 +1,8 @@
-"""An estimate of what each trial gains, from derivatives at the baseline: cheap, and good enough to choose what to refit."""
+"""An estimate of what each trial and each pair of trials gains, from one prediction a trial: enough to choose what to refit.
+
+All directions are freed of the nuisances, which move along. From their inner products follow the gains of every trial alone and
+of every pair of trials; no further prediction is needed.
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -8,7 +12,6 @@ import numpy.typing as npt
 
 from diagnosis.fits.fit import Fit, step_within
 from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.gap.floor import KNEE
 from diagnosis.hypotheses.hypothesis import Hypothesis
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.processes import each
@@ -18,7 +21,10 @@ Floats = npt.NDArray[np.floating[Any]]
 # Bounds of a screened start: times the trial's own size, and tolerances of a nuisance. Too small: large effects look too small
 # to matter. Too large: starts lie where the derivatives no longer hold.
 _FURTHEST = 8.0
-_FURTHEST_TOLERANCES = 3.0
+_FURTHEST_TOLERANCES = 3.0  # of a nuisance
+_LEAST_POWER = 1e-6  # of a direction, in chi2: less changes nothing
+_LEAST_APART = 0.01  # sine squared of the angle between two directions, from which they are two
+_PAIRS = 8  # of effects that a screening keeps
 
 
 class Screened(NamedTuple):
@@ -31,20 +37,19 @@ class Screened(NamedTuple):
     others: tuple[tuple[Floats, Floats], ...]  # further starts, deviations and w; a refit takes the best of all starts
 
 
-class Origin(NamedTuple):
-    """A fit without effects that a search starts from, and the knee of the compression that it was fitted under."""
+class Screening(NamedTuple):
+    """What the trials promise, the lowest estimated chi2 first."""
 
-    fit: Fit
-    knee: float
+    singles: list[Screened]  # every trial that changes a prediction
+    pairs: list[Screened]  # the best pair of trials of every two effects, the first few
 
 
-class _Base(NamedTuple):
-    """A fit that trials are added to, with the prediction and the nuisances' directions there."""
+class Column(NamedTuple):
+    """What a trial changes."""
 
-    fit: Fit
-    predicted: Floats  # [features]
-    slope: Floats  # derivative of the compression [compared]
-    directions: "Directions"
+    trial: Trial
+    change: Floats  # of the whitened differences [compared]
+    direction: Floats  # the change freed of the nuisances [compared + parameters]
 
 
 class Directions:
@@ -68,10 +73,10 @@ class Directions:
         full = np.concatenate([column, np.zeros(len(self.residual) - len(column))])
         return full - self._columns @ (self._inverse @ (self._columns.T @ full))
 
-    def moved(self, column: Floats, size: float) -> Floats:
-        """Nuisances and coordinates [parameters] after `size` times a direction [compared] is taken out of the differences."""
+    def moved(self, change: Floats) -> Floats:
+        """Nuisances and coordinates [parameters] after a change [compared] is taken out of the differences."""
         rest = self.residual.copy()
-        rest[: len(column)] -= size * column
+        rest[: len(change)] -= change
         return self._at + self._inverse @ (self._columns.T @ rest)
 
 
@@ -80,58 +85,95 @@ def added(base: Hypothesis, more: Hypothesis) -> Hypothesis:
     return Hypothesis(base.forms | more.forms, (*base.coordinates, *more.coordinates))
 
 
-def _screen(fitter: Fitter, origin: _Base, trial: Trial, there: Floats) -> Screened | None:
-    """Scale a trial's start, where the model predicts `there` [features], so that chi2 is least; None if nothing changes."""
-    base, directions = origin.fit, origin.directions
-    column = fitter.column(origin.predicted, there, origin.slope)
-    direction = directions.freed(column)
-    power = float(direction @ direction)
-    if power < 1e-6:
-        return None
-    along = float(direction @ directions.left)
-    size = along / power
-    w = trial.w.copy()
-    if trial.hypothesis.coordinates[0].logarithmic:
-        size = min(max(size, 1.0 / _FURTHEST), _FURTHEST)
-        rolls_off = trial.hypothesis.coordinates[0].name in {"corner_Hz", "resonance_Hz"}  # larger is less
-        w[0] += (-0.5 if rolls_off else 1.0) * math.log(size)
-    else:
-        size = min(max(size, -_FURTHEST), _FURTHEST)
-        w[0] *= size
-    moved = directions.moved(column, size)
-    own = len(base.deviations)
-    deviations = np.clip(moved[:own], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
-    chi2 = float(directions.left @ directions.left) - 2.0 * size * along + size * size * power
-    unmoved = (base.deviations, np.concatenate([base.w, w]))
-    return Screened(
-        added(base.hypothesis, trial.hypothesis), deviations, np.concatenate([moved[own:], w]), chi2, (unmoved,)
-    )
-
-
-def screened(fitter: Fitter, origins: list[Origin], trials: list[Trial], jobs: int = 1) -> list[list[Screened]]:
-    """For each origin all trials that change a prediction, the lowest estimated chi2 first; in `jobs` processes."""
-    return [_screened(fitter, one.fit, one.knee, trials, jobs) for one in origins]
-
-
-def _screened(fitter: Fitter, base: Fit, knee: float, trials: list[Trial], jobs: int) -> list[Screened]:
-    """All trials that change a prediction, the lowest estimated chi2 first."""
-    shares = each(jobs, _screened_share, fitter, [(base, knee, trials[i::jobs]) for i in range(jobs)])
+def screened(fitter: Fitter, base: Fit, trials: list[Trial], jobs: int = 1, paired: bool = True) -> Screening:
+    """What the trials promise in addition to the effects of `base`, and pairs of them where `paired`; in `jobs` processes."""
+    trials = [trial for trial in trials if not set(trial.hypothesis.effects) & set(base.hypothesis.effects)]
+    directions = Directions(base, fitter.most)
+    shares = each(jobs, _columns, fitter, [(base, trials[i::jobs]) for i in range(jobs)])
     # in the order of the trials: otherwise `jobs` would decide which of two equal trials comes first
-    in_order = (shares[number % jobs][number // jobs] for number in range(len(trials)))
-    return sorted((one for one in in_order if one is not None), key=lambda one: one.chi2)
+    changes = (shares[number % jobs][number // jobs] for number in range(len(trials)))
+    columns = [Column(trial, change, directions.freed(change)) for trial, change in zip(trials, changes, strict=True)]
+    columns = [one for one in columns if float(one.direction @ one.direction) >= _LEAST_POWER]
+    if not columns:
+        return Screening([], [])
+    inner = np.stack([one.direction for one in columns])
+    towards = inner @ directions.left
+    inner = inner @ inner.T
+    low, high = np.array([_bounds(one.trial) for one in columns]).T
+    left = float(directions.left @ directions.left)
+    sizes = np.clip(towards / np.diag(inner), low, high)
+    alone = left - 2.0 * sizes * towards + sizes**2 * np.diag(inner)
+    singles = [
+        _start(base, directions, [one], [size], chi2)
+        for one, size, chi2 in zip(columns, sizes.tolist(), alone.tolist(), strict=True)
+    ]
+    best = best_pairs(columns, inner, towards, (low, high), left) if paired else []
+    pairs = [_start(base, directions, [columns[i], columns[j]], own, chi2) for i, j, own, chi2 in best]
+    return Screening(sorted(singles, key=lambda one: one.chi2), pairs)
 
 
-def beside_origin(fitter: Fitter, first: Fit, trials: list[Trial], jobs: int) -> list[Screened]:
-    """The trials of all other effects, screened in addition to the effects of `first`; the lowest estimated chi2 first."""
-    others = [trial for trial in trials if not set(trial.hypothesis.effects) & set(first.hypothesis.effects)]
-    return _screened(fitter, first, KNEE, others, jobs)
-
-
-def _screened_share(fitter: Fitter, work: tuple[Fit, float, list[Trial]]) -> list[Screened | None]:
-    base, knee, trials = work
-    predicted = fitter.predicted(base.deviations, base.effects)
-    origin = _Base(base, predicted, fitter.whitened(predicted, knee)[1], Directions(base, fitter.most))
+def _columns(fitter: Fitter, work: tuple[Fit, list[Trial]]) -> list[Floats]:
+    base, trials = work
+    here = fitter.predicted(base.deviations, base.effects)
+    slope = fitter.whitened(here)[1]
     there = fitter.predicted_many(
         [(base.deviations, base.effects | trial.hypothesis.tables(trial.w)) for trial in trials]
     )
-    return [_screen(fitter, origin, *one) for one in zip(trials, there, strict=True)]
+    return [fitter.column(here, one, slope) for one in there]
+
+
+def _bounds(trial: Trial) -> tuple[float, float]:
+    """Of a trial's size, in times its own."""
+    return (1.0 / _FURTHEST if trial.hypothesis.coordinates[0].logarithmic else -_FURTHEST), _FURTHEST
+
+
+def best_pairs(
+    columns: list[Column], inner: Floats, towards: Floats, bounds: tuple[Floats, Floats], left: float
+) -> list[tuple[int, int, list[float], float]]:
+    """The best two trials of every two effects: their numbers, sizes and estimated chi2; the first `_PAIRS`."""
+    first, second = np.triu_indices(len(columns), 1)
+    a, b, c = inner[first, first], inner[second, second], inner[first, second]
+    apart = np.maximum(a * b - c * c, _LEAST_APART * a * b)  # of two directions that are one, one alone would do
+    sizes = np.stack(
+        [(b * towards[first] - c * towards[second]) / apart, (a * towards[second] - c * towards[first]) / apart]
+    )
+    low, high = bounds
+    sizes = np.clip(sizes, np.stack([low[first], low[second]]), np.stack([high[first], high[second]]))
+    one, other = sizes
+    chi2 = left - 2.0 * (one * towards[first] + other * towards[second])
+    chi2 += one**2 * a + other**2 * b + 2.0 * one * other * c
+    names = [column.trial.hypothesis.effects[0] for column in columns]
+    seen: set[frozenset[str]] = set()
+    found: list[tuple[int, int, list[float], float]] = []
+    for k in np.argsort(chi2, kind="stable").tolist():
+        i, j = int(first[k]), int(second[k])
+        both = frozenset((names[i], names[j]))
+        if len(both) == 2 and both not in seen:
+            seen.add(both)
+            found.append((i, j, sizes[:, k].tolist(), float(chi2[k])))
+            if len(found) == _PAIRS:
+                break
+    return found
+
+
+def _start(base: Fit, directions: Directions, columns: list[Column], sizes: list[float], chi2: float) -> Screened:
+    """Trials at these sizes on top of a fit."""
+    change = np.zeros_like(columns[0].change)
+    hypothesis, own = base.hypothesis, [base.w]
+    for column, size in zip(columns, sizes, strict=True):
+        w = column.trial.w.copy()
+        first = column.trial.hypothesis.coordinates[0]
+        if first.logarithmic:
+            w[0] += (-0.5 if first.name in {"corner_Hz", "resonance_Hz"} else 1.0) * math.log(size)  # larger is less
+        else:
+            w[0] *= size
+        change += size * column.change
+        hypothesis = added(hypothesis, column.trial.hypothesis)
+        own.append(w)
+    moved = directions.moved(change)
+    count = len(base.deviations)
+    deviations = np.clip(moved[:count], -_FURTHEST_TOLERANCES, _FURTHEST_TOLERANCES)
+    unmoved = np.concatenate(own)
+    # a large effect may have pulled the nuisances into a valley of their own: where the rig is described is a start as well
+    others = ((base.deviations, unmoved), (np.zeros_like(base.deviations), unmoved))
+    return Screened(hypothesis, deviations, np.concatenate([moved[count:], *own[1:]]), chi2, others)

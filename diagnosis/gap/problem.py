@@ -25,7 +25,7 @@ from diagnosis.model.sensor_chain import SENSOR_EFFECTS, Chain, sensed, true_for
 from diagnosis.model.true_force import relative, true_commands
 from plant.config import RigConfig
 from plant.effects.library import EFFECTS
-from plant.four_rigs_step import NARROW
+from plant.four_rigs_step import LANES, NARROW
 
 Floats = npt.NDArray[np.floating[Any]]
 AGEING, AGE_BEFORE = "static-friction-ageing", "age_before_s"  # an effect, and the contact's age when a run begins
@@ -78,7 +78,8 @@ class Problem:
     def __init__(self, rig: RigTable, runs: list[Prepared]) -> None:
         self.rig = rig
         self.runs = runs
-        self.until_s = math.inf  # of `time.monotonic`, which all processes share: then `predicted_many` gives up
+        self.until_s = math.inf  # of `time.monotonic`, which all processes share: `predicted_many` gives up before
+        self.pace = 0.0  # seconds of work a simulated second of one lane, as the last batch took
         self.scales = scales_of(rig)
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
@@ -106,7 +107,7 @@ class Problem:
     ) -> list[Floats]:
         """Features of the model at each point, [features] each, in less time than by calls of `predicted`.
 
-        Raises OutOfTimeError after `until_s`.
+        Raises OutOfTimeError where it would end after `until_s`.
 
         Args:
             points: the models.
@@ -114,11 +115,12 @@ class Problem:
             perhaps: points that may be asked for next, simulated where a lane is free.
 
         """
+        if math.isfinite(self.until_s) and len(points) > LANES:  # time is looked at between batches
+            batches = [slice(first, first + LANES) for first in range(0, len(points), LANES)]
+            return [one for own in batches for one in self.predicted_many(points[own], draws[own], perhaps)]
         parts: list[list[float]] = [[] for _ in points]
         with np.errstate(over="ignore", invalid="ignore"):  # a refit may start so far away that the model diverges
             for run in self.runs:
-                if time.monotonic() > self.until_s:
-                    raise OutOfTimeError
                 found = self._signals(run, points, draws or [None] * len(points), perhaps)
                 for part, signals in zip(parts, found, strict=True):
                     part.extend([math.nan] if signals is None else self._features(run, signals).values)
@@ -228,7 +230,13 @@ class Problem:
         starts = [requests[number].start for number in configs]
         entries = [requests[number].entries for number in configs]
         possible = sum(number < wanted for number in configs)
+        began = time.monotonic()
+        simulated_s = possible * len(commands.drive) * BLOCK_S
+        if began + self.pace * simulated_s > self.until_s:
+            raise OutOfTimeError
         found = predict_many(list(configs.values()), self.rig.drive == "force", commands, starts, entries, possible)
+        if possible:
+            self.pace = (time.monotonic() - began) / simulated_s
         by_number = dict(zip(configs, found, strict=True))
         return [by_number.get(number) for number in range(len(requests))]
 

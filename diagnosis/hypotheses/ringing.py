@@ -14,7 +14,7 @@ from diagnosis.gap.prepare import Prepared
 
 Floats = npt.NDArray[np.floating[Any]]
 _WINDOW = 512  # blocks: 2 Hz
-_LOWEST_HZ, _HIGHEST_HZ = 20.0, 450.0
+_LOWEST_HZ, _HIGHEST_HZ = 20.0, 450.0  # of a base that rings: slower is a slip, faster is beyond a grid of 1 ms
 _PROMINENCE = 2.0  # of the logarithm of power; combs of regular slips stay below
 
 

@@ -18,7 +18,7 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.model.per_run import phase_of
 
 Floats = npt.NDArray[np.floating[Any]]
-_GRID = 1500
+_GRID = 1500  # periods that are tried for a wave
 _LOBES = 2  # peaks in every range: pieces of track apart from each other leave the period ambiguous
 _LOBE = 10  # grid points within which peaks are one
 _TWO_WAVES = 3  # pairs of waves that are tried

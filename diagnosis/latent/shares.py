@@ -15,10 +15,10 @@ from diagnosis.latent.components import NOISE, SCATTER
 from diagnosis.latent.reml import Fitted, covariances, fitted, restricted_value
 from diagnosis.latent.rows import Floats, Indices, Rows
 
-_PROPOSED, _DRAWS = 120, 80
+_PROPOSED, _DRAWS = 120, 80  # variances and lengths proposed for the interval, and courses drawn
 _WIDEST = 1.5  # standard deviation of a proposal, in the logarithm of a variance or a length
-_NULL_DRAWS = 300
-_LEVELS = (0.05, 0.95)
+_NULL_DRAWS = 300  # records without the process
+_LEVELS = (0.05, 0.95)  # ends of a 90 % interval
 _LEAST_SHARE = 0.03  # of the shares that get a null, which costs a fit
 
 

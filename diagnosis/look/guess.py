@@ -4,20 +4,22 @@ import re
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from bridge.faults import Fault
 from bridge.tables.table import Table
-from bridge.tables.unit_words import bare_name, known_unit
+from bridge.tables.unit_words import bare_name, known_unit, weight_unit
 
 _NAMES = {
     "time": r"^(t|ts|time|zeit|x_value|timestamp|elapsed.*|.*\btime\b.*|.*zeit.*|__time|%time|.*stamp.*|sekunden|seconds)$",
-    "coefficient": r"(^|[^a-z])(mu|µ|cof|c\.o\.f)([^a-z]|$)|coeff.*fric|fric.*coeff|reib(bei)?wert|reibungskoeff|reibzahl",
+    "coefficient": r"(^|[^a-z])(mu|µ|cof|c\.o\.f)([^a-z]|$)|coeff.*(fric|trac)|(fric|trac).*coeff"
+    r"|reib(bei)?wert|reibungskoeff|reibzahl",
     "load": r"normal|(^|[^a-z])(fz|fn|f_n|f_z|load|last)([^a-z]|$)|auflast|anpress",
     "force": r"friction|reib|tangent|drag|(^|[^a-z])(ff|fx|f_x|f_t|ft|f_d|f)([^a-z]|$)|force|kraft|last?zelle|load ?cell"
     r"|torque|moment|effort",
     "speed": r"speed|veloc|geschw|(^|[^a-z])(v|v_d)([^a-z]|$)",
     "position": r"drive.*pos|stroke|hub|verfahrweg|stage|(^|[^a-z])(s_d|x_d)([^a-z]|$)|position|displacement|weg|travel|distance"
-    r"|(^|[^a-z])(x|s)([^a-z]|$)",
+    r"|angle|winkel|(^|[^a-z])(x|s|phi|theta)([^a-z]|$)",
 }  # fmt: skip
 _QUANTITIES = {
     "time": ("time",),
@@ -27,6 +29,7 @@ _QUANTITIES = {
     "speed": ("velocity", "angular velocity"),
     "coefficient": ("share",),
 }
+_FEWEST_STEPS = 8
 # what none of these is, whatever else its name says
 _OTHER = re.compile(r"acc|beschl|temp|humid|feucht|count|zyklus|cycle|voltage|current", re.IGNORECASE)
 
@@ -59,21 +62,26 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
         if column:
             found[what] = column
             reasons.append(f"{what} = {column!r} by its name")
+    if "load" in found and "load" not in given and not {"force", "coefficient"} & found.keys():
+        found["force"] = found.pop("load")  # what a testing machine calls the load is the force that it measures
+        reasons = [reason for reason in reasons if not reason.startswith("load = ")]
+        reasons.append(f"force = {found['force']!r}, as no other column is one")
     if "time" not in found and not table.clocks:
-        rising = next((name for name in numeric if name not in found.values() and _is_clock(table, name)), "")
-        if rising:
+        left = [name for name in numeric if name not in found.values()]
+        rising = next((name for name in left if _is_clock(table, name)), "")
+        # beside a column that numbers the rows it may be the way of an even drive
+        if rising and not any(_numbers_rows(table, name) for name in left):
             found["time"] = rising
             reasons.append(f"time = {rising!r}, which rises in even steps")
     left = [name for name in numeric if name not in found.values()]
     if "force" not in found and "coefficient" not in found:
         by_unit = [name for name in left if (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES["force"]]
-        only = (
-            by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _is_clock(table, one))]
-        )
+        only = by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _rises(table, one))]
         if len(only) != 1:
             raise Fault("CONFIG", _ask(table, numeric))
-        found["force"] = only[0]
-        reasons.append(f"force = {only[0]!r}, the only one left")
+        what = "coefficient" if (known_unit(table.unit(only[0])) or ("",))[0] == "share" else "force"
+        found[what] = only[0]
+        reasons.append(f"{what} = {only[0]!r}, the only one left")
     if "position" in found and _flat(table, found["position"]):
         del found["position"]
     kinds = ("time", "force", "load", "position", "speed", "coefficient")
@@ -117,8 +125,10 @@ def _named(table: Table, what: str, names: list[str]) -> str:
             continue
         if what in ("force", "position") and _flat(table, name):
             continue
+        if what == "time" and not _has_times(table, name):
+            continue
         unit = table.unit(name)
-        quantity = (known_unit(unit) or ("",))[0]
+        quantity = ((weight_unit if what in ("force", "load") else known_unit)(unit) or ("",))[0]
         if quantity and quantity not in _QUANTITIES[what]:
             continue
         if pattern.search(bare_name(name).lstrip("/").split("/")[-1]) or pattern.search(bare_name(name)):
@@ -126,11 +136,34 @@ def _named(table: Table, what: str, names: list[str]) -> str:
     return ""
 
 
+def _has_times(table: Table, name: str) -> bool:
+    """Whether a column holds a time at all: LabVIEW writes the names of columns that it leaves empty."""
+    try:
+        return bool(np.isfinite(table.seconds(name)[0]).any())
+    except Fault:
+        return False
+
+
 def _is_clock(table: Table, name: str) -> bool:
-    """Whether a column rises from row to row, in even steps."""
+    """Whether a column rises from row to row in even steps, and is not the number of the row."""
+    return _rises(table, name) and not _numbers_rows(table, name)
+
+
+def _rises(table: Table, name: str) -> bool:
+    steps = _steps(table, name)
+    if len(steps) <= _FEWEST_STEPS or not (steps > 0.0).all():
+        return False
+    return float(np.ptp(steps)) < 0.2 * float(np.median(steps)) + 1e-12
+
+
+def _numbers_rows(table: Table, name: str) -> bool:
+    steps = _steps(table, name)
+    return len(steps) > _FEWEST_STEPS and bool((steps == 1.0).all())
+
+
+def _steps(table: Table, name: str) -> npt.NDArray[np.float64]:
     values = table.column(name)
-    steps = np.diff(values[np.isfinite(values)])
-    return len(steps) > 8 and bool((steps > 0.0).all()) and float(np.ptp(steps)) < 0.2 * float(np.median(steps)) + 1e-12
+    return np.diff(values[np.isfinite(values)])
 
 
 def _flat(table: Table, name: str) -> bool:

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from diagnosis.look.breakaway import breakaway_of
 from diagnosis.look.numbers import Number, groups_of, jackknifed, mean_of
 from diagnosis.look.record import Part, noise_of, parts_of
-from diagnosis.look.slip_shape import Falls, Shape, falls_of, fit_shape
+from diagnosis.look.slip_shape import LESS, Falls, Shape, falls_of, fit_shape
 from diagnosis.look.slips import Slips, find_slips
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
@@ -17,6 +18,7 @@ from diagnosis.look.sticks import Cycle, cycles_of
 Floats = npt.NDArray[np.float64]
 _FEWEST_FOR_SCATTER = 3
 _SURE = 1.2  # half intervals of 90 % from which a decay is there
+_ALIKE = 0.1  # share up to which what a decay does to level and ends is alike
 _LARGEST_DECAY = 2.5  # over a fall: a decay at the end of what is tried is none
 # names of numbers of a force, where a coefficient is looked at
 _MU = {
@@ -28,14 +30,28 @@ _MU = {
     "dwell_N_per_decade": "mu_dwell_per_decade",
 }
 
+# the units of a rig that turns
+_TURNING = {"N": "N m", "N/s": "N m/s", "N/m": "N m/rad", "kg": "kg m²", "N per decade": "N m per decade"}
+
 
 class Known(NamedTuple):
-    """What is known beside the force, SI units."""
+    """What is known beside the force, SI units; of a rig that turns torque for force, rad for m, kg m² for kg."""
 
     speed_mps: float | None = None  # of the drive, where its position was not measured
     load_N: float | None = None  # normal load
     mass_kg: float | None = None  # of the slide
     coefficient: bool = False  # what is looked at is the force over an unknown load
+    torsion: bool = False  # the rig turns: forces are torques, ways are angles
+
+    @property
+    def force_unit(self) -> str:
+        """Of what is looked at."""
+        return "1" if self.coefficient else "N m" if self.torsion else "N"
+
+    @property
+    def speed_unit(self) -> str:
+        """Of the drive."""
+        return "rad/s" if self.torsion else "m/s"
 
 
 class Look(NamedTuple):
@@ -108,6 +124,10 @@ def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: 
     mean_N = float(np.average([part.force_N.mean() for part in parts], weights=[len(part.t_s) for part in parts]))
     if known.coefficient:
         numbers = _of_coefficient(numbers)
+    elif known.torsion:
+        numbers = {
+            name: number._replace(unit=_TURNING.get(number.unit, number.unit)) for name, number in numbers.items()
+        }
     if known.load_N:
         numbers["mu_mean"] = Number(mean_N / known.load_N, math.nan, math.nan, "1")
     return Look(
@@ -117,7 +137,7 @@ def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: 
         cycles,
         sticks,
         numbers,
-        over_speed(parts, cycles if sticks else [], "1" if known.coefficient else "N"),
+        over_speed(parts, cycles if sticks else [], known.force_unit),
         parts,
         known,
         mean_N,
@@ -153,13 +173,16 @@ def _of_cycles(found: list[Slips], cycles: list[Cycle], step_s: float) -> dict[s
         "slip_s": mean_of(durations, "s", 0.3 * step_s),
         "slope_N_per_s": mean_of([cycle.slope_N_per_s for cycle in stuck], "N/s"),
     } | _stiffness(stuck)
+    if numbers["static_force_N"] is not None:
+        numbers["static_force_N"] = breakaway_of(found, numbers["static_force_N"])
     return {name: number for name, number in numbers.items() if number is not None}
 
 
 def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
     """The stiffness of the drive beside that in series, where the sticks surely show the contact give way; else the latter alone.
 
-    What the contact gives way is by a formula, so all of it is in the interval, both ways.
+    What the contact gives way is by a formula, so all of it is in the interval, both ways; where it is not sure, as much of it as
+    the sticks allow.
     """
     series = mean_of([cycle.stiffness_N_per_m for cycle in stuck], "N/m")
     drive = mean_of([cycle.drive_m_per_N for cycle in stuck], "m/N")
@@ -167,7 +190,7 @@ def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:
         return {"stiffness_N_per_m": series}
     # fewer half intervals: the scatter that the second column brings would be more than half of what it mends
     if not 1.0 / series.value - drive.value > 2.0 * (drive.high - drive.value):
-        return {"stiffness_N_per_m": series}
+        return {"stiffness_N_per_m": series._replace(high=max(series.high, 1.0 / drive.low))}
     value = 1.0 / drive.value
     more = abs(value - series.value)
     stiffness = Number(value, 1.0 / drive.high - more, 1.0 / drive.low + more, "N/m")
@@ -186,11 +209,14 @@ def _of_falls(found: list[Slips], numbers: dict[str, Number]) -> dict[str, Numbe
     if not stacks:
         return {"kinetic_force_N": guess}
     falls = max(stacks, key=lambda stack: stack.slips)
-    shape, others = _shape(falls)
+    shape, others, more = _shape(falls)
     if shape is None:
         return {"kinetic_force_N": guess}
     kinetic = jackknifed(shape.force_N, [one.force_N for one in others], "N")
     omega = jackknifed(shape.omega_rad_per_s, [one.omega_rad_per_s for one in others], "rad/s")
+    if more is not None:
+        kinetic = kinetic.wider(more.force_N - shape.force_N)
+        omega = omega.wider(more.omega_rad_per_s - shape.omega_rad_per_s)
     result = {"kinetic_force_N": kinetic, "omega_rad_per_s": omega, "static_force_N": _breakaway(shape, numbers)}
     if "stiffness_N_per_m" in numbers:
         stiffness = numbers["stiffness_N_per_m"]
@@ -226,20 +252,25 @@ def _between_samples(numbers: dict[str, Number], step_s: float) -> dict[str, Num
     }
 
 
-def _shape(falls: Falls) -> tuple[Shape | None, list[Shape]]:
-    """The swing, and those without one group of falls each; with a decay where the falls surely show one.
+def _shape(falls: Falls) -> tuple[Shape | None, list[Shape], Shape | None]:
+    """The swing, those without one group of falls each, and that of more of the falls; with a decay where they surely have one.
 
-    Level and decay of a single fall are hardly told apart, so a decay that is not there would spoil the level.
+    Level and decay of a fall are hardly told apart, so a decay that is not there spoils the level: friction that falls slowly,
+    and a contact that creeps, bend a fall much as a decay does. But a decay also takes the level away from the middle of the
+    ends, by as much.
     """
     groups = groups_of(falls.slips) if falls.slips >= _FEWEST_FOR_SCATTER else []
-    found: list[tuple[Shape | None, list[Shape]]] = []
+    found: dict[bool, tuple[Shape | None, list[Shape]]] = {}
     for damped in (True, False):
         whole = fit_shape(falls, damped)
         without = [fit_shape(falls.without(group), damped, whole) for group in groups] if whole is not None else []
-        found.append((whole, [one for one in without if one is not None]))
-    (with_it, others), plain = found
-    if with_it is not None and len(others) == len(groups) >= _FEWEST_FOR_SCATTER:
-        decay = jackknifed(with_it.decay_per_s, [one.decay_per_s for one in others], "1/s")
-        if decay.value > _SURE * (decay.high - decay.value) and with_it.decay_per_s * falls.length_s < _LARGEST_DECAY:
-            return with_it, others
-    return plain
+        found[damped] = whole, [one for one in without if one is not None]
+    shape, others = found[True]
+    damped = False
+    if shape is not None and len(others) == len(groups) >= _FEWEST_FOR_SCATTER:
+        decay = jackknifed(shape.decay_per_s, [one.decay_per_s for one in others], "1/s")
+        there = decay.value > _SURE * (decay.high - decay.value) and decay.value * falls.length_s < _LARGEST_DECAY
+        level = (shape.force_N - falls.bottom_N) / (falls.top_N - falls.bottom_N)
+        damped = there and abs((0.5 - level) / (0.5 - shape.level_of_ends()) - 1.0) < _ALIKE
+    shape, others = found[damped]
+    return shape, others, fit_shape(falls, damped, shape, LESS) if shape is not None else None

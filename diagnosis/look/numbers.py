@@ -26,6 +26,11 @@ class Number(NamedTuple):
         ends = sorted((self.low * factor, self.high * factor)) if math.isfinite(self.low) else [self.low, self.high]
         return Number(self.value * factor, ends[0], ends[1], unit)
 
+    def wider(self, more: float) -> "Number":
+        """The number with as much more in its interval, both ways, that has nothing to do with what is in it."""
+        low, high = (math.hypot(end - self.value, more) for end in (self.low, self.high))
+        return self._replace(low=self.value - low, high=self.value + high)
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {"value": self.value, "interval_90": [self.low, self.high], "unit": self.unit}

@@ -14,7 +14,8 @@ from scipy.optimize import least_squares
 from diagnosis.look.slips import Slips
 
 Floats = npt.NDArray[np.float64]
-_FIRST = 0.12  # share of the fall at either end that is not fitted: it belongs to breakaway and re-stick
+# Share of the fall at either end that is not fitted: it belongs to breakaway and re-stick. What another share gives is not known.
+FIRST, LESS = 0.12, 0.06
 _MOST_SAMPLES = 4000  # that are fitted
 _FEWEST = 5  # samples of a fall
 # of level and size over the fall, and of frequency, instant and decay over its length
@@ -28,6 +29,10 @@ class Shape(NamedTuple):
     omega_rad_per_s: float  # of the slide on the drive's spring
     decay_per_s: float
     found: tuple[float, ...]  # from which another fit begins
+
+    def level_of_ends(self) -> float:
+        """Where the level lies between the lower and the upper end of a swing with this decay, at rest at both; 0.5 without."""
+        return 1.0 / (1.0 + math.exp(math.pi * self.decay_per_s / self.omega_rad_per_s))
 
 
 class Falls(NamedTuple):
@@ -63,7 +68,7 @@ def falls_of(slips: Slips, top_N: float, bottom_N: float) -> Falls | None:
     number: list[npt.NDArray[np.int64]] = []
     for count, i in enumerate(good.tolist()):
         top, bottom = int(tops[i]), int(bottoms[i])
-        middle = _half_done(part.force_N, top, bottom, slips.width)
+        middle = half_done(part.force_N, top, bottom, slips.width)
         first, last = max(int(middle - 0.5 * usual), 0), min(int(middle + 0.5 * usual) + 1, len(part.force_N))
         at = np.arange(first + count % every, last, every)
         since.append(((at - middle) * part.step_s).astype(np.float64))
@@ -75,7 +80,7 @@ def falls_of(slips: Slips, top_N: float, bottom_N: float) -> Falls | None:
     )  # fmt: skip
 
 
-def _half_done(force_N: Floats, top: int, bottom: int, width: int) -> float:
+def half_done(force_N: Floats, top: int, bottom: int, width: int) -> float:
     """The instant, in samples, at which half of a fall is done, from a line through the samples around it."""
     around = slice(max(top - width, 0), top + width + 1), slice(max(bottom - width, 0), bottom + width + 1)
     half = 0.5 * (float(force_N[around[0]].mean()) + float(force_N[around[1]].mean()))
@@ -89,12 +94,15 @@ def _half_done(force_N: Floats, top: int, bottom: int, width: int) -> float:
     return float(near.mean()) + (half - float(y.mean())) / slope if slope < 0.0 else float(near.mean())
 
 
-def fit_shape(falls: Falls, damped: bool, near: Shape | None = None) -> Shape | None:
-    """The swing in all falls, with a decay or without, from one that is near; None where it does not fit."""
+def fit_shape(falls: Falls, damped: bool, near: Shape | None = None, first: float = FIRST) -> Shape | None:
+    """The swing in all falls, with a decay or without, from one that is near; None where it does not fit.
+
+    `first`: share of the fall at either end that is not fitted.
+    """
     drop_N, length_s = falls.top_N - falls.bottom_N, falls.length_s
     if drop_N <= 0.0:
         return None
-    reach_s = math.acos(1.0 - 2.0 * _FIRST) / math.pi  # of the fall before its ends
+    reach_s = math.acos(1.0 - 2.0 * first) / math.pi  # of the fall before its ends
     inside = np.abs(falls.since_s) < (0.5 - reach_s) * length_s
     t, y = falls.since_s[inside] / length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
     count = 5 if damped else 4

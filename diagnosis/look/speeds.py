@@ -14,6 +14,9 @@ VARIES = 1.3  # largest speed over smallest, from which friction is told over sp
 _BINS_A_DECADE = 8.0
 _WINDOWS = 200  # of a record without slips, in which speed and force are averaged
 _FEWEST_IN_BIN = 3
+_FEWEST_DWELLS = 5
+_MOST_INFLATED = 10.0  # Marquardt's bound: an estimate has ten times the variance that it has alone
+_ENOUGH = 0.1  # share of the dwell's variation; a rate that varies less makes at most a tenth of a slope over the dwell
 _DWELLS = 1.25  # largest dwell over smallest (of nine in ten slips), from which breakaway is told over dwell
 
 
@@ -77,13 +80,38 @@ def _windows(part: Part, cycles: list[Cycle]) -> tuple[Floats, Floats]:
 
 
 def over_dwell(cycles: list[Cycle]) -> Number | None:
-    """Rise of the breakaway force per decade of dwell [N]; None where dwells are all alike."""
-    rows = np.array([(cycle.dwell_s, cycle.breakaway_force_N) for cycle in cycles if cycle.dwell_s > 0.0]).reshape(
-        -1, 2
-    )
-    if len(rows) < 5:
-        return None
-    low, high = np.quantile(rows[:, 0], (0.05, 0.95))
-    if high < _DWELLS * low:
+    """Rise of the breakaway force per decade of dwell [N]; None where dwells are all alike, or hang on the speed."""
+    rows = _dwells(cycles)
+    if rows is None or confounded(cycles):
         return None
     return slope_of(np.log10(rows[:, 0]), rows[:, 1], "N per decade")
+
+
+def confounded(cycles: list[Cycle]) -> bool:
+    """Whether dwells are long where the force climbs slowly, so that a slope over the dwell may be one over the speed.
+
+    Told by the variance inflation of one logarithm beside the other, as for any two regressors (Marquardt, Technometrics 12,
+    1970), where the rate differs enough to stand for the dwell.
+    """
+    rows = _dwells(cycles)
+    if rows is None:
+        return False
+    dwell, loading = np.log(rows[:, 0]), np.log(rows[:, 2])
+    if not float(loading.std()) > _ENOUGH * float(dwell.std()):
+        return False
+    return 1.0 / max(1.0 - float(np.corrcoef(dwell, loading)[0, 1]) ** 2, 1e-12) > _MOST_INFLATED
+
+
+def _dwells(cycles: list[Cycle]) -> Floats | None:
+    """Dwell, breakaway force and rate of loading, [slips, 3]; None where dwells are all alike, or few."""
+    rows = np.array(
+        [
+            (cycle.dwell_s, cycle.breakaway_force_N, cycle.loading_N_per_s)
+            for cycle in cycles
+            if cycle.dwell_s > 0.0 and cycle.loading_N_per_s > 0.0
+        ]
+    ).reshape(-1, 3)
+    if len(rows) < _FEWEST_DWELLS:
+        return None
+    low, high = np.quantile(rows[:, 0], (0.05, 0.95))
+    return None if high < _DWELLS * low else rows

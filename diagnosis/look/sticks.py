@@ -15,6 +15,8 @@ _FROM, _TO = (
     0.9,
 )  # share of a stick in which its slope is read: a re-stick rings, and before a breakaway it creeps
 _FEWEST = 5  # samples of that
+_EVEN = 0.5  # share of its way that an even drive goes in that
+_LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9)  # of the climb
 _UNKNOWN = (np.nan, np.nan, np.nan, np.nan, np.nan)
 _DEGREE = 4  # of the smooth curve through a stick: a contact that gives way bends it once
 _HALVES = 4  # samples of a smoothing from which every other one finds a peak and the others measure it
@@ -29,6 +31,7 @@ class Cycle(NamedTuple):
     restick_force_N: float
     dwell_s: float  # of the stick before
     slope_N_per_s: float  # of that stick
+    loading_N_per_s: float  # of its last half where the force climbs fastest: beside a halt of the drive
     speed_mps: float  # of the drive in that stick
     stiffness_N_per_m: float  # of that stick, over the way of the drive: of drive and contact in series
     drive_m_per_N: float  # of that way: what the drive gives way for a force
@@ -49,6 +52,7 @@ def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
         slope, speed, stiffness, drive, contact = (
             _stick(part, began, top, float(top_N[i]), speed_mps, slips.width) if i else _UNKNOWN
         )
+        loading = _loading(part, began, top, slips.width) if i else np.nan
         found.append(
             Cycle(
                 float(part.t_s[top]),
@@ -57,6 +61,7 @@ def cycles_of(slips: Slips, speed_mps: float | None) -> list[Cycle]:
                 float(bottom_N[i]) if bottom >= 0 else np.nan,
                 float(part.t_s[top] - part.t_s[began]) if began >= 0 else np.nan,
                 slope,
+                loading,
                 speed,
                 stiffness,
                 drive,
@@ -111,11 +116,29 @@ def _stick(
         speed = speed_mps if speed_mps is not None else np.nan
     else:
         speed = _slope(t_s, part.position_m[first:last])
-    if not speed > 0.0:
+    if not speed > 0.0 or (part.position_m is not None and _halted(part.position_m, began, top, first, last)):
         return slope, speed, np.nan, np.nan, np.nan
     # a breakaway is known to the width of the smoothing that found it: nearer to it the force may be that of the slip
     whole = slice(0, max(min(last, top - width) - first, 0))
     return slope, speed, slope / speed, *_both(speed * (t_s - t_s[0])[whole], force_N[whole], breakaway_N)
+
+
+def _halted(position_m: Floats, began: int, top: int, first: int, last: int) -> bool:
+    """Whether the drive goes much less of its way in the part that is read than an even drive does."""
+    way, whole = position_m[last - 1] - position_m[first], position_m[top] - position_m[began]
+    return bool(way < _EVEN * (_TO - _FROM) * whole)
+
+
+def _loading(part: Part, began: int, top: int, width: int) -> float:
+    """How fast the force climbs in the last half of a stick: in the quickest of its steps. NaN for too few samples."""
+    climb = smoothed(part.force_N[began : top + 1], width)
+    if len(climb) < _FEWEST:
+        return np.nan
+    levels = climb[0] + np.array(_LEVELS) * (climb[-1] - climb[0])
+    # from the top back, as noise crosses a level now and again
+    reached = np.array([len(climb) - 1 - np.argmax(climb[::-1] <= level) for level in levels])
+    quickest = float(np.diff(reached).min()) * part.step_s
+    return float(levels[1] - levels[0]) / quickest if quickest > 0.0 else np.nan
 
 
 def _both(way_m: Floats, force_N: Floats, breakaway_N: float) -> tuple[float, float]:

@@ -5,6 +5,7 @@ import math
 from bridge.units import counted, fixed_digits, prefixed
 from diagnosis.look.look import Look
 from diagnosis.look.numbers import Number
+from diagnosis.look.speeds import confounded
 from diagnosis.look.steady import unsteady
 
 # in the order in which they are told
@@ -55,7 +56,8 @@ def headline(seen: Look) -> str:
         if seen.known.coefficient:
             level = f"the friction coefficient is {seen.mean_force_N:.4g} on average, with {seen.noise_N:.2g} of noise"
             return f"no slip in {seen.seconds:.3g} s: {level}"
-        level = f"the force is {seen.mean_force_N:.4g} N on average, with {seen.noise_N:.2g} N of noise"
+        what, unit = ("torque" if seen.known.torsion else "force"), seen.known.force_unit
+        level = f"the {what} is {seen.mean_force_N:.4g} {unit} on average, with {seen.noise_N:.2g} {unit} of noise"
         return f"no slip in {seen.seconds:.3g} s: {level}"
     if not seen.sticks:
         swings = f"{counted(len(seen.cycles), 'swing')} in {seen.seconds:.3g} s"
@@ -75,7 +77,9 @@ def sentences(seen: Look) -> list[str]:
     lines += [f"{'':<10} {text}" for text in cannot_tell(seen)]
     for one in seen.at_speeds:
         top = "" if one.breakaway_N is None else f", breakaway {with_interval(one.breakaway_N)}"
-        lines.append(f"{'at ' + f'{1e3 * one.speed_mps:.3g} mm/s':<14} mean {with_interval(one.mean_N)}{top}")
+        lines.append(
+            f"{'at ' + f'{1e3 * one.speed_mps:.3g} m{seen.known.speed_unit}':<14} mean {with_interval(one.mean_N)}{top}"
+        )
     return lines
 
 
@@ -84,20 +88,24 @@ def cannot_tell(seen: Look) -> list[str]:
     lines: list[str] = []
     if not seen.sticks:
         return lines
+    example = "10mrad/s" if seen.known.torsion else "0.5mm/s"
     names = ("mu_s", "mu_k") if seen.known.coefficient else ("static_force_N", "kinetic_force_N")
     if "stiffness_N_per_m" not in seen.numbers and "slope_N_per_s" in seen.numbers:
-        lines.append("no stiffness and no mass: the drive's speed is not known; add --speed 0.5mm/s")
+        lines.append(f"no stiffness and no mass: the drive's speed is not known; add --speed {example}")
     if "stiffness_N_per_m" in seen.numbers and "series_N_per_m" not in seen.numbers:
         lines.append(
             "no stiffness of the contact: the sticks are straight, and the stiffness is that of drive and contact in series"
         )
     if seen.known.coefficient:
         lines.append("no force: the normal load is not known; add --load 94.5N")
-    elif seen.known.load_N is None:
+    elif seen.known.load_N is None and not seen.known.torsion:
         lines.append("no friction coefficient: the normal load is not known; add --load 94.5N")
     if seen.slips >= 2 and not {"dwell_N_per_decade", "mu_dwell_per_decade"} & seen.numbers.keys():
-        lines.append("no dependence on the stick time: all sticks last alike; measure at several speeds")
-    lines += unsteady(seen.cycles, "1" if seen.known.coefficient else "N")
+        why = "all sticks last alike"
+        if confounded(seen.cycles):
+            why = "sticks last long where the force climbs slowly, so it may be one on the speed"
+        lines.append(f"no dependence on the stick time: {why}; stop the drive for different times, at one speed")
+    lines += unsteady(seen.cycles, seen.known.force_unit)
     static = seen.numbers[names[0]]
     if names[1] in seen.numbers and static.value - static.low > 0.1 * (static.value - seen.numbers[names[1]].value):
         lines.append(

@@ -10,11 +10,11 @@ from diagnosis.relations.relation import Missing, Relation, kept_blocks, lacking
 from diagnosis.relations.shapes import bend, free, mode, rate, slip_phase
 
 NEEDED = ("base_accel_mps2", "drive_force_N", "mass_accel_mps2")
-_HIGHEST_HZ = 320.0
-_RESOLUTION_MPS2 = 1e-4
-_MODES_HZ = np.geomspace(45.0, 300.0, 28)
+_HIGHEST_HZ = 320.0  # of a mode of the base
+_RESOLUTION_MPS2 = 1e-4  # least noise of a row
+_MODES_HZ = np.geomspace(45.0, 300.0, 28)  # that a mode may have: steps of 7 %
 _CROSS = 0.01  # share of the slide's acceleration that an ordinary accelerometer on the base shows
-_COMPLIANCE_M_PER_N = 2e-6
+_COMPLIANCE_M_PER_N = 2e-6  # of a large effect
 
 
 def base_relation(rig: RigTable, runs: list[Prepared]) -> Relation | Missing:

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+from diagnosis.evidence.manifest import RigTable
 from diagnosis.relations.answer import Answered, Relations
 from diagnosis.relations.relation import OUTSIDE
 from diagnosis.relations.shares import Share
@@ -20,9 +21,26 @@ _BURSTS = 2.0  # mean over median of the local variance from which what is left 
 # Relations whose patterns are not told: a base that shows slips in another way than by a mode is an ordinary mount.
 _COARSE = frozenset({"base"})
 _UNEVEN = "drive-speed-ripple"
+# Share of the static friction that an uneven drive must pull with: breakaways on the smoothest surfaces scatter twenty times as
+# much, so a smaller one closes nothing of the gap, however well a displacement sensor shows it.
+_MATTERS = 1e-4
 _BURSTING = ("spring", "motion")  # relations whose rows are short enough for that
 _NEAR = 5.0  # log evidence within which another cause would do as well
 _LEVELS = frozenset({"drive-stiffness"})
+# Share of a large effect's size to which a relation must know the size of an effect that no fit tries. Larger: an effect that the
+# relation can hardly see is lost. Smaller: time.
+_KNOWN_SIZE = 0.1
+# Effects that act in one relation alone, and where it is finer than any fit. What an exciter delivers is known at a few
+# frequencies only, and a base shows slips without a mode of its own: their effects stay with the fits.
+SHOWN_BY = {
+    "drive-damping": "spring",
+    "force-sensor-delay": "spring",
+    "force-sensor-lag": "spring",
+    "drive-hardening": "spring",
+    "force-sensor-drift": "spring",
+    "drive-backlash": "spring",
+    "drive-speed-ripple": "drive",
+}
 # Causes that one relation alone cannot tell from a cause that it names.
 _ALIKE = {
     "drive-stiffness": ("drive-stiffness", "force-sensor-gain", "frame-compliance"),
@@ -63,11 +81,14 @@ class Decision(NamedTuple):
     outside: tuple[Outside, ...]
 
 
-def decision_of(relations: Relations) -> Decision:
-    """The names and the unexplained patterns of all relations."""
+def decision_of(relations: Relations, rig: RigTable) -> Decision:
+    """The names and the unexplained patterns of all relations; `rig` says how small is too small to matter."""
+    pull_N_per_m = rig.drive_stiffness_N_per_m or 0.0
     decided: list[Decided] = []
     outside: list[Outside] = []
     for one in relations.answered:
+        if one.name == "drive" and pull_N_per_m * one.refitted < _MATTERS * rig.static_force_N:
+            continue
         own = _decided(one)
         pattern = _pattern(one, own)
         if pattern is not None and one.name == "drive":  # any function of the place is an uneven drive
@@ -76,9 +97,8 @@ def decision_of(relations: Relations) -> Decision:
         outside += [_outside_cause(one, cause) for cause in own if not cause.known]
         if pattern is not None and not any(not cause.known for cause in own):
             outside.append(pattern)
-    if any(
-        cause.relation == "base" for cause in decided
-    ):  # a base with a mode of its own changes what an exciter delivers
+    # a base with a mode of its own changes what an exciter delivers, also where the mode's formula does not fit every run
+    if any(one.name == "base" and one.chosen.evidence > _limit(one) for one in relations.answered):
         decided = [cause for cause in decided if cause.relation != "exciter"]
         outside = [left for left in outside if left.relation != "exciter"]
     return Decision(
@@ -87,8 +107,29 @@ def decision_of(relations: Relations) -> Decision:
     )
 
 
+def ruled_out(relations: Relations, decision: Decision) -> frozenset[str]:
+    """Effects that a relation would show, and that these runs do not have: no fit needs to try them.
+
+    Where a relation names causes, its other effects; elsewhere those whose size its best column knows to a tenth of a large
+    effect's, with less evidence than no effect at all.
+    """
+    found: set[str] = set()
+    for one in relations.answered:
+        own = {name for name, relation in SHOWN_BY.items() if relation == one.name}
+        kept = {term.cause for term in one.chosen.terms}
+        named = [cause for cause in decision.decided if cause.relation == one.name and cause.known]
+        if named:
+            found |= own - kept - {other for cause in named for other in cause.alike}
+        for alone in one.ranking.singles:
+            (term,), (deviation,) = alone.terms, alone.deviations
+            known = float(deviation.max()) < _KNOWN_SIZE * term.spread
+            if term.cause in own - kept and alone.evidence < 0.0 and known:
+                found.add(term.cause)
+    return frozenset(found)
+
+
 def _decided(one: Answered) -> list[Decided]:
-    limit = _DECIDES + math.log(max(one.tried, 1))
+    limit = _limit(one)
     shares = {} if one.shares is None else {(share.cause, share.form): share for share in one.shares.causes}
     found: list[Decided] = []
     for number, term in enumerate(one.chosen.terms):
@@ -96,8 +137,21 @@ def _decided(one: Answered) -> list[Decided]:
         # a number beyond its tolerance: the refitted rig follows it, so it closes nothing that the baseline leaves
         borne_out = share is None or share.share > share.null_90 or term.cause in _LEVELS
         if lost > limit and lost > _ADDS * one.chosen.evidence and one.agreement[number] > _SAME_SIZE and borne_out:
-            found.append(Decided(term.cause, one.name, lost, _alike(one, term.cause), share))
+            cause = _of_library(one, term.cause)
+            found.append(Decided(cause, one.name, lost, _alike(one, cause), share))
     return found
+
+
+def _limit(one: Answered) -> float:
+    return _DECIDES + math.log(max(one.tried, 1))
+
+
+def _of_library(one: Answered, cause: str) -> str:
+    """The cause, or the best of the library where that would do as well: a force 0.3 ms early is a damped spring's."""
+    if cause not in OUTSIDE or len(one.chosen.terms) > 1:
+        return cause
+    known = next((found for found in one.ranking.singles if found.causes[0] not in OUTSIDE), None)
+    return cause if known is None or one.chosen.evidence - known.evidence >= _NEAR else known.causes[0]
 
 
 def _alike(one: Answered, cause: str) -> tuple[str, ...]:

@@ -12,12 +12,12 @@ from diagnosis.gap.prepare import Prepared
 from diagnosis.relations.relation import Floats, Missing, Piece, Relation, Term, kept_blocks, pieces_of, wander
 from diagnosis.relations.shapes import hats, knots_of
 
-_HIGHEST_HZ = 60.0
+_HIGHEST_HZ = 60.0  # of the unevenness that is compared
 _DEPTH = 0.1  # typical share by which an uneven drive's speed swings
 _THIN = 10  # every how many rows the search for waves takes
 _WAVES = 2  # strongest waves over the place, and over time, that become columns
 _PITCHES_M = (2e-4, 8e-3)  # shortest and longest wave over the place
-_FREQUENCIES_HZ = (0.4, 30.0)
+_FREQUENCIES_HZ = (0.4, 30.0)  # slowest and fastest wave over time
 _WANDER_M = 2e-7  # slow drift of a displacement sensor
 _FEWEST_TURNS = 2.0  # of a wave in the longest piece; a slower one is a wander of the sensor
 

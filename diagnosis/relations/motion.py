@@ -14,10 +14,10 @@ from diagnosis.relations.shapes import bend, calmed, free, near_slips, rate, sli
 NEEDED = ("mass_accel_mps2", "mass_position_m")
 # Content above is noise of the position, whose second derivative grows with the square of the frequency.
 _HIGHEST_HZ = 60.0
-_RESOLUTION_MPS2 = 1e-4
+_RESOLUTION_MPS2 = 1e-4  # least noise of a row
 _SCALE = 0.008  # slope of the position sensor, relative
 _DELAY_S = 2e-4  # between the two channels
-_BEND_S2 = 1e-7
+_BEND_S2 = 1e-7  # lag of the second order between the two channels
 _SKEW = 5e-4  # between two recorders of which one is timed by software
 _LOWEST_RAD_PER_S = 2.0 * math.pi * 0.35  # accelerometers begin at 0 to 0.5 Hz
 

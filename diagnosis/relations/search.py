@@ -10,7 +10,7 @@ from diagnosis.relations.products import Noise, Products, weighted
 from diagnosis.relations.relation import Floats, Term
 
 _TRIED_TOGETHER = 40  # terms of which all pairs are tried
-_TRIED_IN_TRIPLES = 16
+_TRIED_IN_TRIPLES = 16  # of which all triples are tried
 
 
 class Reduced(NamedTuple):

@@ -18,8 +18,8 @@ from diagnosis.relations.relation import Floats, Relation, Term
 from diagnosis.relations.search import Found
 
 _BLOCK_S = 0.5  # of the bootstrap: longer than a slip, so that blocks are independent
-_DRAWS = 400
-_LEVELS = (0.05, 0.95)
+_DRAWS = 400  # of blocks and sizes, for an interval
+_LEVELS = (0.05, 0.95)  # ends of a 90 % interval
 
 
 class Share(NamedTuple):

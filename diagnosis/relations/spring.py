@@ -15,7 +15,7 @@ from diagnosis.relations.spring_effects import spring_effects
 
 NEEDED = ("drive_force_N", "mass_position_m", "drive_position_m")
 _HIGHEST_HZ = 120.0  # slips end below; above, a block mean of 1 ms is not the value at its middle
-_RESOLUTION_N = 1e-4
+_RESOLUTION_N = 1e-4  # least noise of a row
 # Standard deviations of what no manifest states; sources: `diagnosis.hypotheses.nuisances`.
 _SCALE, _SLOPE, _BOW_PER_M, _DELAY_S, _BEND_S2 = 0.004, 0.006, 0.2, 1.1e-4, 5e-8
 _WANDER = 6e-4  # of the static friction: a strain gauge drifts by 10 mN in 10 s on the paper's rig

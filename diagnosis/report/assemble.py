@@ -2,8 +2,8 @@
 
 import math
 import time
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,15 +15,17 @@ from diagnosis.experiments.proposal import next_experiment
 from diagnosis.features.grid import BLOCK_S
 from diagnosis.features.segments import SHORTEST_S
 from diagnosis.fits.fit import Fit
+from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.random_friction import is_random
 from diagnosis.gap.floor import Floor
 from diagnosis.gap.measure import DEFINITION, cell_names, cell_squares, differences
 from diagnosis.gap.prepare import Prepared
-from diagnosis.gap.problem import Problem
+from diagnosis.gap.problem import OutOfTimeError, Problem
 from diagnosis.hypotheses.hypothesis import Coordinate
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.model.per_run import is_phase
 from diagnosis.pictures.choice import pictures
+from diagnosis.report.without_fits import LONGER
 from diagnosis.result import PARAMETERS, Candidate, Cell, Diagnosis, Estimate, Experiment, Gap, Shrinkage
 from diagnosis.verdict.blend import flexible_differences
 from diagnosis.verdict.confirmation import Confirmation
@@ -33,6 +35,7 @@ from diagnosis.verdict.lookalikes import imitators
 from diagnosis.verdict.selection import Contest
 
 Floats = npt.NDArray[np.floating[Any]]
+R = TypeVar("R")
 # Share of a run that may pass while speed or vibration change before a finding says so. Too small: the ramps of a drive and a
 # piezo raise it. Too large: a run is hardly compared and nothing tells.
 _MUCH_CHANGING = 0.2
@@ -61,11 +64,14 @@ def assembled(
     fitter, baseline = contest.rig.fitter, contest.rig.fit
     verdict, best, _, held_out = outcome
     nuisances = fitter.nuisances
-    cells = _cells(fitter.floor, differences(fitter.floor, fitter.problem, fitter.predicted(baseline.deviations, {})))
+    cells = _in_time(lambda: _cells_left(fitter, baseline), [])
     judged = Gap(DEFINITION, (), math.nan, math.nan, math.nan, 1.0, None, None, ())
     if held_out is not None:
-        cells += _cells(held_out.floor, held_out.differences(baseline.deviations, baseline.hypothesis, baseline.w))
-        judged = _judged(contest, outcome, held_out, tried, jobs)
+        gap = held_out
+        cells += _in_time(
+            lambda: _cells(gap.floor, gap.differences(baseline.deviations, baseline.hypothesis, baseline.w)), []
+        )
+        judged = _in_time(lambda: _judged(contest, outcome, gap, tried, jobs), judged)
     cells += _vibrating(evidence)
     total = sum(cell.share for cell in cells)
     where = sorted((cell._replace(share=cell.share / total) for cell in cells), key=lambda cell: -cell.share)
@@ -82,7 +88,7 @@ def assembled(
     named = nuisances.point(best.deviations, best.effects) if verdict.named else None
     effects = verdict.names
     followed = [one for one in verdict.ranked if not is_random(one.fit.hypothesis)]
-    alike = imitators(fitter, followed, verdict.scale) if refittable(verdict) else ()
+    alike = _in_time(lambda: imitators(fitter, followed, verdict.scale), ()) if refittable(verdict) else ()
     leaders = [fit for fit in (verdict.named or baseline, verdict.runner_up) if fit is not None]
     if verdict.outside:
         if any(run.pick_up for run in evidence.runs):
@@ -90,7 +96,10 @@ def assembled(
         else:
             following = Experiment(SINE, "Every effect of the library shakes the base with a sine.", None)
     else:
-        following = next_experiment(fitter.problem, nuisances, leaders)
+        following = _in_time(lambda: next_experiment(fitter.problem, nuisances, leaders), LONGER)
+    shown = Problem(evidence.rig, runs)
+    shown.until_s = fitter.problem.until_s
+    described, refitted = (nuisances.point(at, {}) for at in (np.zeros(len(nuisances)), baseline.deviations))
     return Diagnosis(
         verdict=verdict.kind,
         effects=effects,
@@ -102,16 +111,18 @@ def assembled(
         next_experiment=following,
         rig=nuisances.parameters(best.deviations),
         findings=(*evidence.findings, *_changing(runs)),
-        pictures=pictures(
-            Problem(evidence.rig, runs),
-            nuisances.point(np.zeros(len(nuisances)), {}),
-            nuisances.point(baseline.deviations, {}),
-            named,
-            effects,
-        ),
+        pictures=_in_time(lambda: pictures(shown, described, refitted, named, effects), ()),
         compared_features=len(baseline.residual),
         elapsed_s=time.monotonic() - began,
     )
+
+
+def _in_time(work: Callable[[], R], otherwise: R) -> R:
+    """What the work makes; `otherwise` where the time that a person allows is over."""
+    try:
+        return work()
+    except OutOfTimeError:
+        return otherwise
 
 
 def compared_fits(verdict: Verdict, gone: Fit | None) -> list[Fit]:
@@ -160,6 +171,11 @@ def _changing(runs: list[Prepared]) -> Iterator[Finding]:
 
 def _shrinkage(who: str, closed: Closed) -> Shrinkage:
     return Shrinkage(who, closed.gap, closed.shrinkage, closed.interval_90)
+
+
+def _cells_left(fitter: Fitter, fit: Fit) -> list[Cell]:
+    left = differences(fitter.floor, fitter.problem, fitter.predicted(fit.deviations, fit.effects))
+    return _cells(fitter.floor, left)
 
 
 def _cells(floor: Floor, z: Floats) -> list[Cell]:

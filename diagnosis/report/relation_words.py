@@ -25,11 +25,17 @@ def number_lines(diagnosis: Diagnosis) -> list[str]:
 
 def sizes_in_words(row: RelationRow) -> str:
     """What a relation leaves as described, refitted and with its causes, beside its noise."""
-    sizes = [row.described, row.refitted, *([row.left] if row.causes else []), row.noise]
-    factor, unit = prefixed(min(sizes), row.unit)
-    described, refitted, *left, noise = (f"{size * factor:.3g}" for size in sizes)
-    caused = f", {left[0]} with {' and '.join(row.causes)}" if left else ""
-    return f"{row.relation}: {described} {unit}".rstrip() + f" as described, {refitted} refitted{caused}; noise {noise}"
+    described, refitted, left, noise = (
+        _size(size, row.unit) for size in (row.described, row.refitted, row.left, row.noise)
+    )
+    caused = f", {left} with {' and '.join(row.causes)}" if row.causes else ""
+    return f"{row.relation}: {described} as described, {refitted} refitted{caused}; noise {noise}"
+
+
+def _size(size: float, unit: str) -> str:
+    """A size with a prefix of its own, three digits: one prefix for all of a line would write newtons as 1.93e+03 mN."""
+    factor, shown = prefixed(size, unit)
+    return f"{size * factor:.3g} {shown}".rstrip()
 
 
 def share_in_words(share: Share) -> str:
@@ -50,8 +56,7 @@ def _percent(share: float) -> str:
 
 def remainder_in_words(remainder: Remainder) -> str:
     """What is left and where."""
-    factor, unit = prefixed(max(remainder.size, remainder.noise), remainder.unit)
-    size, noise = f"{remainder.size * factor:.3g} {unit}".rstrip(), f"{remainder.noise * factor:.3g}"
+    size, noise = _size(remainder.size, remainder.unit), _size(remainder.noise, remainder.unit)
     if not remainder.what:
         return f"largest remainder: {size} in the {remainder.where}, where noise is {noise}: no pattern"
     what = remainder.what.removeprefix("over ")

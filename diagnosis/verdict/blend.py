@@ -42,7 +42,7 @@ def flexible_differences(fitter: Fitter, baseline: Fit, trials: list[Trial], hel
     free = np.stack([directions.freed(column) for column in columns], axis=1)
     shares = np.linalg.solve(free.T @ free + np.eye(len(trials)), free.T @ directions.left)
     blended = np.stack(columns, axis=1) @ shares
-    moved = directions.moved(blended, 1.0) - baseline.deviations
+    moved = directions.moved(blended) - baseline.deviations
     points = [fitter.nuisances.point(baseline.deviations, {})]
     points += [fitter.nuisances.point(baseline.deviations, trial.hypothesis.tables(trial.w)) for trial in trials]
     points += [fitter.nuisances.point(ahead, {}) for ahead in baseline.deviations + _STEP * np.eye(len(moved))]

@@ -5,24 +5,14 @@ from typing import NamedTuple
 
 from diagnosis.fits.fit import Fit
 from diagnosis.fits.random_friction import is_random
-from diagnosis.relations.decide import Decided, Decision
+from diagnosis.relations.decide import SHOWN_BY, Decided, Decision
 from diagnosis.verdict.judge import Verdict
 
 # Share of a relation on the held-out runs from which a known cause counts although something outside the library acts as well.
 _MOST = 0.5
 _LEAST_CLOSED = 0.5  # share of the held-out gap that two effects must close to stay named where they leave much
 # Effects that act in one relation alone: beside a cause that this relation names they are not there.
-_SEEN = {
-    "drive-damping": "spring",
-    "force-sensor-delay": "spring",
-    "force-sensor-lag": "spring",
-    "drive-hardening": "spring",
-    "force-sensor-drift": "spring",
-    "drive-speed-ripple": "drive",
-    "piezo-roll-off": "exciter",
-    "piezo-resonance": "exciter",
-    "piezo-sag": "exciter",
-}
+_SEEN = SHOWN_BY | dict.fromkeys(("piezo-roll-off", "piezo-resonance", "piezo-sag"), "exciter")
 
 
 class Closed(NamedTuple):

@@ -21,10 +21,10 @@ from diagnosis.model.per_run import PHASE, Table, has_own_phases
 from diagnosis.model.rig import Effects, Roughness
 
 Floats = npt.NDArray[np.floating[Any]]
-_REPLICATES = 24
+_REPLICATES = 24  # for the floor of the held-out runs
 _DRAWS = 8  # of a fit's parameters
 _RESAMPLES = 400  # of the cells
-_SEED = 3
+_SEED = 3  # of the replicates and of the intervals
 _SMALLEST_GAP = 0.05  # above the floor: less leaves nothing to divide by
 # Of chi2 above the expected: a name closes this share, or it is refuted. Of 56 right ones the least closed 0.26, a drift of two
 # detection limits, the next 0.36; a tilted track named as bias and wave 0.17, one as a drift -0.5, a seal as a static level -1.5.

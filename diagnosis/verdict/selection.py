@@ -1,24 +1,28 @@
-"""Which effect explains the fitted runs: refits, the more the less is explained, until a verdict stands."""
+"""Which effect explains the fitted runs: refits, the more the less is explained, until a verdict stands.
+
+What the relations decide is no longer asked: effects that their relation does not show are not tried, those that it shows are
+refitted first, and where it shows something that the library lacks no further effect is looked for.
+"""
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from diagnosis.fits.expected import NEVER_WITHOUT_GAP, hidden_by_noise, much_left
 from diagnosis.fits.fit import Fit
-from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
+from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.fits.late_friction import EFFECT as LAG
 from diagnosis.fits.late_friction import late_fits
 from diagnosis.fits.load_phases import starts_by_run
 from diagnosis.fits.random_friction import RANDOM_EFFECTS, RandomFriction
 from diagnosis.fits.refits import Start, best_of_each, each_beside, refits
 from diagnosis.fits.refloored import on_floor_of
-from diagnosis.fits.restarts import alone, close, contenders, rival_pairs, starts_of
+from diagnosis.fits.restarts import alone, close
 from diagnosis.fits.retuning import Retuned
-from diagnosis.fits.screening import Origin, screened
-from diagnosis.fits.search import middle_fits, pairs_of_effects, pairs_with, refitted, refitted_rest
-from diagnosis.gap.floor import KNEE
+from diagnosis.fits.screening import screened
+from diagnosis.fits.search import middle_fits, pairs_of_effects, refitted, refitted_rest
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.starts import Trial
 from diagnosis.verdict.judge import COST_OF_EFFECT, Verdict, judge, of_another_place, refittable
@@ -35,11 +39,18 @@ _STRONGEST_WAVE = 0.05
 # Times the expected chi2: right effects whose formula is another leave up to 2.5 (but one, seen by the force alone, 28), a gain
 # of the force sensor that stood for a Coulomb friction never tried left 5.5. What is searched then takes as long as all before.
 _DOUBTFUL = 3.0
-# Times the first number of an effect that comes near and leaves much. Where slips come and go chi2 is rough: a force late by
-# 1.75 ms had ended at 368, beside a slow sensor at 237; from these sizes it came to 205 (`stickslip diagnose --json`).
-_SIZES_BESIDE = (0.85, 1.15)
+_LATE = 0.3  # share of what the best effect closes, from which friction that lags is looked for at other dead times
 _NEAR = 0.6  # of the gap: of 11 effects outside the library the best single one closed 0.08 to 0.42
-_WORTH_MORE = 40.0  # of chi2 that the best single effect takes: of two that show, one takes more
+# of chi2 that the best single effect takes, of two that show one takes more; and that it leaves above the expected, as a second
+# effect that takes less would not pay
+_WORTH_MORE = 40.0
+
+
+class Known(NamedTuple):
+    """What the relations say before any fit."""
+
+    hinted: frozenset[str] = frozenset()  # effects of the library that they show
+    outside: bool = False  # whether they show something that the library lacks
 
 
 class Contest:
@@ -53,7 +64,7 @@ class Contest:
 
     """
 
-    def __init__(self, rig: Retuned, tried: list[Trial], jobs: int) -> None:
+    def __init__(self, rig: Retuned, tried: list[Trial], jobs: int, known: Known = Known()) -> None:  # noqa: B008
         self.rig = rig
         self.singles: list[Fit] = []
         self.pairs: list[Fit] = []
@@ -62,17 +73,14 @@ class Contest:
         self.verdict = self._judged()
         self._tried = tried
         self._jobs = jobs
-        self._origins = [Origin(rig.fit, KNEE)]
-        if self._leaves_much(rig.fit):  # a large effect may have pulled the refit into a valley of its own
-            described = np.zeros(len(rig.fitter.nuisances))
-            self._origins.append(Origin(rig.fitter.described(described), FAR_KNEE))
-        self._screened = screened(rig.fitter, self._origins, tried, jobs)
+        self._known = known
 
     def decide(self, progress: Progress) -> None:
         """Go on until a verdict stands. `progress` is told what is known and the share of the whole diagnosis that is done."""
-        self._fit_singles_and_pairs(progress)
-        self._refit_contenders()
-        self._refit_rival_pairs()
+        self._fit_singles(progress)
+        if self._known.outside:
+            return
+        self._fit_pairs(progress)
         named, doubtful = self.verdict.named, _DOUBTFUL * self.rig.expected_chi2
         if self.verdict.kind == "unexplained" or (named is not None and named.chi2 > doubtful):
             self._try_everything(progress)
@@ -80,7 +88,6 @@ class Contest:
             progress("could what is left be friction that varies at random?", 0.75)
             self.random = self._random_frictions()
             self.verdict = self._judged()
-        self._give_the_named_all_its_starts()
         self.check()
         nearest = self._nearest()
         if self.verdict.kind == "unexplained" and nearest is not None:
@@ -116,71 +123,47 @@ class Contest:
         paths = self.random or self._random_frictions()
         return of_another_place(self.rig.fit, self.singles, self.rig.expected_chi2, paths)
 
-    def _fit_singles_and_pairs(self, progress: Progress) -> None:
+    def _fit_singles(self, progress: Progress) -> None:
+        """The leading effects, each from the most promising start."""
         fitter, jobs = self.rig.fitter, self._jobs
-        self.singles = self._finished(refitted(fitter, self._origins, self._screened, jobs))
-        if self._shows_more() and self.singles[0].chi2 > self.rig.expected_chi2:
-            progress(f"best single effect so far: {self.singles[0].hypothesis.effects[0]}; looking for a second", 0.6)
-            expected = self.rig.expected_chi2
-            self.pairs = pairs_of_effects(fitter, self.rig.fit, self.singles, self._tried, expected, jobs)
-            if self.pairs and self._leaves_much(self.pairs[0]):
-                self.pairs = self._finished(self.pairs)
-            self.singles = self._again(self.singles, alone(self.pairs))
-
-    def _refit_contenders(self) -> None:
-        """The rig without effects from where the best effect ended, and the leading effects from each other's ends."""
-        if self.singles:
-            # an effect must not win because its refit found a valley of the nuisances that the retuning had missed
-            again = self.rig.fitter.refit(NOTHING, self.singles[0].deviations, np.zeros(0))
-            self.rig = self.rig._replace(fit=min(self.rig.fit, again, key=lambda fit: fit.chi2))
+        self._screening = screened(fitter, self.rig.fit, self._tried, jobs)
+        progress("every effect was tried once; the leading ones are fitted", 0.35)
+        found = refitted(fitter, self.rig.fit.chi2, self._screening, self._known.hinted, jobs)
+        self.singles = self._finished(found)
         if self._shows_more():
-            leading = contenders(self.rig.fit, self.singles, self.pairs, self.rig.expected_chi2)
-            near = self._is_near(self.singles[0]) and self._leaves_much(self.singles[0])
-            starts = starts_of(leading, self.rig.fit, _SIZES_BESIDE if near else ())
-            self.singles = self._finished(self._again(self.singles, starts))
+            # an effect must not win because its refit found a valley of the nuisances that the others had missed
+            again = fitter.refit(NOTHING, self.singles[0].deviations, np.zeros(0))
+            self.rig = self.rig._replace(fit=min(self.rig.fit, again, key=lambda fit: fit.chi2))
         self.verdict = self._judged()
 
-    def _refit_rival_pairs(self) -> None:
-        """Where two effects are named that leave much, the pairs that come close.
-
-        Of 20 pairs named on opened cases 15 left less: no refit changed a name. It changed two of the other five, for the better.
-        """
-        named = self.verdict.named
-        if named is not None and len(named.hypothesis.effects) > 1 and self._leaves_much(named):
-            starts = starts_of(rival_pairs(self.singles, self.pairs), self.rig.fit, ())
-            self.pairs = self._finished(self._again(self.pairs, starts))
-            self.verdict = self._judged()
+    def _fit_pairs(self, progress: Progress) -> None:
+        """A second effect beside the best ones, if they leave more than a perfect model would."""
+        if not self._shows_more() or self.singles[0].chi2 - self.rig.expected_chi2 < _WORTH_MORE:
+            return
+        progress(f"best single effect so far: {self.singles[0].hypothesis.effects[0]}; looking for a second", 0.6)
+        pairs = pairs_of_effects(self.rig.fitter, self.singles, self._screening, self._tried, self._jobs)
+        self.pairs = self._finished(_with(self.pairs, pairs))
+        self.singles = self._again(self.singles, alone(self.pairs))
+        self.verdict = self._judged()
 
     def _try_everything(self, progress: Progress) -> None:
         """Every form of every effect, alone and beside the best one."""
         fitter, jobs = self.rig.fitter, self._jobs
         progress("nothing explains it well yet: every effect gets a refit", 0.65)
-        rest = refitted_rest(fitter, self._origins, self._screened, self._tried, jobs)
-        self.singles = _with(self.singles, rest)
+        best = self._best()
+        self.singles = _with(self.singles, refitted_rest(fitter, self.rig.fit, self.singles, self._tried, jobs))
         if self._varies():
             by_run = starts_by_run(fitter, self.rig.fit, self._tried, jobs)
             self.singles = self._finished(self._again(self.singles, by_run))
-        if any(fit.hypothesis.effects == (LAG,) for fit in close(self.rig.fit, self.singles)):
+        if any(fit.hypothesis.effects == (LAG,) for fit in close(self.rig.fit, self.singles, _LATE)):
             self.singles = self._finished(_with(self.singles, late_fits(fitter, self._tried, jobs)))
-        if self.singles and self._leaves_much(self.singles[0]):
-            progress(f"every effect gets a refit beside the best one, {self.singles[0].hypothesis.effects[0]}", 0.7)
-            best_before = self.pairs[0].chi2 if self.pairs else math.inf
-            beside = pairs_with(fitter, self.singles[0], self._tried, jobs)
-            self.pairs = self._finished(_with(self.pairs, beside))
-            if self.pairs and self.pairs[0].chi2 < best_before:
-                self.singles = self._again(self.singles, alone(self.pairs))
         self.verdict = self._judged()
+        if self._best() is not best and self._leaves_much(self._best()):
+            self._fit_pairs(progress)
 
-    def _give_the_named_all_its_starts(self) -> None:
-        """Among all others few of them had a place: a lag was refuted at chi2 213, alone it came to 161."""
-        named = self.verdict.named
-        if named is None or not refittable(self.verdict) or not self._leaves_much(named):
-            return
-        fitter, jobs = self.rig.fitter, self._jobs
-        own = [trial for trial in self._tried if trial.hypothesis.effects == named.hypothesis.effects]
-        again = refitted(fitter, self._origins, screened(fitter, self._origins, own, jobs), jobs)
-        self.singles = self._finished(_with(self.singles, again))
-        self.verdict = self._judged()
+    def _best(self) -> Fit:
+        """The single effect that leaves least, or the rig without effects."""
+        return self.singles[0] if self.singles else self.rig.fit
 
     def _contest_on_floor_of(self, nearest: Fit) -> None:
         """The leading effects on the floors of the model that comes nearest; what they were stays where none is named there."""

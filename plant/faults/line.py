@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import sealed, sensor_block
+from bridge.wire.topics import SENSORS
 from plant.faults.table import FaultTable
 
 _CORRUPTED_BYTES = 3
@@ -66,6 +68,8 @@ class Line:
                 due = max(due, float(until))
             elif table.kind == "corrupted" and random.random() < size:
                 copies = [Message(_corrupted(one.payload, random), one.of) for one in copies]
+            elif table.kind == "truncated" and random.random() < size:
+                copies = [one._replace(payload=one.payload[: random.integers(len(one.payload))]) for one in copies]
             elif table.kind == "forged":
                 more = [Message(self._forged(message.payload), message.of)] * round(size)
         for one in (*copies, *more):
@@ -87,7 +91,8 @@ class Line:
             return said.SerializeToString()
         block = wire.SensorBlock.FromString(payload)
         block.sequence += 1 << 40
-        return block.SerializeToString()
+        layout = sensor_block(len(block.drive_force_N))
+        return sealed(layout.canonical(block.SerializeToString(), SENSORS.name))
 
 
 def _corrupted(payload: bytes, random: np.random.Generator) -> bytes:

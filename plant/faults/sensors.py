@@ -127,6 +127,14 @@ class _Channel:
     def coarse(self, samples: Floats, _s: float) -> Floats:
         return np.round(samples / self.size) * self.size if self.size > 0.0 else samples
 
+    def flipped(self, samples: Floats, _s: float) -> Floats:
+        """As the wire would carry it: of a number of four bytes."""
+        if self.random.random() < self.size:
+            carried = samples.astype(np.float32)
+            carried.view(np.uint32)[self.random.integers(len(samples))] ^= np.uint32(1 << int(self.random.integers(32)))
+            return carried.astype(np.float64)
+        return samples
+
     def hum(self, samples: Floats, since_s: float) -> Floats:
         t_s = since_s + self.sample_s * np.arange(len(samples))
         return samples + self.size * np.sin(2.0 * math.pi * _HUM_HZ * t_s)
@@ -137,6 +145,6 @@ _KINDS: dict[str, Callable[[_Channel, Floats, float], Floats]] = {
     for made in (
         *(_Channel.off, _Channel.stuck, _Channel.frozen, _Channel.garbage, _Channel.scaled, _Channel.offset),
         *(_Channel.delayed, _Channel.clipped, _Channel.nan, _Channel.huge, _Channel.drifting, _Channel.fading),
-        *(_Channel.jumping, _Channel.noise, _Channel.loose, _Channel.coarse, _Channel.hum),
+        *(_Channel.jumping, _Channel.noise, _Channel.loose, _Channel.coarse, _Channel.hum, _Channel.flipped),
     )
 }

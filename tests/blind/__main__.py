@@ -19,6 +19,7 @@ class GeneratorName(StrEnum):
     """Where the rigs come from."""
 
     independent = "independent"
+    independent_2 = "independent-2"
     plant = "plant"
 
 
@@ -37,7 +38,10 @@ def make(
     out: Annotated[Path, typer.Option(metavar="DIR", help="The set: a new folder.")],
     key: Annotated[Path, typer.Option(help="The key file with the answers, outside DIR.")],
     generator: Annotated[
-        GeneratorName, typer.Option(help="Formulas of their own, or those that the diagnosis itself tries.")
+        GeneratorName,
+        typer.Option(
+            help="Formulas of their own (independent-2: other effects outside the library), or those that the diagnosis tries."
+        ),
     ] = GeneratorName.independent,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes to use; all cores if not given.")] = None,
 ) -> None:

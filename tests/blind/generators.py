@@ -56,6 +56,7 @@ def generator(name: str) -> Generator:
         from tests.blind.plant_cases import Plant
 
         return Plant()
+    from tests.blind.generator import OUTSIDE_2
     from tests.blind.independent_cases import Independent
 
-    return Independent()
+    return Independent(outside=OUTSIDE_2) if name == "independent-2" else Independent()

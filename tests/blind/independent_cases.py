@@ -15,18 +15,19 @@ class Independent:
 
     Args:
         runs: the protocol of every evidence.
+        outside: the effects that have no name in the library.
 
     """
 
     library = tuple(LIBRARY)
-    outside = tuple(OUTSIDE)
     usual = "lugre"
     backbones = ("multi-element", "lorentzian", "stretched")
     strongest = 1.5
     wide = 1.1  # draws are cut at three tolerances before they are scaled, and a gap begins at 3.3 tolerances
 
-    def __init__(self, runs: tuple[RunPlan, ...] = PROTOCOL) -> None:
+    def __init__(self, runs: tuple[RunPlan, ...] = PROTOCOL, outside: tuple[str, ...] = OUTSIDE) -> None:
         self._runs = runs
+        self.outside = outside
 
     def draw(self, random: np.random.Generator, name: str) -> Effect:
         return draw_effect(random, name)

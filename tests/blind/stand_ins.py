@@ -38,6 +38,7 @@ class StandIn:
 
     def make(self, folder: Path, plan: Plan, seed: int) -> None:  # noqa: ARG002
         made_up.evidence_folder(folder)
+        (folder / "manifest.toml").write_text(made_up.MANIFEST)  # the same whatever the folder's name
         path = folder / "run-01.csv"
         rows = path.read_text().splitlines()
         more_N = sum(effect.strength for effect in plan.effects)

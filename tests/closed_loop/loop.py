@@ -7,6 +7,7 @@ import numpy as np
 
 from bridge.config import validate
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
+from bridge.wire.messages import sealed
 from bridge.wire.topics import TRACE
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
@@ -81,7 +82,7 @@ def close_the_loop(
         if payload is None:
             commands = []
             continue
-        command = node.block(payload)
+        command = node.block(sealed(payload))
         assert command is not None
         commands = [command.payload]
         traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)

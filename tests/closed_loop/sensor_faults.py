@@ -8,7 +8,7 @@ import numpy as np
 from bridge.config import validate
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
-from bridge.wire.messages import sensor_block
+from bridge.wire.messages import sealed, sensor_block
 from bridge.wire.topics import TRACE
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
@@ -172,7 +172,7 @@ def suffer(
             if memory.first is None:
                 memory.first = block.copy()
             fault(block, number - first, memory)
-            payload = block.tobytes()
+            payload = sealed(block.tobytes())
         if operator and number in operator:
             node.operator(operator[number])
         command = node.block(payload)

@@ -43,7 +43,7 @@ def of_relations(evidence: Evidence) -> list[str]:
     runs = prepare(evidence)
     relations = relations_of(evidence.rig, runs)
     said = [line for one in relations.answered for line in _relation(one)]
-    decision = decision_of(relations)
+    decision = decision_of(relations, evidence.rig)
     said += [f"{one.relation}: named: {one.cause}" for one in decision.decided]
     said += [
         f"{one.relation}: outside: {one.what}: {one.size:.3g} {one.unit}, noise {one.noise:.3g}"

@@ -148,7 +148,7 @@ def test_a_second_ctrl_c_takes_nothing_away(tmp_path: Path, runs: list[Run], pau
 def test_judging_that_takes_long_is_told_and_can_be_left(tmp_path: Path, number: signal.Signals) -> None:
     log = tmp_path / "run.mcap"
     slow = (
-        "import time; from cockpit.judge import verdict; from cockpit.cli import main\n"
+        "import time; from cockpit.judge import verdict; from cockpit.entry import main\n"
         "verdict.judge_run = lambda _run: time.sleep(60)\n"
         "main()"
     )

@@ -15,6 +15,7 @@ import pytest
 
 from bridge.faults import FAULTS
 from tests.system.ports import free_endpoint
+from tests.system.run_under_way import call
 
 COMMAND = [sys.executable, "-m", "cockpit"]
 
@@ -35,9 +36,9 @@ def rig(endpoint: str, environment: dict[str, str], *more: str) -> Generator[sub
         process.communicate()
 
 
-def say(word: str, endpoint: str) -> tuple[int, dict[str, Any]]:
+def say(word: str, endpoint: str, *options: str) -> tuple[int, dict[str, Any]]:
     """Exit status of a word, and what came of it; said again until the rig is there."""
-    command = [*COMMAND, word, "--json", "--endpoint", endpoint]
+    command = [*COMMAND, word, "--json", "--endpoint", endpoint, *options]
     done = subprocess.run(command, timeout=60, check=False, capture_output=True, text=True)
     until_s = time.monotonic() + 60.0
     while done.returncode == FAULTS["NO_PEER"].exit_status and time.monotonic() < until_s:
@@ -52,7 +53,7 @@ def test_a_rig_is_armed_by_a_person_and_a_stop_outlasts_its_process(tmp_path: Pa
         status, seen = say("status", endpoint)
         assert (status, seen["state"], seen["cause"]) == (1, "DISARMED", "POWER_UP")
         status, armed = say("arm", endpoint)
-        assert (status, armed["state"], armed["cause"]) == (0, "ARMED", "CHECK_PASSED")
+        assert (status, armed["state"], armed["cause"]) == (0, "ARMED", "FIRST_CHECK")
         status, stopped = say("stop", endpoint)
         assert (status, stopped["state"], stopped["cause"]) == (0, "FAULT", "STOP_BY_PERSON")
     endpoint = free_endpoint()
@@ -62,8 +63,22 @@ def test_a_rig_is_armed_by_a_person_and_a_stop_outlasts_its_process(tmp_path: Pa
         assert say("arm", endpoint)[0] == 1
         assert say("reset", endpoint)[1]["state"] == "DISARMED"
     endpoint = free_endpoint()
-    with rig(endpoint, environment, "--set", "arm=true"):
+    with rig(endpoint, environment, "--set", "arm=true") as process:
         assert say("status", endpoint)[1]["state"] == "ARMED"
+        process.send_signal(signal.SIGSTOP)
+        try:
+            unheard = call("stop", "--endpoint", endpoint)
+        finally:
+            process.send_signal(signal.SIGCONT)
+        assert unheard.returncode == FAULTS["NO_PEER"].exit_status
+        assert "stands still" in unheard.stderr
+        assert "by hand" in unheard.stderr
+    with rig(endpoint, environment, "--set", "arm=true", "--set", "rig.piezo.delivered_ratio=0.5"):
+        assert say("status", endpoint)[1]["state"] == "ARMED"
+        status, armed = say("arm", endpoint)  # the gain of the first run was kept
+        assert (status, armed["state"], armed["cause"]) == (1, "READY", "GAIN_CHANGED")
+        status, armed = say("arm", endpoint, "--accept-gain")
+        assert (status, armed["state"], armed["cause"]) == (0, "ARMED", "GAIN_ACCEPTED")
 
 
 def test_a_rig_whose_stop_could_not_be_kept_does_not_arm_itself(tmp_path: Path) -> None:

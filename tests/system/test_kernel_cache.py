@@ -1,4 +1,4 @@
-"""Compiled kernels where nothing can be kept: a read-only home, a container's user without one."""
+"""Compiled kernels: a first start of several runs at once, and where nothing can be kept, as in a container without a home."""
 
 import os
 import subprocess
@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from tests.system.ports import free_endpoint
 
 pytestmark = pytest.mark.slow
 
@@ -67,3 +69,38 @@ import bridge.kernel
     assert "its home is not known" in done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.nightly
+def test_of_two_first_starts_at_once_one_process_compiles_each_set_and_nobody_is_said_to_be_missing(tmp_path):
+    cache = tmp_path / "cache"
+    fast = (
+        "--scenario",
+        "from-the-start",
+        "--lockstep",
+        "--set",
+        "duration_s=1",
+    )  # in lockstep a busy computer changes nothing but the time it takes
+    begun = [
+        subprocess.Popen(
+            [sys.executable, "-m", "cockpit", "run", *fast, "--endpoint", free_endpoint(), "--log", tmp_path / name],
+            env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
+            cwd=Path(__file__).parents[2],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for name in ("one.mcap", "other.mcap")
+    ]
+    said = [process.communicate(timeout=280)[1] for process in begun]
+    assert [process.returncode for process in begun] == [0, 0], said
+    lines = "".join(said).splitlines()
+    for role in ("plant", "controller"):
+        compiling = [line for line in lines if f"compiling the kernels of the {role}" in line]
+        assert len(compiling) == 1, lines
+        assert "first start of this version, about a minute" in compiling[0]
+        assert sum(f"another process compiles the kernels of the {role}: waiting for it" in line for line in lines) == 1
+        # the second process loads what the first has kept, and writes nothing
+        done = next(cache.glob(f"the {role}-*")).stat().st_mtime_ns
+        assert all(path.stat().st_mtime_ns <= done for path in cache.glob(f"{role}_*/*.nbc"))
+    assert not [line for line in lines if "have not found each other" in line]

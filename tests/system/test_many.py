@@ -1,5 +1,6 @@
 """Many evidence folders on several processes and on a Dask cluster: complete when a worker dies, nobody left behind."""
 
+import json
 import os
 import signal
 import socket
@@ -10,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bridge.faults import Fault
@@ -17,6 +19,8 @@ from bridge.wire.certificates import CLUSTER, files_of
 from cockpit.run.authority import make_certificates
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult, diagnose_many, find_sources
 from tests import made_up
+from tests.blind.generator import Case, draw_effect, make
+from tests.blind.small_set import RUNS
 
 pytestmark = pytest.mark.slow
 
@@ -78,13 +82,14 @@ def cluster(at: Path, workers: int, certs: Path | None = None) -> Iterator[str]:
 
 
 def test_outcomes_on_two_processes(tmp_path):
-    outcomes = by_name(diagnose_many(sources(tmp_path, ["a", "b", "refused", "broken"]), 2, diagnose=made_up.quick))
-    assert {name for name, outcome in outcomes.items() if outcome.diagnosis} == {"a", "b"}
+    """The last folder has both processes, as the stand-in says."""
+    names = ["a", "b", "refused", "broken", "c"]
+    outcomes = by_name(diagnose_many(sources(tmp_path, names), 2, diagnose=made_up.spreads))
+    found = {name: outcome.diagnosis for name, outcome in outcomes.items() if outcome.diagnosis}
+    assert {name: one.elapsed_s for name, one in found.items()} == {"a": 1.0, "b": 1.0, "c": 2.0}
     assert outcomes["refused"].fault == ("BAD_EVIDENCE", "run-01.csv: too short")
     assert (outcomes["broken"].fault or ("",))[0] == "DIAGNOSIS_BROKE"
-    assert outcomes["a"].diagnosis is not None
-    assert outcomes["a"].diagnosis.gap == made_up.diagnosis().gap
-    assert outcomes["a"].diagnosis.elapsed_s == 1.0  # the stand-in says the number of jobs here
+    assert found["a"].gap == made_up.diagnosis().gap
 
 
 def test_a_process_that_always_dies_takes_nobody_along(tmp_path):
@@ -138,13 +143,75 @@ def test_a_cluster_that_is_not_there(tmp_path):
     assert time.monotonic() - started_s < 15.0
 
 
+@pytest.mark.nightly
+def test_after_sigkill_only_what_is_missing_is_done(tmp_path):
+    """One folder is done, the other under way when everything is killed; the next time only the other is diagnosed."""
+    for name in ("a", "slow"):
+        made_up.evidence_folder(tmp_path / "all" / name)
+    out = tmp_path / "out"
+    program = "from diagnosis import diagnose_many as many; from tests import made_up; from cockpit import entry;"
+    program += "many.real_diagnose = made_up.marks; entry.main()"
+    options = [
+        "diagnose",
+        str(tmp_path / "all"),
+        "--jobs",
+        "2",
+        "--report",
+        str(out),
+        "--json",
+        str(tmp_path / "all.json"),
+    ]
+    command = [sys.executable, "-c", program, *options]
+    first = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
+    wait_for(lambda: (tmp_path / "all/slow/done").exists() and any((out / "results").glob("*.json")))
+    os.killpg(first.pid, signal.SIGKILL)
+    first.wait()
+    index = json.loads((out / "index.json").read_text())
+    assert (index["left"], len(index["groups"][0]["rigs"])) == (["slow"], 1)
+    (tmp_path / "all/slow/fast").touch()
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "1 of 2 are kept from before" in again.stderr
+    assert (tmp_path / "all/a/done").read_text() == "once\n"
+    assert (tmp_path / "all/slow/done").read_text() == "once\nonce\n"
+    assert [one["evidence"] for one in json.loads((tmp_path / "all.json").read_text())["results"]] == ["a", "slow"]
+    assert json.loads((out / "index.json").read_text())["left"] == []
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(1800)
+def test_a_real_fleet_goes_on_after_sigkill(tmp_path):
+    """Three rigs, two of them with the same gap; killed after the first result, and then once more with nothing to do."""
+    backlash = (draw_effect(np.random.default_rng(3), "drive-backlash"),)
+    for number, effects in enumerate(((), backlash, backlash)):
+        make(tmp_path / "all" / f"rig-{number}", Case(effects), 100 + number, RUNS)
+    out = tmp_path / "out"
+    options = ["diagnose", str(tmp_path / "all"), "--jobs", "2", "--report", str(out), "--budget", "60s"]
+    command = [sys.executable, "-m", "cockpit", *options]
+    first = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
+    wait_for(lambda: any((out / "results").glob("*.json")), 600.0)
+    os.killpg(first.pid, signal.SIGKILL)
+    first.wait()
+    kept = {path: path.stat().st_mtime_ns for path in (out / "results").glob("*.json")}
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert f"{len(kept)} of 3 are kept from before" in again.stderr
+    assert all(path.stat().st_mtime_ns == written for path, written in kept.items())
+    index = json.loads((out / "index.json").read_text())
+    assert (index["folders"], index["failed"], index["left"]) == (3, [], [])
+    group = next(group for group in index["groups"] if group["what"] == "drive-backlash")
+    assert {rig["evidence"] for rig in group["rigs"]} >= {"rig-1", "rig-2"}
+    assert all((out / rig["report"]).is_file() for group in index["groups"] for rig in group["rigs"])
+    third = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "3 of 3 are kept from before" in third.stderr
+    assert third.stdout == again.stdout
+
+
 def test_ctrl_c_leaves_no_worker_and_no_file(tmp_path):
     for name in ("a", "b"):
         made_up.evidence_folder(tmp_path / "all" / name)
     # who is started with & by a script ignores Ctrl-C, and so do its children: here it is as a terminal starts a command
     program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-    program += "from diagnosis import diagnose_many as many; from tests import made_up; from cockpit import cli;"
-    program += "many.real_diagnose = made_up.endless; cli.main()"
+    program += "from diagnosis import diagnose_many as many; from tests import made_up; from cockpit import entry;"
+    program += "many.real_diagnose = made_up.endless; entry.main()"
     options = ["diagnose", str(tmp_path / "all"), "--jobs", "2", "--json", str(tmp_path / "out.json")]
     command = subprocess.Popen(
         [sys.executable, "-c", program, *options], stderr=subprocess.PIPE, text=True, start_new_session=True

@@ -15,7 +15,7 @@ from tests.system.ports import free_endpoint
 _HEAVY = {"numba", "scipy", "matplotlib", "pyarrow", "rich"}
 _TELL = """
 import json, sys
-from cockpit.cli import main
+from cockpit.entry import main
 sys.argv[0] = "stickslip"
 try:
     main()

@@ -37,6 +37,10 @@ class Owner(Protocol):
         """Tell in the log and on the bus."""
         ...
 
+    def say_again(self) -> None:
+        """Tell in the log what was told at its beginning and holds for all of it."""
+        ...
+
     @property
     def t_ns(self) -> int:
         """The time of the run."""
@@ -163,6 +167,8 @@ class LogFiles:
         part.leave()
         goes_on = f"the log goes on in {self._name()}" if self._part else "the log waits for a place to go on"
         self._owner.add_event(code, f"{part.path.name} {text}; {goes_on}")
+        if self._part:
+            self._owner.say_again()
 
     def _name(self) -> str:
         return part_path(self.path, self._number).name

@@ -11,6 +11,7 @@ from bridge.tables.unit_words import is_unit_row, known_unit
 
 COMMENTS = ("#", "%", "//", "!", "*", ";;", "'")
 _CONFIRMED = 5  # rows under the first one, of which most must be rows too
+_LABEL = "Y_Unit_Label"  # with which LabVIEW begins a line of units, each above its column
 _MOST_ABOVE = 6  # lines above the first row among which the names are looked for
 _RATE = re.compile(
     r"(?:sampl|abtast|scan|acqui|messrate|datenrate|data\s*rate)[\w .\-/]*?(?:rate|freq\w*|messrate)?"
@@ -32,6 +33,7 @@ class Head(NamedTuple):
     names_line: int  # from 0; -1: there is none
     names: list[str]  # as many as there are columns
     units: list[str]  # as many, or none
+    units_line: int  # from 0; -1: there is none
     step_s: float | None  # between rows, as a line above states
 
     @property
@@ -63,9 +65,11 @@ def read_head(lines: Sequence[str], body: Sequence[str], form: Form, given: Dial
     if not names and names_line >= 0:
         names = _named(lines[names_line], form, width)
     names = _each_once([name.strip() for name in names], width)
+    if units_line < 0 and given.units_row is not False:
+        units_line = next((at for at in range(first - 1, -1, -1) if lines[at].startswith(_LABEL)), -1)
     units = [unit.strip().strip("[]()") for unit in _named(lines[units_line], form, width)] if units_line >= 0 else []
-    units = (units + [""] * width)[:width] if units else []
-    return Head(first, names_line, names, units, _step_s(lines[:first]))
+    units = ["" if unit == _LABEL else unit for unit in (units + [""] * width)[:width]] if units else []
+    return Head(first, names_line, names, units, units_line, _step_s(lines[:first]))
 
 
 def _columns(body: Sequence[str], form: Form) -> tuple[int, list[bool]]:

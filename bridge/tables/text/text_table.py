@@ -120,7 +120,9 @@ def _told(file: str, head: Head, form: Form, encoding: str, given: Dialect) -> l
     if told := [text for wanted, text in parts if wanted]:
         found.append(Finding("assumed", file, ", ".join(told)))
     if head.units:
-        found.append(Finding("assumed", file, f"line {head.lines} is of units: {', '.join(filter(None, head.units))}"))
+        found.append(
+            Finding("assumed", file, f"line {head.units_line + 1} is of units: {', '.join(filter(None, head.units))}")
+        )
         if unknown := unknown_units(head.unit_of):
             found.append(Finding("units", file, f"no known unit: {unknown}; taken as it is"))
     return found

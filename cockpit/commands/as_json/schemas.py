@@ -336,6 +336,11 @@ TOML = (
 JSON = (
     Format("diagnosis-2", "`stickslip diagnose FOLDER --json`, diagnosis/2.", _diagnosis),
     Format("diagnoses-2", "`stickslip diagnose --json` of several folders, diagnoses/2.", _diagnoses),
+    Format(
+        "fleet-1",
+        "index.json that `stickslip diagnose --report DIR` of several folders writes.",
+        _result_of("cockpit.fleet.groups", "Fleet"),
+    ),
     Format("blind-scores-2", "`stickslip blind score --json` and `blind pool --json`, blind-scores/2.", _blind_scores),
     Format("fault", "Any command that fails with JSON on stdout.", _fault),
     Format("run-result", "`stickslip run --json`.", _run),

@@ -22,6 +22,10 @@ def bench_control(
         list[str], typer.Option(help="A family of the bank, or how the names of scenarios begin. Repeatable.")
     ] = [],  # noqa: B006
     small: Annotated[bool, typer.Option("--small", help="The small part of the bank alone, some seconds.")] = False,
+    drawn: Annotated[
+        int | None,
+        typer.Option(metavar="SEED", help="In place of the bank: 60 axes drawn from this seed, so of any that is new."),
+    ] = None,
     rivals: Annotated[bool, typer.Option(help="Run the rules that need no controller, too.")] = True,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report, one .html file.")] = None,
     axes: Annotated[
@@ -35,6 +39,7 @@ def bench_control(
     def work() -> int:
         from joblib import cpu_count
 
+        from cockpit.bank.drawn import drawn_axes
         from cockpit.bank.result import OWN, bench, in_words
         from cockpit.bank.scenario import chosen, load_bank
         from cockpit.commands.diagnose_output import watched
@@ -44,7 +49,7 @@ def bench_control(
             check_output("--report", report, PAGE)
         if axes is not None:
             check_output("--map", axes, PICTURE)
-        bank = chosen(load_bank(), only, small)
+        bank = chosen(load_bank() if drawn is None else drawn_axes(drawn), only, small)
         with watched() as progress:
             result = bench(bank, rivals, jobs or cpu_count(), lambda share, line: progress(line, share))
         if report is not None:

@@ -1,7 +1,9 @@
 """The bus of a simulated run: messages arrive at once and in order, unless their sender or receiver stands still for too long."""
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterable
 
+from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.inbox import Received
 from bridge.wire.topics import Topic
 from cockpit.run.simulated.stage import Stage
@@ -68,6 +70,10 @@ class Session:
     def listen(self, topic: Topic, receive: Receive) -> None:
         """Call `receive` for every message of a topic."""
         self._hub.listen(self._role, topic, receive)
+
+    def headers(self, _roles: Iterable[str], _timeout_s: float, _stop: threading.Event) -> dict[str, wire.Header]:
+        """Nothing: rig and controller of a simulated run come of one scenario, and need not tell each other what they are."""
+        return {}
 
     def alive(self, role: str) -> bool:
         """Whether a role is on the bus, as this one sees it: nobody is, without a link of its own."""

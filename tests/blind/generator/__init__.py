@@ -4,7 +4,8 @@ kernel.py    the rig's equations of motion and their integrator     rig.py      
 surface.py   friction along the track                               runs.py     the commands of drive and piezo in each run
 chain.py     the sensor chain: noise, hum, bandwidth, resolution    effect.py   an effect and its formulas
 library.py   the 26 named effects                                   outside.py  effects that have no name in the library
-evidence.py  one folder on disk                                     case.py     a case, from seed to folder
+evidence.py  one folder on disk                                     outside_2.py  others, for sets after those of outside.py
+case.py      a case, from seed to folder
 
 Signs as in the paper: a force is positive when it pulls in +x. Sources of the formulas stand beside them.
 """
@@ -13,5 +14,6 @@ from tests.blind.generator.case import Case, make, simulate
 from tests.blind.generator.effect import Effect
 from tests.blind.generator.library import LIBRARY, draw_effect
 from tests.blind.generator.outside import OUTSIDE
+from tests.blind.generator.outside_2 import OUTSIDE_2
 
-__all__ = ["LIBRARY", "OUTSIDE", "Case", "Effect", "draw_effect", "make", "simulate"]
+__all__ = ["LIBRARY", "OUTSIDE", "OUTSIDE_2", "Case", "Effect", "draw_effect", "make", "simulate"]

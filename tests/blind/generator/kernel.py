@@ -1,11 +1,11 @@
 """The rig's motion: slide, bristle contact, spring drive, vibrated base; classic Runge-Kutta, 3.85 us steps.
 
-State y, float64[14]: x, v of the slide [m, m/s]; z of four bristle elements [m]; frame x, v; base x, v; Maxwell
-force [N]; inner mass x, v; seal deflection [m]. Bristle rate as LuGre (Canudas de Wit et al. 1995):
-z' = v_r - sigma0 |v_r| z / g(v_r). At 22 mm/s of slip sigma0 |v| / g is 1.2e5 1/s, 0.45 per step of 3.85 us;
+State y, float64[15]: x, v of the slide [m, m/s]; z of four bristle elements [m]; frame x, v; base x, v; Maxwell
+force [N]; inner mass x, v; seal deflection [m]; deflection of a second guide [m]. Bristle rate as LuGre (Canudas de Wit
+et al. 1995): z' = v_r - sigma0 |v_r| z / g(v_r). At 22 mm/s of slip sigma0 |v| / g is 1.2e5 1/s, 0.45 per step of 3.85 us;
 Runge-Kutta is stable up to 2.78, so there is room for a stiff element and a slip five times as fast.
 
-Memory that is no rate (rest time, lag of g, clamp slider, heat) is carried from step to step.
+Memory that is no rate (rest time, lag of g, clamp slider, heat, distance slid one way) is carried from step to step.
 An effect that is off is a factor of exactly 1 or an addend of exactly 0.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 SAMPLE_RATE_HZ = 20_000
 SUBSTEPS = 13
-STATES = 14
+STATES = 15
 REST_SPEED_MPS = 2e-5  # below it the contact rests and ages; drive velocities start at 0.15 mm/s
 SMOOTHING_S = 1e-3  # time constant of slip speed and drive force as inputs of slow mechanisms
 
@@ -119,6 +119,10 @@ def _rates(p, y, dy, drive_m, drive_mps, base_mps, level, aged, lagged_mps, stri
     if p.seal_force_N > 0.0:
         dy[13] = v - p.seal_stiffness_N_per_m * abs(v) * y[13] / p.seal_force_N
         total -= p.seal_stiffness_N_per_m * y[13]
+    if p.guide_force_N > 0.0:
+        steady_N = p.guide_force_N * (1.0 + p.guide_static_share * math.exp(-((v / p.guide_stribeck_mps) ** 2)))
+        dy[14] = v - p.guide_stiffness_N_per_m * abs(v) * y[14] / steady_N
+        total -= p.guide_stiffness_N_per_m * y[14]
     total += place_force_N(p, x)
     if p.inner_mass_ratio > 0.0:
         w = p.inner_omega_radps
@@ -166,7 +170,7 @@ def integrate(
 ):  # fmt: skip
     """Moves the rig from sample to sample and fills out.
 
-    params (1,) PARAMS; y (14,) state, overwritten; table (points,) friction level along the track; drive_m,
+    params (1,) PARAMS; y (15,) state, overwritten; table (points,) friction level along the track; drive_m,
     drive_mps, load, amplitude_m (samples + 1,) linear in between; frequency_Hz, phase_rad (samples,) held;
     out (4, samples): drive force [N], slide and base acceleration [m/s2], slide position [m].
     """
@@ -178,6 +182,7 @@ def integrate(
     lagged, lag_on, past_at = -1.0, p.lag_delay_s > 0.0 or p.lag_distance_m > 0.0, 0
     past = np.zeros(max(int(p.lag_delay_s / h + 0.5), 1))
     aged, stribeck = 0.0, p.stribeck_velocity_mps
+    preload_heat, smooth_v, side, wiped_m, grown = 0.0, 0.0, 0.0, 0.0, 1.0
     if lag_on:
         lagged = 0.0
     for n in range(samples):
@@ -185,6 +190,10 @@ def integrate(
             aged = _aged(p, rest_s)
         if p.warming != 0.0:
             stribeck = p.stribeck_velocity_mps * (1.0 + p.warming * heat)
+        if p.preload_growth != 0.0:
+            grown = 1.0 + p.preload_growth * preload_heat
+        if p.starvation != 0.0:
+            grown = 1.0 + p.starvation * (1.0 - math.exp(-wiped_m / p.starvation_m))
         sag = 1.0 - p.sag_load * smooth_force / p.static_force_N
         a0, a1 = amplitude_m[n] * sag, amplitude_m[n + 1] * sag
         growth = (a1 - a0) * SAMPLE_RATE_HZ
@@ -201,7 +210,7 @@ def integrate(
             dh, eh = _between(drive_m, n, fh), _between(drive_mps, n, fh)
             d1, e1 = _between(drive_m, n, f1), _between(drive_mps, n, f1)
             # the finest wave of the surface is 10 um long, a step moves 0.1 um at most: held over a step
-            level = _between(load, n, fh) * _surface(y[0], table_step_m, table)
+            level = _between(load, n, fh) * _surface(y[0], table_step_m, table) * grown
             force, over, v_r, mode_accel = _rates(p, y, k1, d0, e0, u0, level, aged, lagged, stribeck, slider_m)
             if j == 0:
                 out[0, n] = force
@@ -238,6 +247,14 @@ def integrate(
                 past_at = (past_at + 1) % len(past)
             if p.warming != 0.0:  # 1 at the friction work of F_c at 1 mm/s
                 heat += h / p.warming_time_s * (slip / 1e-3 - heat)
+            if p.preload_growth != 0.0:  # 1 at the friction work of F_c at 1 mm/s
+                preload_heat += h / p.preload_time_s * (slip / 1e-3 - preload_heat)
+            if p.starvation != 0.0:
+                smooth_v += h / SMOOTHING_S * (over * v_r - smooth_v)
+                if smooth_v * side < -REST_SPEED_MPS or side == 0.0:  # it slides the other way, where the oil is
+                    side = math.copysign(1.0, smooth_v)
+                    wiped_m = 0.0
+                wiped_m += h * abs(smooth_v)
             if p.clamp_share > 0.0:
                 stretch = d1 + y[6] - y[0]
                 slider_m = min(max(slider_m, stretch - p.clamp_yield_m), stretch + p.clamp_yield_m)

@@ -5,6 +5,7 @@ import numpy as np
 from tests.blind.generator import library_friction, library_machine, library_sensors
 from tests.blind.generator.effect import Effect, Formula
 from tests.blind.generator.outside import OUTSIDE_FORMULAS
+from tests.blind.generator.outside_2 import OUTSIDE_2_FORMULAS
 
 _FORMULAS: dict[str, list[Formula]] = {}
 for _formula in (*library_friction.FORMULAS, *library_machine.FORMULAS, *library_sensors.FORMULAS):
@@ -14,9 +15,9 @@ LIBRARY = tuple(_FORMULAS)
 
 def formulas_of(name: str) -> list[Formula]:
     """Every formula of an effect, in the library or outside it."""
-    formulas = _FORMULAS.get(name) or [f for f in OUTSIDE_FORMULAS if f.effect == name]
+    formulas = _FORMULAS.get(name) or [f for f in (*OUTSIDE_FORMULAS, *OUTSIDE_2_FORMULAS) if f.effect == name]
     if not formulas:
-        raise KeyError(f"{name}: no such effect; see LIBRARY and OUTSIDE")
+        raise KeyError(f"{name}: no such effect; see LIBRARY, OUTSIDE and OUTSIDE_2")
     return formulas
 
 

@@ -61,6 +61,10 @@ PARAMS = np.dtype(
         ("warming", "f8"),  # growth of the Stribeck velocity with friction work
         ("warming_time_s", "f8"),
         ("acceleration_friction_s2_per_m", "f8"),
+        ("preload_growth", "f8"),  # of all friction with friction work
+        ("preload_time_s", "f8"),
+        ("starvation", "f8"),  # growth of all friction with the distance slid one way
+        ("starvation_m", "f8"),
         # drive
         ("spring_cubic", "f8"),  # added relative force at 1 mm, growing as stretch^2
         ("spring_knee", "f8"),  # added relative stiffness beyond spring_knee_m
@@ -85,6 +89,10 @@ PARAMS = np.dtype(
         # other forces on the slide
         ("seal_force_N", "f8"),
         ("seal_stiffness_N_per_m", "f8"),
+        ("guide_force_N", "f8"),  # Coulomb friction of a second guide, beside the vibrated contact
+        ("guide_static_share", "f8"),  # by which its static friction is higher
+        ("guide_stribeck_mps", "f8"),
+        ("guide_stiffness_N_per_m", "f8"),
         ("tilt_N_per_m", "f8"),
         ("tilt_N_per_m2", "f8"),
         ("tilt_centre_m", "f8"),

@@ -1,6 +1,7 @@
 """A log in several files: by size and time, where its file is taken away, where the disk is full or slow."""
 
 import errno
+import mmap
 import os
 import re
 import resource
@@ -154,16 +155,17 @@ def test_a_file_that_is_taken_away_is_told_and_the_log_goes_on(
     path = tmp_path / "run.mcap"
     log = RunLog(path, lockstep=False, on_event=events.append)
     log._files._look_s = 0.0
+    log.add_event("WATCH", "what holds for the whole log", holds=True)
     write(log, range(100))
     act(path)
     write(log, range(100, 200))
     write(log, range(200, 300))
     with pytest.raises(Fault, match=rf"LOG_LOST: .*run.mcap: {told}.*; it goes on in run-0001.mcap"):
         log.close()
-    assert [event.code for event in events] == [code]
+    assert [event.code for event in events] == ["WATCH", code, "WATCH"]
     run = read_run(tmp_path / "run-0001.mcap")
     assert run.sensors["sequence"][-1] == 299
-    assert [event.code for event in run.events] == [code]
+    assert [(event.code, event.sequence) for event in run.events] == [(code, 1), ("WATCH", 2)]
     assert run.damage.whole
     if act is renamed:
         assert read_run(tmp_path / "other.mcap").damage.whole
@@ -258,3 +260,15 @@ def test_the_index_of_a_long_log_does_not_stay_in_memory(tmp_path: Path) -> None
     log.close()
     assert len(read_run(log.path).sensors) == 900
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_memory_that_grows_while_a_log_is_read_keeps_what_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.mcap"
+    rotated(path)
+    whole = read_run(path).sensors
+    monkeypatch.setattr("bridge.log.logfile._FIRST_BYTES", mmap.PAGESIZE)
+    grown = read_run(path).sensors
+    assert len(grown) == 400
+    assert grown.tobytes() == whole.tobytes()

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from bridge.faults import FAULTS
 from bridge.files import strict_json, write_whole
 from cockpit.cli import app
+from cockpit.fleet import work
 from diagnosis import diagnose_many as many
 from tests import made_up
 
@@ -19,6 +20,7 @@ from tests import made_up
 @pytest.fixture(autouse=True)
 def stand_in(monkeypatch):
     monkeypatch.setattr(many, "real_diagnose", made_up.quick)
+    monkeypatch.setattr(work, "tool_version", lambda: "1.0+abc")  # reads the whole package, for a second
 
 
 def diagnose(*arguments):
@@ -29,6 +31,10 @@ def folders(at: Path, *names: str) -> Path:
     for name in names:
         made_up.evidence_folder(at / name)
     return at
+
+
+def pages(at: Path) -> set[str]:
+    return {name for name in files(at) if name.endswith(".html")}
 
 
 def files(at: Path) -> set[str]:
@@ -50,12 +56,12 @@ def test_one_folder_says_the_verdict_first(tmp_path):
     )
     after = next(i for i, line in enumerate(lines) if line.startswith("next"))
     assert lines[7:16] == [
-        "relations  spring relation: 800 mN as described, 300 refitted, 50 with drive-backlash; noise 12",
+        "relations  spring relation: 0.8 N as described, 0.3 N refitted, 50 mN with drive-backlash; noise 12 mN",
         "             drive-backlash 73 % (90 %: 61 % to 92 %); chance alone shows up to 12 %",
         "             noise 25 %",
         "             unexplained 2 % (90 %: 0 % to 5 %)",
         "           base: left out: run-01.parquet has no base_accel_mps2",
-        "           46 mN remain in the spring relation over the extension, where noise is 12: nothing in the library",
+        "           46 mN remain in the spring relation over the extension, where noise is 12 mN: nothing in the library",
         "numbers    drive stiffness 11.697 kN/m (90 %: 11.650 to 11.744) by the spring relation, described 20 kN/m",
         "           mass 1.497 kg, described 1.5 kg",
         "           drive stiffness 11.01 kN/m, described 11.7 kN/m",
@@ -196,11 +202,11 @@ def test_a_folder_of_folders_gives_every_result_in_order(tmp_path):
         "b-broken",
         "c",
         "refused",
-        f"reports    {out}/reports",
+        f"reports    {out}/reports/index.html",
     ]
     assert "b-broken: DIAGNOSIS_BROKE: ZeroDivisionError: nothing to divide by (made_up.py, line" in result.stdout
     assert "4 of 4: refused: BAD_EVIDENCE: run-01.csv: too short" in result.stderr
-    assert files(out) == {"a.json", "reports/a.html", "reports/c.html"}
+    assert pages(out) == {"reports/a.html", "reports/c.html", "reports/index.html"}
     written = json.loads((out / "a.json").read_text())
     assert written["format"] == "diagnoses/2"
     results = {one["evidence"]: one for one in written["results"]}
@@ -219,7 +225,7 @@ def test_folders_of_the_same_name_keep_apart(tmp_path):
     assert [source.name for source in sources] == [str(tmp_path / "one/rig"), "other", str(tmp_path / "two/rig")]
     result = diagnose(tmp_path / "one", tmp_path / "two", "--report", tmp_path / "out", "--jobs", 1)
     assert result.exit_code == 0
-    assert len(files(tmp_path / "out")) == 3
+    assert len(pages(tmp_path / "out")) == 3 + 1
 
 
 @pytest.mark.parametrize(
@@ -268,7 +274,21 @@ def test_interrupted_is_130_and_writes_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(many, "real_diagnose", interrupted)
     result = diagnose(folders(tmp_path, "rig") / "rig", "--json", tmp_path / "a.json")
     assert result.exit_code == 130
+    assert "stopped by SIGTERM" in result.output
     assert not (tmp_path / "a.json").exists()
+
+
+def test_an_interrupted_fleet_says_where_it_goes_on(tmp_path, monkeypatch):
+    def interrupted(sources, *_):
+        yield many.FolderResult(sources[0], made_up.diagnosis(), None)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(many, "diagnose_many", interrupted)
+    out = tmp_path / "out"
+    result = diagnose(folders(tmp_path / "all", "a", "b"), "--report", out)
+    assert result.exit_code == 130
+    assert f"1 of 2 are in {out}; the same command goes on from there" in result.stderr
+    assert json.loads((out / "index.json").read_text())["left"] == ["b"]
 
 
 def test_the_answer_is_said_whatever_cannot_be_written(tmp_path):
@@ -332,7 +352,8 @@ def test_a_report_that_cannot_be_written_ends_no_other(tmp_path):
     result = diagnose(tmp_path / "all", "--json", "-", "--report", out, "--jobs", 1)
     assert result.exit_code == FAULTS["LOG_WRITE"].exit_status
     assert f"LOG_WRITE: {out / 'b.html'}: cannot be written" in result.stderr
-    assert files(out) == {"a.html", "b.html/full", "c.html"}
+    assert pages(out) == {"a.html", "c.html", "index.html"}
+    assert (out / "b.html/full").is_file()
     assert [one["evidence"] for one in json.loads(result.stdout)["results"]] == ["a", "b", "c"]
 
 
@@ -354,4 +375,4 @@ def test_every_report_has_a_name_of_its_own_that_a_disk_takes(tmp_path):
     given = [tmp_path / "a_b/rig", tmp_path / "a/b/rig", tmp_path / "c" / long, tmp_path / "d" / long]
     result = diagnose(*given, "--report", tmp_path / "out", "--jobs", 1)
     assert result.exit_code == 0
-    assert len(files(tmp_path / "out")) == 4
+    assert len(pages(tmp_path / "out")) == 4 + 1

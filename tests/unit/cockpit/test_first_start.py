@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 
 from bridge.faults import Fault
-from bridge.plain import COMPILED, COMPILING
+from bridge.plain import COMPILED, COMPILING, LOADED
 from cockpit.run import processes
 
 
 class Child:
-    """As a process that was started: its role, and whether it compiles."""
+    """As a process that was started: its role, and what it still does."""
 
-    def __init__(self, role: str, compiles: bool = False) -> None:
-        self.role, self.compiles = role, compiles
+    def __init__(self, role: str, still: str = processes.READY) -> None:
+        self.role, self.still = role, still
 
 
 def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.Beginning:
@@ -25,10 +25,15 @@ def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.Begi
 
 def test_who_still_compiles_is_told_now_and_then(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes, "_TOLD_S", 0.0)
-    start = beginning(tmp_path / "run.mcap", None, Child("plant", compiles=True), Child("controller"))
+    start = beginning(
+        tmp_path / "run.mcap", None, Child("plant", processes.COMPILES), Child("controller", processes.STARTS)
+    )
     time.sleep(0.01)
     start.look()
-    assert "waiting  the plant still compiles, since 0 s; Ctrl-C ends it" in capsys.readouterr().err
+    assert (
+        "waiting  the plant still compiles, the controller still starts, since 0 s; Ctrl-C ends it"
+        in capsys.readouterr().err
+    )
 
 
 def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
@@ -43,11 +48,15 @@ def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    ("compiles", "words"),
-    [(True, "the plant and the controller still compile after"), (False, "have not found each other after")],
+    ("still", "words"),
+    [
+        (processes.COMPILES, "the plant and the controller still compile after"),
+        (processes.STARTS, "the plant and the controller still start after"),
+        (processes.READY, "have not found each other after"),
+    ],
 )
-def test_after_the_longest_wait_the_fault_says_who_is_not_ready(tmp_path, compiles, words):
-    start = beginning(tmp_path / "run.mcap", 0.001, Child("plant", compiles), Child("controller", compiles))
+def test_after_the_longest_wait_the_fault_says_who_is_not_ready(tmp_path, still, words):
+    start = beginning(tmp_path / "run.mcap", 0.001, Child("plant", still), Child("controller", still))
     time.sleep(0.01)
     with pytest.raises(Fault, match=rf"NO_PEER: .*{words} .*--wait S"):
         start.look()
@@ -56,7 +65,8 @@ def test_after_the_longest_wait_the_fault_says_who_is_not_ready(tmp_path, compil
 def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys):
     said = f"print('stickslip: {COMPILING}the plant, once', file=sys.stderr, flush=True)"
     over = f"print('stickslip: {COMPILED}the plant', file=sys.stderr, flush=True)"
-    code = f"import sys, time; {said}; sys.stdin.readline(); {over}; print('other', file=sys.stderr)"
+    more = f"print('other', file=sys.stderr); print('stickslip: {LOADED}', file=sys.stderr)"
+    code = f"import sys, time; {said}; sys.stdin.readline(); {over}; {more}"
     started = processes.subprocess.Popen
 
     def instead(_words: list[str], **how: Any) -> Any:
@@ -65,14 +75,15 @@ def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys)
     monkeypatch.setattr(processes.subprocess, "Popen", instead)
     child = processes.Child("plant", [])
     until_s = time.monotonic() + 20.0
-    while not child.compiles and time.monotonic() < until_s:
+    assert child.still == processes.STARTS
+    while child.still != processes.COMPILES and time.monotonic() < until_s:
         time.sleep(0.01)
-    assert child.compiles
+    assert child.still == processes.COMPILES
     child.process.stdin.write("\n")
     child.process.stdin.close()
     assert child.process.wait(20) == 0
     child._reader.join(5.0)
-    assert not child.compiles
+    assert child.still == processes.READY
     told = capsys.readouterr().err
     assert f"{COMPILING}the plant" in told
     assert COMPILED not in told

@@ -1,6 +1,7 @@
 """`stickslip look`: one file, one answer, and what it writes."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -191,4 +192,81 @@ def test_a_torque_is_told_as_one(tmp_path: Path) -> None:
     turned.write_text(text.replace(";94,5", "").replace(";Normalkraft [N]", ""), encoding="latin-1")
     result = CliRunner().invoke(app, ["look", str(turned), "--json"])
     texts = " ".join(one["text"] for one in json.loads(result.stdout)["findings"])
-    assert "'Torque [N m]' is a torque: read N as N m" in texts
+    assert "'Torque [N m]' is a torque: the rig turns" in texts
+
+
+def after_a_rest(folder: Path, zero: float, names: str, *more: Any) -> Path:
+    """Stick-slip of a drive that begins after 2 s, on a sensor with a zero of its own."""
+    t_s = np.arange(0, 12, 2e-3)
+    way = np.maximum(t_s - 2.0, 0.0)
+    force_N = zero + np.where(way > 0.0, 10.0 + 4.0 * (way % 1.0), 0.0)
+    return table_of(folder / "rest.csv", names, t_s, force_N + 0.01 * np.sin(997.0 * t_s), *[one * way for one in more])
+
+
+@pytest.mark.parametrize(
+    ("zero", "told"), [(1.5, "is taken for the sensor's zero"), (9.0, "too much for a sensor's zero")]
+)
+def test_a_rest_at_the_beginning_is_the_zero_of_the_sensor(tmp_path: Path, zero: float, told: str) -> None:
+    seen = seen_in(after_a_rest(tmp_path, zero, "Time (s),Force (N)"), "--out", str(tmp_path / "map.toml"))
+    assert told in said(seen)
+    taken = zero if zero < 2.0 else 0.0
+    assert seen["numbers"]["static_force_N"]["value"] == pytest.approx(14.0 + zero - taken, abs=0.1)
+    written = (tmp_path / "map.toml").read_text()
+    assert (re.search(r"offset = -1\.(49|50)", written) is not None) == (taken > 0.0)
+
+
+def test_a_rig_that_turns_has_its_own_units(tmp_path: Path) -> None:
+    seen = seen_in(after_a_rest(tmp_path, 0.0, "Time (s),Torque (N m),Angle (rad)", 0.01))
+    units = {name: number["unit"] for name, number in seen["numbers"].items()}
+    assert (units["static_force_N"], units["stiffness_N_per_m"], units["slope_N_per_s"]) == ("N m", "N m/rad", "N m/s")
+    assert seen["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(400.0, rel=0.02)
+    path = after_a_rest(tmp_path, 0.0, "Time (s),Torque (N m)")
+    refused = CliRunner().invoke(app, ["look", str(path), "--speed", "0.5mm/s", "--json"])
+    assert "is a torque: must be a speed such as 10mrad/s or 5rpm" in json.loads(refused.stdout)["line"]
+
+
+LVM = (
+    "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\nY_Unit_Label\tkN\t\nDelta_X\t0.002\t\n"
+    "***End_of_Header***\t\t\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("file", "head", "row", "told"),
+    [
+        (
+            "bluehill.csv",
+            'Rate,"30 mm/min"\n\nTime,Load\n(s),(kN)\n',
+            "{t:.4f},{kN:.8f}\n",
+            "as no other column is one",
+        ),
+        ("klipper.csv", "#time,force_g\n", "{t:.4f},{g:.4f}\n", "is in g: times 0.00980665 to be in N"),
+        ("labels.lvm", LVM + "X_Value\tFriction\tComment\n", "\t{kN:.8f}\t\n", "line 4 is of units: kN"),
+        ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is told as a coefficient"),
+    ],
+)
+def test_what_a_machine_calls_its_columns_is_understood(
+    tmp_path: Path, file: str, head: str, row: str, told: str
+) -> None:
+    t_s, force_N, _ = saw_teeth()
+    rows = (row.format(t=t, N=f, kN=1e-3 * f, g=f / 9.80665e-3) for t, f in zip(t_s, force_N, strict=True))
+    (tmp_path / file).write_text(head + "".join(rows))
+    seen = seen_in(tmp_path / file)
+    static = seen["numbers"].get("static_force_N") or seen["numbers"]["mu_s"]
+    assert static["value"] == pytest.approx(16.0, abs=0.1)
+    assert seen["rate_Hz"] == pytest.approx(500.0, rel=1e-3)
+    assert told in said(seen)
+
+
+def test_beside_the_number_of_the_row_an_even_way_is_no_time(tmp_path: Path) -> None:
+    _, force_N, drive_mm = saw_teeth()
+    path = tmp_path / "halsampler.txt"
+    path.write_text("".join(f"{i} {f:.5f} {x:.6f} \n" for i, (f, x) in enumerate(zip(force_N, drive_mm, strict=True))))
+    refused = CliRunner().invoke(app, ["look", str(path), "--force", "2", "--json"])
+    assert (
+        'no time: which column is it, or how many rows a second are there? Add --time "NAME" or --rate 1kHz'
+        in json.loads(refused.stdout)["line"]
+    )
+    assert seen_in(path, "--force", "2", "--rate", "500Hz")["numbers"]["static_force_N"]["value"] == pytest.approx(
+        16.0, abs=0.1
+    )

@@ -1,6 +1,9 @@
 """What a soak makes of what it hears."""
 
 import math
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -49,3 +52,13 @@ def test_what_ran_to_its_end_without_a_loss_is_good() -> None:
 
 def test_two_points_are_no_slope() -> None:
     assert math.isnan(soak._memory("plant", [(0.0, 1.0), (1.0, 2.0)]).slope_MB_per_h)
+
+
+def test_a_process_that_has_ended_tells_no_memory() -> None:
+    """Its number stays until its parent looks, and its memory reads 0, which would bend the slope."""
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)
+    assert soak._resident(1.0, ended.pid) == []
+    ended.wait()
+    assert soak._resident(1.0, ended.pid) == []
+    assert soak._resident(1.0, os.getpid())[0][1] > 1.0

@@ -16,10 +16,11 @@ def test_lines_are_printed_in_order_and_all_before_the_end(capsys: pytest.Captur
     assert capsys.readouterr().err == "waiting  for a rig\nrunning  \\x1b[2J\n"
 
 
-def test_a_child_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_child_says_only_once_that_all_is_loaded(capsys: pytest.CaptureFixture[str]) -> None:
     with telling(quiet=True) as tell:
         tell("waiting", "for a rig")
-    assert capsys.readouterr().err == ""
+        tell("joined", "a rig")
+    assert capsys.readouterr().err == "stickslip: loaded\n"
 
 
 def test_a_terminal_that_stands_still_holds_up_nobody(monkeypatch: pytest.MonkeyPatch) -> None:

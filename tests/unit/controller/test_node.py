@@ -2,7 +2,9 @@
 
 import pytest
 
+from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import sealed, sensor_block
 from controller.codes import BLOCK, LATE
 from controller.node import ControllerNode
 from tests.unit.controller.test_process import CONFIG, block
@@ -32,3 +34,20 @@ def test_a_reset_forgets_a_pause_in_which_vibration_did_not_help() -> None:
             assert state["off_left_s"].min() > 59.0
     assert state["off_left_s"].max() == 0.0
     assert state["needless_from_mps"].max() == 0.0
+
+
+def test_a_block_that_was_changed_on_its_way_is_refused_and_counts_as_lost() -> None:
+    node = ControllerNode(CONFIG)
+    whole = [sealed(sensor_block(20).canonical(block(number), "sensors")) for number in range(3)]
+    assert node.block(block(0)) is not None  # a rig that gives no checksum
+    assert node.block(whole[1]) is not None
+    for at in (1, 10, 40, 200, 420, 430, 440, 452, 456):  # numbers, samples, the rig's state, the checksum and its tag
+        changed = bytearray(whole[2])
+        changed[at] ^= 0x10
+        with pytest.raises(Fault, match="BAD_MESSAGE"):
+            node.block(bytes(changed))
+    with pytest.raises(Fault, match="checksum"):
+        node.block(block(2))
+    assert node.last_block == 1
+    node.rig_was_away()
+    assert node.block(block(2)) is not None

@@ -18,7 +18,8 @@ from bridge.guard.codes import (
     OVERTRAVEL,
 )
 from bridge.guard.config import GuardConfig, HeatConfig, Level
-from bridge.guard.limits import exciter_gain, passes
+from bridge.guard.limits import exciter_gain, passes, watch
+from bridge.guard.records import FIRST
 from bridge.guard.senses import expect_drive
 from tests.unit.bridge.guard.rigs import EXCITER, NANO, Rig
 
@@ -86,6 +87,12 @@ def test_a_checked_gain_bounds_the_velocity_over_that_of_the_drive(gain: float) 
     settled(rig, amplitude_m, 4000.0)
     assert (rig.s.state, rig.s.limit) == (ACTIVE, DRIVE_RATIO)
     assert gain * TWO_PI * 4000.0 * rig.s.amplitude_m == pytest.approx(3.0 * 2.5e-4, rel=0.02)
+    assert rig.s.ratio_blocks > rig.p.window_blocks
+    rig.command(4000.0, 0.0)
+    rig.block(int(rig.s.block) - 1, 4000.0, 0.0)
+    rig.command(4000.0, amplitude_m)
+    rig.block(int(rig.s.block) - 1, 4000.0, amplitude_m)
+    assert rig.s.limit != DRIVE_RATIO  # held, and not told, for as long as a start of the drive is not seen
     rig.v_d_mps = 1.75e-4  # the ratio of the same command is 5 when the old velocity is forgotten
     rig.run(1500, 4000.0, amplitude_m)
     assert (rig.s.state, rig.s.cause) == (FAULT, DRIVE_RATIO)
@@ -154,6 +161,22 @@ def test_duty_is_the_share_of_the_time() -> None:
     assert (rig.s.state, rig.s.cause) == (FAULT, DUTY)
 
 
+def test_an_exciter_that_rests_counts_as_no_duty() -> None:
+    rig = Rig(GuardConfig(duty_window_s=0.5, loud_ratio=FREE))
+    rig.run(300)
+    before = float(rig.s.duty)
+    rig.run(500 + 30, amplitude_m=0.0)  # one time constant, after a ramp of 30 blocks
+    assert rig.s.duty == pytest.approx(before * math.exp(-1.0), rel=0.1)
+
+
+def test_a_machine_that_shakes_while_the_exciter_rests_is_not_loud() -> None:
+    rig = Rig()
+    for _ in range(300):
+        rig.s.vibration_mps = 1.0
+        rig.run(1, amplitude_m=0.0)
+    assert (rig.s.state, rig.s.limit) == (ARMED, NO_CAUSE)
+
+
 def test_by_default_no_duty_is_too_much() -> None:
     rig = Rig(GuardConfig(duty_window_s=0.01, loud_ratio=FREE))
     rig.run(1000)
@@ -213,3 +236,15 @@ def test_a_shake_that_is_over_soon_is_not_told_as_loud() -> None:
     assert (rig.s.state, rig.s.limit) == (ACTIVE, NO_CAUSE)
     rig.run(30)
     assert rig.s.limit == LOUD
+
+
+def test_a_loud_vibration_is_told_after_a_tenth_of_the_time_in_which_it_trips() -> None:
+    rig = Rig()
+    rig.run(90)
+    tenth = int(rig.p.hold_blocks[LOUD - FIRST]) // 10
+    told: list[int] = []
+    for _ in range(tenth + 1):
+        rig.s.limit, rig.s.vibration_mps = NO_CAUSE, 1.0
+        watch(rig.p, rig.s)
+        told.append(int(rig.s.limit))
+    assert told == [NO_CAUSE] * tenth + [LOUD]

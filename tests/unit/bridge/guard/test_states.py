@@ -1,8 +1,13 @@
 """The states of a rig, and the loop check that stands before ARMED."""
 
+import math
+from typing import Any
+
 import pytest
 
+from bridge.guard.check import follow_check, gain_change
 from bridge.guard.codes import (
+    ACCEPT_GAIN,
     ACTIVE,
     ARM,
     ARMED,
@@ -16,6 +21,9 @@ from bridge.guard.codes import (
     EXCITER_SILENT,
     EXCITER_WILD,
     FAULT,
+    FIRST_CHECK,
+    GAIN_ACCEPTED,
+    GAIN_CHANGED,
     LEAVE,
     LOUD,
     POWER_UP,
@@ -33,6 +41,7 @@ from bridge.guard.config import GuardConfig
 from bridge.guard.core import NO_COMMAND
 from bridge.guard.records import build
 from bridge.guard.states import enter, obey, trip
+from bridge.wire.messages import sensor_block
 from tests.unit.bridge.guard.rigs import EXCITER, Rig
 
 
@@ -111,14 +120,46 @@ def test_the_check_measures_the_gain_and_arms() -> None:
     for _ in range(500):
         rig.block(NO_COMMAND)
         assert (rig.s.state, rig.s.amplitude_m) == (CHECKING, 0.0)
-    for _ in range(5 * 200 + 10):  # the last tone fades before the rig is ARMED
+    rig.block(NO_COMMAND)
+    assert rig.s.amplitude_m > 0.0  # the first tone begins at once
+    for _ in range(5 * 200 + 9):  # the last tone fades before the rig is ARMED
         assert rig.s.state == CHECKING
         rig.block(NO_COMMAND)
     rig.block(NO_COMMAND)
-    assert (rig.s.state, rig.s.cause, rig.s.verified) == (ARMED, CHECK_PASSED, 1)
+    assert (rig.s.state, rig.s.cause, rig.s.verified) == (ARMED, FIRST_CHECK, 1)
+    assert rig.s.vibration_mps < 1e-6  # its own tones do not make what follows loud
     assert rig.s.amplitude_m == 0.0
     assert rig.s.gain[:5] == pytest.approx([0.7] * 5, rel=0.03)
     assert rig.p.tone_Hz[:5] == pytest.approx([1250.0, 2000.0, 2750.0, 3500.0, 4250.0])
+
+
+def after_a_check(rig: Rig, gain: float, word: int = ARM) -> tuple[int, int]:
+    """State and cause after a check at another gain."""
+    rig.gain = gain
+    assert obey(rig.s, word)
+    for _ in range(500 + 5 * 200 + 20):
+        rig.block(NO_COMMAND)
+    return int(rig.s.state), int(rig.s.cause)
+
+
+def test_a_check_that_finds_another_gain_asks_for_a_persons_word() -> None:
+    rig = Rig(arm=False)
+    assert after_a_check(rig, 1.0) == (ARMED, FIRST_CHECK)
+    for gain in (1.1, 1.2, 0.85):  # small changes are compared with what was accepted, and do not add up
+        obey(rig.s, DISARM)
+        assert after_a_check(rig, gain) == (ARMED, CHECK_PASSED)
+    assert rig.s.accepted[:5] == pytest.approx([1.0] * 5, rel=0.03)
+    obey(rig.s, DISARM)
+    assert after_a_check(rig, 0.5) == (READY, GAIN_CHANGED)
+    assert gain_change(rig.p, rig.s) == pytest.approx(2.0, rel=0.05)
+    assert after_a_check(rig, 0.5) == (READY, GAIN_CHANGED)  # the word ARM checks again
+    rig.block(NO_COMMAND)
+    assert rig.s.amplitude_m == 0.0
+    assert obey(rig.s, ACCEPT_GAIN)
+    assert (rig.s.state, rig.s.cause) == (ARMED, GAIN_ACCEPTED)
+    obey(rig.s, DISARM)
+    assert after_a_check(rig, 1.0, ACCEPT_GAIN) == (READY, GAIN_CHANGED)  # which begins a check, too
+    assert after_a_check(rig, 0.5) == (ARMED, CHECK_PASSED)
 
 
 def test_tones_keep_out_of_forbidden_bands() -> None:
@@ -150,6 +191,39 @@ def test_an_exciter_that_is_silent_or_wild_fails_the_check(gain: float, cause: i
     for _ in range(20):
         rig.block(NO_COMMAND)
     assert rig.s.amplitude_m == 0.0
+
+
+def test_an_exciter_that_is_wild_at_the_last_tone_alone_is_not_verified() -> None:
+    rig = Rig(arm=False)
+    obey(rig.s, ARM)
+    for block in range(500 + 5 * 200 + 20):
+        rig.gain = 1.0 if block < 500 + 4 * 200 else 25.0
+        rig.block(NO_COMMAND)
+        assert rig.s.verified == 0
+    assert (rig.s.state, rig.s.cause) == (FAULT, EXCITER_WILD)
+
+
+def test_a_channel_may_stand_for_part_of_the_quiet_time() -> None:
+    """A converter of few bits shows the same number for a while."""
+    rig = Rig(arm=False)
+    obey(rig.s, ARM)
+    for block in range(502):
+        rig.frozen = {"drive_force_N"} if block < 400 else set()
+        rig.block(NO_COMMAND)
+    assert rig.s.state == CHECKING
+
+
+def test_the_gain_is_that_of_the_second_half_of_a_tone() -> None:
+    """In the first half the exciter starts, and the base swings in."""
+    rig = Rig(arm=False)
+    block: Any = sensor_block(20).blank()[0]
+    for block_at in range(500 + 5 * 200):
+        block.drive_force_N[:] = block.mass_accel_mps2[:] = block.base_accel_mps2[:] = block_at
+        block.mass_position_m[:] = block.drive_position_m[:] = block_at
+        in_tone = (block_at - 500) % 200
+        follow_check(rig.p, rig.s, block, 4.0 if block_at >= 500 and in_tone >= 100 else 0.0)
+    omega = 2.0 * math.pi * rig.p.tone_Hz[:5]
+    assert rig.s.gain[:5] * omega**2 * rig.p.check_m == pytest.approx([2.0] * 5)
 
 
 def test_a_rig_that_a_person_armed_without_a_controller_is_disarmed_again() -> None:

@@ -39,6 +39,12 @@ def test_every_change_of_state_is_told_once_with_its_reason() -> None:
     assert teller.news(applied(fault)[0])[0][1].startswith("ACTIVE -> FAULT: LOUD: F: measured v_a beyond")
 
 
+def test_another_gain_is_an_event_of_its_own() -> None:
+    ready: dict[str, Any] = {"guard_state": wire.READY, "cause": wire.GAIN_CHANGED}
+    assert told(ARMED, ready, ready) == [["GUARD"], ["GUARD", "GAIN_CHANGED"], []]
+    assert told(ARMED, ready | {"cause": wire.CHECK_PASSED}) == [["GUARD"], ["GUARD"]]
+
+
 def test_missing_commands_are_told_when_they_stop_and_when_they_come_back_but_not_before_the_first() -> None:
     lost = ACTIVE | {"fallback": 1}
     assert told(ARMED, ACTIVE, lost, lost, ACTIVE, ACTIVE) == [["GUARD"], ["GUARD"], ["FALLBACK"], [], ["FRESH"], []]

@@ -150,7 +150,7 @@ def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pyt
 
     def obey(_bus: BusConfig, word: str) -> Obeyed:
         words.append(word)
-        return Obeyed("here", word, True, "FAULT", "STOP_BY_PERSON", "a person stopped it", 0.0, 0.1, "", False)
+        return Obeyed("here", word, True, "FAULT", "STOP_BY_PERSON", "a person stopped it", 0.0, 0.1, "", True, False)
 
     monkeypatch.setattr(person, "tell", obey)
 
@@ -168,15 +168,30 @@ def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pyt
     assert words == ["STOP"]
 
 
-def test_too_many_connections_are_closed_at_once(port: int) -> None:
-    held = [socket.create_connection(("127.0.0.1", port), timeout=5.0) for _ in range(server._MOST_CONNECTIONS)]
+def test_connections_that_say_nothing_keep_no_page_out(port: int) -> None:
+    request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()
+    half_open = [
+        socket.create_connection(("127.0.0.1", port), timeout=5.0) for _ in range(4 * server._MOST_CONNECTIONS)
+    ]
     try:
-        with pytest.raises((ConnectionResetError, AssertionError)):
-            assert raw(port, f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        assert b" 200 " in raw(port, request, timeout_s=server._OPEN_S / 2.0)
     finally:
-        for one in held:
+        for one in half_open:
             one.close()
-    assert b" 200 " in raw(port, f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+
+
+def test_where_all_connections_are_pages_the_next_is_closed_at_once(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "_MOST_CONNECTIONS", 2)
+
+    async def look() -> None:
+        async with page_of(port) as first, page_of(port) as second:
+            await next_of(first, "now")
+            await next_of(second, "now")
+            with pytest.raises((ConnectionResetError, AssertionError)):
+                assert await asyncio.to_thread(raw, port, b"GET / HTTP/1.1\r\n\r\n")
+            await next_of(first, "now")
+
+    asyncio.run(look())
 
 
 def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,7 +205,7 @@ def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.Mo
             armed.wait(5.0)
         if word == "RESET":
             raise Fault("NO_PEER", "nobody there\x1b[2J")
-        return Obeyed("here", word, True, "ARMED", "CHECK_PASSED", "", 0.0, 0.1, "", False)
+        return Obeyed("here", word, True, "ARMED", "CHECK_PASSED", "", 0.0, 0.1, "", True, False)
 
     monkeypatch.setattr(person, "tell", obey)
 

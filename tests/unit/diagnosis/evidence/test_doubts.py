@@ -59,8 +59,12 @@ def force_the_other_way(data: Columns) -> None:
     data["drive_force_N"] *= -1.0
 
 
-def wild_force(data: Columns) -> None:
+def no_value(data: Columns) -> None:
     data["drive_force_N"][[500, 700]] = -9999.0
+
+
+def wild(data: Columns) -> None:
+    data["mass_accel_mps2"][[500, 700]] = -2e5, 1.5e5
 
 
 def negative_vibration(data: Columns) -> None:
@@ -100,7 +104,8 @@ def slow_accelerometer(data: Columns) -> None:
         (mass_in_mm, "units", "mass_position_m: travels 1: the drive moves by 0.001 m", "mass_position_m", 4000),
         (twice_as_fast, "units", "moves at 0.001 m/s on average, drive_velocity_mps says 0.0005", "", 4000),
         (force_the_other_way, "sign", "drive_force_N: pulls against the drive's motion", "drive_force_N", 4000),
-        (wild_force, "wild", "drive_force_N: 2 samples are beyond 5214, first row 501: -9999; not used", "", 3998),
+        (no_value, "outlier", "2 outliers, first row 501 = -9999: no measurement; left out", "", 3998),
+        (wild, "wild", "mass_accel_mps2: 2 samples are beyond 100000, first row 501: -200000; not used", "", 3998),
         (negative_vibration, "sign", "vibration_amplitude_m: 4000 samples are negative", "", 4000),
         (slow_accelerometer, "rate", "mass_accel_mps2: 2000 Hz, below 8000 Hz: how strongly it vibrates", "", 4000),
     ],

@@ -315,3 +315,28 @@ def test_a_log_tells_what_it_cannot_hold(tmp_path: Path) -> None:
     findings = import_file(source, channel_map, tmp_path / "made.mcap").findings
     told = [one.where for one in findings if "import it into a folder" in one.text]
     assert told == [f"{source.name}: vibration_frequency_Hz", f"{source.name}: vibration_amplitude_m"]
+
+
+@pytest.mark.parametrize("sentinel", [-9999.0, 1e30, 2047.0])
+def test_what_stands_for_no_value_is_left_out_and_told(tmp_path: Path, sentinel: float) -> None:
+    source, channel_map = setup(tmp_path, ".parquet")
+    data = raw()
+    data["F"] = np.where(np.isin(np.arange(ROWS), [70, 71, 900]), sentinel, data["F"])
+    write_raw(source, data)
+    done = import_file(source, channel_map, tmp_path / "evidence")
+    told = {one.kind: one for one in done.findings}
+    assert (told["outlier"].times, told["not-finite"].times) == (3, 3)
+    assert f"3 outliers, first row 71 = {sentinel:.6g}: no measurement; left out" in told["outlier"].text
+    assert "drive_force_N" in told["not-finite"].where
+    assert np.isnan(pq.read_table(tmp_path / "evidence" / "measured.parquet")["drive_force_N"].to_numpy()).sum() == 3
+
+
+def test_a_force_with_the_other_sign_is_offered_in_a_line_that_can_be_copied(tmp_path: Path) -> None:
+    source, channel_map = setup(tmp_path, ".parquet")
+    for name, scale in (("turned", -0.5), ("right", 0.5)):
+        channel_map.write_text(
+            MAP.replace("scale = 0.5", f"scale = {scale}").replace("offset = 1.0", f"offset = {2.0 * scale}")
+        )
+        told = {one.kind: one.text for one in import_file(source, channel_map, tmp_path / name).findings}
+        line = 'under [channels] write drive_force_N = { column = "F", scale = 0.5, offset = 1.0 }'
+        assert (line in told.get("sign", "")) == (name == "turned")

@@ -7,10 +7,10 @@ import pytest
 
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.fits.batch import together
-from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
-from diagnosis.fits.screening import Origin, screened
+from diagnosis.fits.gauss_newton import Fitter
+from diagnosis.fits.screening import screened
 from diagnosis.fits.search import refitted
-from diagnosis.gap.floor import KNEE, Floor, floor_of, replicates
+from diagnosis.gap.floor import Floor, floor_of, replicates
 from diagnosis.gap.measure import differences, gap
 from diagnosis.gap.prepare import prepare
 from diagnosis.gap.problem import Problem
@@ -36,10 +36,8 @@ def test_the_offset_that_a_rigid_model_without_one_leaves(tmp_path: Path) -> Non
 
     fitter, judge = Fitter(fitted, floor(fitted), nuisances), floor(held_out)
     retuned = together(fitter.predicted_many, [fitter.retuning(np.zeros(len(nuisances)))])[0]
-    described = fitter.described(np.zeros(len(nuisances)))
     offsets = [trial for trial in trials(fitted) if "force-sensor-bias" in trial.hypothesis.forms]
-    origins = [Origin(retuned, KNEE), Origin(described, FAR_KNEE)]
-    with_bias = refitted(fitter, origins, screened(fitter, origins, offsets))[0]
+    with_bias = refitted(fitter, retuned.chi2, screened(fitter, retuned, offsets))[0]
     gaps = [
         gap(judge, differences(judge, held_out, held_out.predicted(nuisances.point(fit.deviations, fit.effects))))
         for fit in (retuned, with_bias)

@@ -1,5 +1,7 @@
 """Refits: an effect that changes a number of the rig table takes over what that number was moved by."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from diagnosis.fits.batch import together
 from diagnosis.fits.fit import step_within
 from diagnosis.fits.gauss_newton import Fitter
 from diagnosis.gap.floor import floor_of, replicates
-from diagnosis.gap.problem import Problem
+from diagnosis.gap.problem import OutOfTimeError, Problem
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.nuisances import Nuisances
 from diagnosis.hypotheses.trials import trials
@@ -42,6 +44,17 @@ def test_a_level_takes_over_what_its_number_was_moved_by(fitter):
     # with a derivative for each, -0.066 and -1.3
     assert fit.hypothesis.tables(fit.w)["static-level"]["ratio"] == pytest.approx(-0.1, abs=0.003)
     assert abs(fit.deviations[static]) < 0.2
+
+
+def test_a_prediction_that_would_end_too_late_is_not_begun(fitter):
+    problem, (point,) = fitter.problem, [fitter.nuisances.point(np.full(len(fitter.nuisances), 0.1), {})]
+    assert 0.0 < problem.pace < 60.0
+    problem.until_s = time.monotonic() + 100.0
+    problem.pace = 1e3
+    with pytest.raises(OutOfTimeError):
+        problem.predicted(point)
+    problem.pace = 0.0
+    assert np.isfinite(problem.predicted(point)).any()
 
 
 def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):

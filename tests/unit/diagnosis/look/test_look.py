@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.look.look import Known, look
+from diagnosis.look.look import Known, Look, look
 from diagnosis.look.words import cannot_tell
 from plant.config import RigConfig
 from plant.simulate import simulate
@@ -114,23 +114,36 @@ def test_both_directions_and_a_gap_count_as_parts() -> None:
     assert gap.numbers["period_s"].value == pytest.approx(period_s, rel=1e-3)
 
 
-def test_friction_over_speed_and_over_stick_time() -> None:
-    """Three speeds, and a breakaway force that rises by 1 N a decade of stick time."""
+def ageing(speeds_mps: tuple[float, ...], halts_s: tuple[float, ...]) -> Look:
+    """Slips at each speed, after each halt, with a breakaway force that rises by 1 N a decade of stick time."""
     stiffness, pieces, way, place = 10000.0, [], [], 0.0
-    for speed_mps in (2e-4, 5e-4, 2e-3):
-        for _ in range(8):
-            stick_s = 2.0 / (stiffness * speed_mps)
-            top = 12.0 + np.log10(stick_s)
-            climb = np.arange(0, stick_s, 1e-3)
-            fall = np.linspace(0, np.pi, 31)
-            pieces += [np.linspace(10.0, top, len(climb)), 10.0 + 0.5 * (top - 10.0) * (1 + np.cos(fall))]
-            way.append(place + speed_mps * 1e-3 * np.arange(1, len(climb) + len(fall) + 1))
+    for speed_mps in speeds_mps:
+        for halt_s in halts_s * 4:
+            top, rate_N_per_s = 13.0, stiffness * speed_mps
+            for _ in range(9):  # the stick is longer where its end is higher
+                top = 13.0 + np.log10((top - 10.0) / rate_N_per_s + halt_s)
+            climbs = [np.arange(begin, end, 1e-3 * rate_N_per_s) for begin, end in ((10.0, 11.0), (11.0, top))]
+            halt, fall = np.full(round(1e3 * halt_s), 11.0), np.linspace(0, np.pi, 31)
+            pieces += [climbs[0], halt, climbs[1]]
+            pieces.append(10.0 + 0.5 * (top - 10.0) * (1 + np.cos(fall)))
+            moves = np.concatenate([np.ones(len(climbs[0])), 0.0 * halt, np.ones(len(climbs[1]) + len(fall))])
+            way.append(place + speed_mps * 1e-3 * np.cumsum(moves))
             place = way[-1][-1]
     force_N, position_m = np.concatenate(pieces), np.concatenate(way)
     seen = look(1e-3 * np.arange(len(force_N)), force_N, position_m)
     assert seen is not None
+    return seen
+
+
+def test_friction_over_speed_and_over_stick_time() -> None:
+    """A stick that lasts long because the drive is slow tells nothing of the time alone; a halt of the drive does."""
+    seen = ageing((2e-4, 5e-4, 2e-3), (0.0, 0.0))
     assert [round(1e3 * one.speed_mps, 1) for one in seen.at_speeds] == [0.2, 0.5, 2.0]
-    assert seen.numbers["dwell_N_per_decade"].value == pytest.approx(1.0, rel=0.05)
+    assert "dwell_N_per_decade" not in seen.numbers
+    assert any("may be one on the speed; stop the drive" in line for line in cannot_tell(seen))
+    halted = ageing((5e-4,), (0.0, 1.0, 4.0))
+    assert halted.numbers["dwell_N_per_decade"].value == pytest.approx(1.0, rel=0.05)
+    assert halted.numbers["stiffness_N_per_m"].value == pytest.approx(1e4, rel=0.1)
 
 
 def test_a_triangle_and_a_reversal_are_no_slips() -> None:

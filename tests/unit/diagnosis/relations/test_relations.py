@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis.relations.answer import Relations, relations_of
-from diagnosis.relations.decide import Decision, decision_of
+from diagnosis.relations.decide import Decision, decision_of, ruled_out
 from tests.unit.diagnosis.relations.kinematic import BLOCK_S, STIFFNESS_N_PER_M, Signals, rig, runs
 
 T_S = (np.arange(8000) + 0.5) * BLOCK_S
@@ -12,7 +12,7 @@ T_S = (np.arange(8000) + 0.5) * BLOCK_S
 
 def answer(cause=None) -> tuple[Relations, Decision]:
     found = relations_of(rig(), runs(cause))
-    return found, decision_of(found)
+    return found, decision_of(found, rig())
 
 
 def test_without_a_cause_nothing_is_named_and_the_noise_is_that_of_the_sensors():
@@ -75,6 +75,16 @@ def test_a_cause_is_named_by_its_relation_alone(cause, name: str, relation: str)
     assert share.null_90 < share.interval_90[0] <= share.share <= share.interval_90[1] <= 1.0
 
 
+def test_effects_that_their_relation_does_not_show_are_ruled_out():
+    without = ruled_out(*answer())
+    assert {"drive-hardening", "force-sensor-drift", "drive-speed-ripple"} <= without
+    # the relation of the exciter knows a few frequencies only, and friction is in none
+    assert not {"piezo-sag", "piezo-roll-off", "coulomb-level", "base-compliance"} & without
+    beside_a_drift = ruled_out(*answer(drifts))
+    assert "force-sensor-drift" not in beside_a_drift
+    assert {"drive-hardening", "drive-damping"} <= beside_a_drift
+
+
 def test_the_size_of_a_drift_is_near_the_true_one():
     found, _ = answer(drifts)
     spring = found.answered[0]
@@ -96,6 +106,10 @@ def is_logged_apart(_: int, signals: Signals) -> None:
     signals["drive_force_N"] = np.interp(T_S * (1.0 + 4e-4), T_S, signals["drive_force_N"])
 
 
+def is_early(_: int, signals: Signals) -> None:
+    signals["drive_force_N"] = np.interp(T_S + 2e-3, T_S, signals["drive_force_N"])
+
+
 def drops_out(number: int, signals: Signals) -> None:
     for first in np.random.default_rng(number).integers(0, 7900, 12):
         signals["drive_force_N"][first : first + 10] *= 0.9
@@ -107,6 +121,7 @@ def drops_out(number: int, signals: Signals) -> None:
         (saturates, "spring", "force-amplifier: from 1"),
         (runs_fast, "motion", "acceleration-clock: in each run"),
         (is_logged_apart, "spring", "logger-clock: runs apart"),
+        (is_early, "spring", "logger-clock: force 2 ms early"),
         (drops_out, "spring", "in bursts"),
     ],
 )
@@ -125,6 +140,15 @@ def test_a_pattern_that_no_column_explains_is_told_with_its_variable():
     _, decision = answer(steps)
     assert [(one.relation, one.what) for one in decision.outside] == [("spring", "over the extension")]
     assert decision.outside[0].size == pytest.approx(0.05 / np.sqrt(2.0), rel=0.3)
+
+
+def test_an_unevenness_too_small_to_pull_is_not_named_however_well_it_shows():
+    def by_nanometres(_: int, signals: Signals) -> None:
+        signals["drive_position_m"] += 7e-9 * np.sin(2.0 * np.pi * signals["drive_position_m"] / 1e-3)
+
+    found, decision = answer(by_nanometres)
+    assert found.answered[2].chosen.evidence > 50.0
+    assert decision == Decision((), ())
 
 
 def test_a_size_that_differs_between_runs_takes_the_name_back():

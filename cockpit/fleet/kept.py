@@ -1,0 +1,71 @@
+"""Results that are kept in the folder of a fleet: one for each content of an evidence folder and version of the diagnosis."""
+
+import hashlib
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from bridge.files import read_json, write_whole
+from diagnosis.evidence.manifest import MANIFEST, read_manifest
+from diagnosis.result import Diagnosis
+
+FORMAT = "fleet-result/1"
+RESULTS = "results"  # in the folder of a fleet
+
+
+def evidence_files(folder: Path) -> list[Path]:
+    """The manifest and the files of the runs, each once. Raises Fault BAD_EVIDENCE."""
+    runs = dict.fromkeys(run.file for run in read_manifest(folder).run)  # several may be parts of one file
+    return [folder / MANIFEST, *(folder / file for file in runs)]
+
+
+def digest_of(folder: Path, tool: str, budget_s: float | None) -> str:
+    """SHA-256 over the files of an evidence, the version of the diagnosis and the time it may take.
+
+    Not over the folder's name, nor the times of its files. Raises Fault BAD_EVIDENCE, OSError.
+    """
+    parts = [
+        tool,
+        str(budget_s),
+        *(_sha256(path) for path in evidence_files(folder)),
+    ]  # the manifest has the files' names
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def keep(fleet: Path, digest: str, diagnosis: Diagnosis, report: str) -> None:
+    """Keep a result, whose report is written: it counts only together with this report. Raises Fault LOG_WRITE, OSError."""
+    table = {
+        "format": FORMAT,
+        "report": report,
+        "report_sha256": _sha256(fleet / report),
+        "diagnosis": _adapter().dump_python(diagnosis._replace(pictures=()), mode="json"),
+    }
+    write_whole(_place(fleet, digest), json.dumps(table) + "\n")  # with NaN and infinity, which strict JSON loses
+
+
+def kept(fleet: Path, digest: str) -> tuple[Diagnosis, str] | None:
+    """A result, without its pictures, and the file of its report; None where there is none that is whole."""
+    try:
+        table: dict[str, Any] = read_json(_place(fleet, digest))
+        if table["format"] != FORMAT or _sha256(fleet / table["report"]) != table["report_sha256"]:
+            return None
+        return _adapter().validate_python(table["diagnosis"]), table["report"]
+    except (OSError, ValueError, TypeError, KeyError, ValidationError):
+        return None
+
+
+def _place(fleet: Path, digest: str) -> Path:
+    return fleet / RESULTS / f"{digest}.json"
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@cache
+def _adapter() -> TypeAdapter[Diagnosis]:
+    return TypeAdapter(Diagnosis, config=ConfigDict(arbitrary_types_allowed=True, ser_json_inf_nan="constants"))

@@ -1,0 +1,50 @@
+"""A healthy rig that a person arms: no word of a fault is said at its starts, stops and checks, and it vibrates as it should."""
+
+import numpy as np
+import pytest
+
+from bridge.guard.tell import Teller
+from bridge.guard.tell import changes as guard_changes
+from bridge.wire import stickslip_pb2 as wire
+from cockpit.run.closed_loop import Blocks, ClosedLoop
+from cockpit.run.scenario import load_scenario
+from controller.trips.tell import TripTeller, changes
+
+ARM, DISARM = wire.Operator.ARM, wire.Operator.DISARM
+
+
+def played(name: str, seconds: float, words: dict[float, int]) -> tuple[set[str], list[Blocks]]:
+    """What guard and controller say in a run in which a person says `words`, at these times, and its blocks."""
+    scenario = load_scenario(name, ["controller.policy.enabled_from_s=0.0"])
+    loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, arm=False)
+    block_s = scenario.rig.solver.block_s
+    guard, trips = Teller(), TripTeller()
+    said: set[str] = set()
+    parts: list[Blocks] = []
+    for at_s, ends_s in zip(words, [*list(words)[1:], seconds], strict=True):
+        if loop.block < round(at_s / block_s):
+            parts.append(loop.advance(round(at_s / block_s) - loop.block))
+        loop.obey(words[at_s])
+        parts.append(loop.advance(round(ends_s / block_s) - loop.block))
+    for part in parts:
+        said |= {code for row in guard_changes(part.applied) for code, _ in guard.news(part.applied[row])}
+        said |= {code for row in changes(part.trace) for code, _ in trips.news(part.trace[row])}
+    slips = np.concatenate([part.trace["slips"] for part in parts]).astype(np.int64)
+    speeds_mps = np.concatenate([part.trace["drive_velocity_mps"] for part in parts])
+    if ((np.diff(slips) > 0) & (speeds_mps[1:] == 0.0)).any():
+        said.add("DRIVE_UNSEEN")
+    return said - {"GUARD"}, parts
+
+
+@pytest.mark.parametrize("name", ["belt-axis", "ball-screw-axis"])
+@pytest.mark.parametrize("at_s", [0.02, 4.02, 8.6])  # in a move, and before and in a dwell
+def test_strokes_to_and_fro_are_no_fault(name: str, at_s: float) -> None:
+    said, _ = played(name, 15.0, {at_s: ARM})
+    assert said == set()
+
+
+def test_a_rig_that_is_armed_again_vibrates_as_before() -> None:
+    said, parts = played("from-the-start", 5.5, {0.02: ARM, 2.5: DISARM, 2.6: ARM})
+    assert said == set()
+    before, after = (part.trace["vibration_velocity_mps"][-1000:] for part in (parts[1], parts[-1]))
+    assert np.median(after) == pytest.approx(np.median(before), rel=0.1)

@@ -1,0 +1,144 @@
+"""A person's word: whose it was, what came of it, and what is said of a rig that does not answer."""
+
+import socket
+from collections.abc import Callable
+from typing import Any, Self
+
+import pytest
+
+from bridge.faults import FAULTS, Fault
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.inbox import Received
+from bridge.wire.payloads import parsed
+from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT, Topic
+from bridge.wire.zenoh_link import BusConfig, stands_still
+from cockpit.run import operator
+from tests.system.ports import free_endpoint
+
+READY, ARMED, DISARMED, FAULT = wire.READY, wire.ARMED, wire.DISARMED, wire.FAULT
+
+
+class Rig:
+    """A bus with a rig whose `answer` to a word is a list of messages; `begins` with others."""
+
+    def __init__(self, begins: list[Any], answer: Callable[[wire.Operator], list[Any]]) -> None:
+        self.words: list[wire.Operator] = []
+        self._begins, self._answer = begins, answer
+        self._listeners: dict[str, Callable[[Received], None]] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def listen(self, topic: Topic, receive: Callable[[Received], None]) -> None:
+        self._listeners[topic.name] = receive
+
+    def publisher(self, _topic: Topic) -> Callable[[bytes], None]:
+        def send(payload: bytes) -> None:
+            self.words.append(parsed(wire.Operator, payload, OPERATOR.name))
+            self._say(self._begins if len(self.words) == 1 else [])
+            self._say(self._answer(self.words[-1]))
+
+        return send
+
+    def wait_for(self, _roles: list[str], _timeout_s: float) -> set[str]:
+        return set()
+
+    def _say(self, messages: list[Any]) -> None:
+        for message in messages:
+            topic = APPLIED if isinstance(message, wire.Applied) else PLANT_EVENT
+            self._listeners[topic.name](Received(topic, message.SerializeToString(), 0))
+
+
+def applied(state: int, cause: int = wire.POWER_UP, amplitude_m: float = 0.0) -> wire.Applied:
+    return wire.Applied(guard_state=state, cause=cause, amplitude_m=amplitude_m)
+
+
+def taken(word: wire.Operator, name: str) -> wire.Event:
+    return wire.Event(code="OPERATOR", text=f"{name} by {word.who}", source="plant")
+
+
+@pytest.fixture
+def say(monkeypatch: pytest.MonkeyPatch) -> Callable[[Rig, str], operator.Obeyed]:
+    for name, seconds in (("_ANSWER_S", 0.4), ("_AGAIN_S", 0.1), ("_SILENT_S", 0.2), ("_REFUSED_S", 0.05)):
+        monkeypatch.setattr(operator, name, seconds)
+
+    def call(rig: Rig, word: str) -> operator.Obeyed:
+        monkeypatch.setattr(operator, "Bus", lambda *_args, **_more: rig)
+        return operator.tell(BusConfig(), word)
+
+    return call
+
+
+def test_a_word_that_the_rig_took_and_did_is_done(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+    rig = Rig([applied(DISARMED)], lambda word: [taken(word, "ARM"), applied(ARMED, wire.CHECK_PASSED)])
+    obeyed = say(rig, "ARM")
+    assert (obeyed.done, obeyed.taken, obeyed.state, len(rig.words)) == (True, True, "ARMED", 1)
+
+
+def test_a_rig_that_falls_silent_is_not_told_by_what_it_said_before(
+    say: Callable[[Rig, str], operator.Obeyed],
+) -> None:
+    """A cut link leaves the last message from before, which shows the very state that the word asks for."""
+    with pytest.raises(
+        Fault, match=r"said nothing for .* before that ARMED with no vibration: must answer ARM"
+    ) as raised:
+        say(Rig([applied(ARMED, wire.CHECK_PASSED)], lambda _word: []), "ARM")
+    assert raised.value.kind is FAULTS["NO_PEER"]
+
+
+def test_an_answer_to_another_word_is_none_to_this_one(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+    """Somebody else's word, and an earlier one of this process, end in the state that is asked for."""
+    other = wire.Operator(who="somebody else")
+    obeyed = say(Rig([], lambda _word: [taken(other, "RESET"), applied(DISARMED)] * 3), "RESET")
+    assert (obeyed.done, obeyed.taken) == (False, False)
+    assert "warning  the rig did not say that it took this word: say it again" in obeyed.in_words()
+
+
+def test_what_the_rig_did_before_it_took_the_word_does_not_count(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+    """A rig that is armed is checked anew where its exciter was not; the message before the check shows it armed."""
+    answers = [[applied(ARMED, wire.CHECK_PASSED)], []]
+
+    def answer(word: wire.Operator) -> list[Any]:
+        return [*answers.pop(0), *([] if answers else [taken(word, "ARM"), applied(FAULT, wire.EXCITER_SILENT)])]
+
+    obeyed = say(Rig([], answer), "ARM")
+    assert (obeyed.done, obeyed.taken, obeyed.cause) == (False, True, "EXCITER_SILENT")
+
+
+def test_two_words_of_one_process_are_two(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+    rigs = [Rig([], lambda word: [taken(word, "RESET"), applied(DISARMED)]) for _ in range(2)]
+    assert all(say(rig, "RESET").done for rig in rigs)
+    assert rigs[0].words[0].who != rigs[1].words[0].who
+
+
+@pytest.mark.parametrize(
+    ("answer", "line"),
+    [
+        (applied(wire.ACTIVE, amplitude_m=37e-9), "ACTIVE with a vibration of 37 nm after a stop: must be at rest"),
+        (applied(FAULT, wire.STOP_BY_PERSON, 1e-9), "FAULT with a vibration of 1 nm after a stop"),
+    ],
+)
+def test_a_stop_that_does_not_stop_is_a_fault(
+    say: Callable[[Rig, str], operator.Obeyed], answer: wire.Applied, line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(operator, "_SILENT_S", 10.0)
+    with pytest.raises(Fault, match=line):
+        say(Rig([], lambda word: [taken(word, "STOP"), answer]), "STOP")
+
+
+def test_a_rig_that_rests_by_a_stop_is_stopped_whoever_said_it(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+    assert say(Rig([], lambda _word: [applied(FAULT, wire.STOP_BY_PERSON)]), "STOP").done
+
+
+def test_what_listens_and_does_not_read_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = BusConfig(endpoint=free_endpoint())
+    assert not stands_still(config)
+    with socket.create_server(("127.0.0.1", config.port)):
+        assert stands_still(config)
+        monkeypatch.setattr(operator, "_DIAL_S", 0.2)
+        with pytest.raises(Fault, match=r"stands still .* hears no STOP: must run; take it that it goes on") as raised:
+            operator.tell(config, "STOP")
+    assert raised.value.kind is FAULTS["NO_PEER"]
