@@ -11,6 +11,7 @@ from controller.codes import BLOCK, LATE
 from controller.estimate.contact import contact
 from controller.estimate.learning import begin, forces, spring, stiffness
 from controller.estimate.motion import drive_velocity
+from controller.estimate.spikes import find_spikes, learn_bends, sum_without
 from controller.estimate.windows import BINS, DRIVE, FORCE, MOST_FRESH, SLIDE, begin_anew, note_steps, push
 from controller.limits import allow
 from controller.needs.need import way_of
@@ -58,7 +59,7 @@ def step(
         s.block = block.sequence
         s.run, s.guard_state = block.run, block.guard_state
         note_check(p, s, float(block.check_Hz), float(block.check_gain))
-        usable = _is_usable(p, block)
+        usable = find_spikes(p, s, block)
         s.missing_blocks += gap_blocks if usable else gap_blocks + 1
         if usable:
             if s.missing_blocks > 0:
@@ -135,32 +136,9 @@ def _begin(p: Record, s: Record) -> None:
     s.level, s.swing_level = -1, -1
     s.growth = FIRST_SHARE
     s.demodulated_Hz = 0.0
+    s.tail[:, :], s.spike_at[:] = math.nan, -1
     for way in range(2):
         s.ratio[way] = p.v_ratio
-
-
-@kernel
-def _is_usable(p: Record, block: Record) -> bool:
-    """Whether every sample is a number: NaN or infinity would stay in the filters for ever, so such a block counts as lost.
-
-    A channel that the configuration leaves out is not looked at.
-    """
-    bad = _not_finite(block.drive_position_m) + _not_finite(block.base_accel_mps2)
-    if p.use_force == 1:
-        bad += _not_finite(block.drive_force_N)
-    if p.use_slide_position == 1:
-        bad += _not_finite(block.mass_position_m)
-    return bad == 0
-
-
-@kernel
-def _not_finite(samples: Record) -> int:
-    """How many are no number; counted without a branch, as eight at once are."""
-    bad = 0
-    for i in range(samples.shape[0]):
-        value = float(samples[i])
-        bad += 1 if value - value != 0.0 else 0
-    return bad
 
 
 @kernel
@@ -173,6 +151,10 @@ def _mean(p: Record, s: Record, block: Record, first: int, samples: int) -> tupl
             force_N += float(block.drive_force_N[i])
         if p.use_slide_position == 1:
             slide_m += float(block.mass_position_m[i])
+    if s.spiked == 1:
+        drive_m = sum_without(s, DRIVE, block.drive_position_m, first, samples)
+        force_N = sum_without(s, FORCE, block.drive_force_N, first, samples) if p.use_force == 1 else 0.0
+        slide_m = sum_without(s, SLIDE, block.mass_position_m, first, samples) if p.use_slide_position == 1 else 0.0
     force_N, slide_m, drive_m = force_N / samples, slide_m / samples, drive_m / samples
     if p.use_force == 0:
         force_N = spring(s, drive_m - slide_m)
@@ -210,6 +192,7 @@ def _look(p: Record, s: Record, block: Record) -> float:
         note_steps(s, FORCE, block.drive_force_N)
         note_steps(s, SLIDE, block.mass_position_m)
         note_steps(s, DRIVE, block.drive_position_m)
+        learn_bends(p, s, s.steps // _STEPS_LOOK, block)
     tick_s = p.bins_per_tick * p.bin_s
     total_N, at = 0.0, 0
     slip_began, stick_began = 0, 0

@@ -23,9 +23,8 @@ from controller.trips.tell import TripTeller
 
 _ANEW_BLOCKS = 1024  # that count as lost before the first block of a rig that was restarted: every window begins anew
 _MOST_GAP_BLOCKS = 1 << 20  # lost blocks that are counted at once; more do not fit into a trace
-_WRONG_LENGTHS = (
-    3  # blocks in a row of one wrong length from which the rig's blocks have that length, and no clock jumped
-)
+# Blocks in a row of one wrong length from which the rig's blocks have that length, and no clock jumped
+_WRONG_LENGTHS = 3
 _FASTEST_MPS = 100.0  # of a drive; an announcement beyond it is no velocity
 
 

@@ -64,9 +64,8 @@ _RISING = 1.05  # held over measured v_d up to which the drive does not slow dow
 _ABOVE_SLIDE = 1.1  # v_a over v_s of a slide that is late
 _TURNING_S = 0.05  # that a drive stands at most where it turns
 _STARTING_S = 0.15  # of a vibration in which the contact still lets go of what it held
-_REAL_STICK = (
-    0.25  # of the expected stick, after which the force is 5 % up: from then on it contradicts that none is needed
-)
+# Of the expected stick, after which the force is 5 % up: from then on it contradicts that none is needed
+_REAL_STICK = 0.25
 _CALM_SHARE = 6.0  # sticks, as long as expected, without an event until the vibration counts as one that helps
 _LEAST_CALM_S, _MOST_CALM_S = 0.5, 4.0
 _LOOK_STEPS = 16  # blocks for one look at which windows show a swing

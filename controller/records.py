@@ -18,6 +18,7 @@ from controller.config import (
     candidate_frequencies_Hz,
     forbidden_bands_Hz,
 )
+from controller.estimate.spikes import BENDS
 from controller.estimate.windows import BINS, LEVELS, MOST_FRESH, ROWS
 from controller.trips import band, confirmed, delivered, doubts, frozen, spring
 
@@ -32,7 +33,7 @@ def _divisor(count: int, wanted: float) -> int:
 
 
 _PARAMS_FLOATS = (
-    *("block_s", "sample_s", "bin_s", "drive_stiffness_N_per_m", "least_feed_mps"),
+    *("block_s", "sample_s", "bin_s", "spike_bends", "drive_stiffness_N_per_m", "least_feed_mps"),
     *("first_probe_s", "probe_every_s", "probe_every_max_s", "probe_fade_s", "probe_hold_s"),
     *("least_ratio", "most_ratio", "start_s", "settle_s"),
     *("filter_share", "learn_share", "accel_bandwidth_Hz", "accel_range_mps2"),
@@ -88,6 +89,14 @@ STATE = np.dtype(
         ("pushed", "i8", (LEVELS,)),
         ("differences", "i8", (LEVELS,)),  # that sigma was learnt from
         ("resolution", "f8", (ROWS,)),
+        # samples that stand alone
+        ("bends", "f8", (ROWS,)),  # from sample to sample, mean; 0: unknown
+        ("most_bend", "f8", (ROWS,)),  # more bends a spike
+        ("tail", "f8", (ROWS, 2)),  # last two samples of the block before; no numbers: unknown
+        ("spiked", "i8"),  # whether any channel has a spike in this block
+        ("spike_at", "i8", (ROWS,)),  # sample of it; -1: none
+        ("spike", "f8", (ROWS,)),  # what takes its place
+        ("spike_step", "i8", (ROWS,)),  # of the last one
         # motion
         ("drive_velocity_mps", "f8"),
         ("drive_velocity_sigma_mps", "f8"),
@@ -305,6 +314,7 @@ def build(config: ControllerConfig) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]
     p.samples_per_block = config.samples_per_block
     p.bin_samples = _divisor(config.samples_per_block, _BIN_S / p.sample_s)
     p.bin_s = p.bin_samples * p.sample_s
+    p.spike_bends = BENDS * math.sqrt(p.bin_samples)
     bins = config.samples_per_block // p.bin_samples
     p.bins_per_tick = _divisor(bins, _TICK_S / p.bin_s)
     p.ticks_per_block = bins // p.bins_per_tick

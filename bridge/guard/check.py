@@ -19,6 +19,7 @@ from bridge.kernel import Record, kernel
 _TWO_PI = 2.0 * math.pi
 _QUIET_S = 0.5  # in which the sensors are listened to; a 16-bit converter shows some noise in it
 _TONE_S = 0.2  # a tone; its first half is the exciter's start
+_NOISY = 3  # channels with noise, the first; a place of an encoder repeats its number while it stands
 _HEARD = 4.0  # power of the tone over that of the noise from which it counts as heard
 _WILD = 20.0  # factor either way of the rigid mount's gain; a mount may resonate tenfold
 
@@ -75,7 +76,7 @@ def follow_check(p: Record, s: Record, block: Record, square_mps2: float) -> Non
     if at < 0:
         s.quiet_mps2 += square_mps2 / quiet_blocks
         if s.check_blocks == quiet_blocks:
-            for channel in range(s.lowest.shape[0]):
+            for channel in range(_NOISY):
                 if s.lowest[channel] == s.highest[channel]:
                     s.frozen_channel = channel
                     trip(s, SENSOR_FROZEN)

@@ -87,5 +87,6 @@ def watch(p: Record, s: Record) -> None:
         s.loud_blocks = 0
         return
     s.loud_blocks += 1
-    if _TOLD_PARTS * s.loud_blocks <= p.hold_blocks[LOUD - FIRST]:
-        s.limit = told  # a machine that stops shakes its base for a moment
+    starts = s.vibration_mps <= p.alarm[LOUD - FIRST] * s.fastest_mps  # the drive, whose velocity is seen late
+    if starts or _TOLD_PARTS * s.loud_blocks <= p.hold_blocks[LOUD - FIRST]:
+        s.limit = told  # or a machine that stops shakes its base for a moment

@@ -62,7 +62,7 @@ STATE = np.dtype(
     + [
         (name, "f8")
         for name in (
-            *("frequency_Hz", "amplitude_m", "drive_mps", "vibration_mps", "square_mps2"),
+            *("frequency_Hz", "amplitude_m", "drive_mps", "fastest_mps", "vibration_mps", "square_mps2"),
             *("heat", "duty", "quiet_mps2", "tone_mps2"),
         )
     ]

@@ -33,7 +33,7 @@ def see_drive(p: Record, s: Record, block: Record) -> None:
 
 @kernel
 def _median(p: Record, s: Record, blocks: int) -> float:
-    """Median velocity of the drive over the parts of its last blocks [m/s]."""
+    """Median velocity of the drive over the parts of its last blocks [m/s]; notes the largest."""
     fastest_mps, second_mps, third_mps = 0.0, 0.0, 0.0
     newer = s.seen_blocks
     for part in range(1, _PARTS + 1):
@@ -48,6 +48,7 @@ def _median(p: Record, s: Record, blocks: int) -> float:
         else:
             third_mps = max(third_mps, velocity_mps)
         newer = older
+    s.fastest_mps = fastest_mps
     return third_mps
 
 

@@ -18,10 +18,11 @@ _MOST_BAD = 0.5  # share of cells that are neither empty nor numbers, from which
 # blanks and apostrophes that part thousands, all of which are written as one in a dialect
 BLANKS = (" ", "\xa0", "\u202f", "\u2009")
 APOSTROPHES = ("'", "\u2019")
-_CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?\s*([AaPp][Mm])?")
+# hours, minutes and seconds; with a fraction behind the second number, minutes and seconds
+_CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?)|([.,]\d+))?\s*([AaPp][Mm])?")
 _DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
-_DAY_S = 86400.0
+_DAY_S, _HOUR_S = 86400.0, 3600.0
 
 
 def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floats, list[Finding]]:
@@ -31,8 +32,8 @@ def numbers(values: Any, where: str, decimal: str, thousands: str) -> tuple[Floa
     """
     if isinstance(values, pa.ChunkedArray):
         kind: Any = values.type
-        if _is_text(kind):
-            return _from_text(_texts(values), where, decimal, thousands)
+        if is_text(kind):
+            return _from_text(texts_of(values), where, decimal, thousands)
         try:
             return np.asarray(values.cast(pa.float64(), safe=False).to_numpy(), np.float64), []
         except pa.ArrowException:
@@ -101,11 +102,12 @@ def seconds(values: Any, where: str) -> tuple[Floats | None, list[Finding]]:
         if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
             stamps = values.cast(pa.timestamp("ns"), safe=False).cast(pa.int64()).to_numpy()
         elif pa.types.is_time(kind):
-            stamps = _over_midnight(
-                np.asarray([np.nan if one is None else _of_day(one) for one in values.to_pylist()], np.float64) * 1e9
-            )
-        elif _is_text(kind):
-            return _times_from_text(_texts(values), where)
+            times = [np.nan if one is None else _of_day(one) for one in values.to_pylist()]
+            stamps = _counted_on(np.asarray(times, np.float64)) * 1e9
+        elif pa.types.is_duration(kind):
+            stamps = values.cast(pa.duration("ns"), safe=False).cast(pa.int64()).to_numpy()
+        elif is_text(kind):
+            return _times_from_text(texts_of(values), where)
     else:
         array = np.asarray(values)
         if array.dtype.kind == "M":
@@ -146,7 +148,7 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
     if sum(time is None for time in times) > _MOST_BAD * len(texts):
         return None, []
     raw = np.array([np.nan if time is None else time for time in times])
-    counted_on = raw if began else _over_midnight(raw * 1e9) * 1e-9
+    counted_on = raw if began else _counted_on(raw)
     first = counted_on[np.isfinite(counted_on)][0]
     bad = [row for row, time in enumerate(times) if time is None]
     found = [_said(where)]
@@ -182,9 +184,11 @@ def _time_in(text: str) -> tuple[int, float] | None:
             return None
     if clock is None:
         return day, 0.0
-    hours, minutes, secs = int(clock[1]), int(clock[2]), float((clock[3] or "0").replace(",", "."))
     if clock[4]:
-        hours = hours % 12 + (12 if clock[4].lower() == "pm" else 0)
+        return day, 60.0 * int(clock[1]) + float((clock[2] + clock[4]).replace(",", "."))
+    hours, minutes, secs = int(clock[1]), int(clock[2]), float((clock[3] or "0").replace(",", "."))
+    if clock[5]:
+        hours = hours % 12 + (12 if clock[5].lower() == "pm" else 0)
     return day, 3600.0 * hours + 60.0 * minutes + secs
 
 
@@ -197,17 +201,20 @@ def _of_day(time: Any) -> float:
     return 3600.0 * time.hour + 60.0 * time.minute + time.second + 1e-6 * time.microsecond
 
 
-def _over_midnight(times_ns: Floats) -> Floats:
-    """Clock times that go on over midnight, [rows]."""
-    back = np.concatenate([[0.0], np.diff(times_ns)]) < -0.5e9 * _DAY_S
-    return times_ns + np.cumsum(back) * _DAY_S * 1e9
+def _counted_on(times_s: Floats) -> Floats:
+    """Clock times that go on over midnight, and minutes and seconds that go on over the hour, [rows]."""
+    around_s = _DAY_S if np.nanmax(times_s, initial=0.0) >= _HOUR_S else _HOUR_S
+    back = np.concatenate([[0.0], np.diff(times_s)]) < -0.5 * around_s
+    return times_s + np.cumsum(back) * around_s
 
 
-def _is_text(kind: Any) -> bool:
+def is_text(kind: Any) -> bool:
+    """Whether an Arrow type holds texts."""
     types = pa.types
     return types.is_string(kind) or types.is_large_string(kind) or types.is_binary(kind) or types.is_large_binary(kind)
 
 
-def _texts(column: Any) -> list[str]:
+def texts_of(column: Any) -> list[str]:
+    """The cells of an Arrow column of texts; an empty one is ""."""
     cells = (one.decode(errors="replace") if isinstance(one, bytes) else one for one in column.to_pylist())
     return ["" if cell is None else cell for cell in cells]

@@ -9,6 +9,7 @@ from bridge.tables.mat import table_of
 from bridge.tables.table import Table
 
 _DEEPEST = 8  # groups one in the other
+_UNIT_KEYS = ("unit", "units", "Unit", "Units", "unit_string")
 _OF_MATLAB = {"#refs#", "#subsystem#"}  # where MATLAB keeps what variables refer to
 
 
@@ -18,9 +19,16 @@ def read_hdf5(path: Path) -> Table:
 
     with h5py.File(path, "r") as file:
         of_matlab = "#refs#" in file or any("MATLAB_class" in file[name].attrs for name in file)
-        return table_of(
-            path, {name: _value(file, file[name], of_matlab, 0) for name in map(str, file) if name not in _OF_MATLAB}
-        )
+        variables = {name: _value(file, file[name], of_matlab, 0) for name in map(str, file) if name not in _OF_MATLAB}
+        table = table_of(path, variables)
+
+        def keep_unit(name: str, item: Any) -> None:
+            told = next((item.attrs[key] for key in _UNIT_KEYS if key in item.attrs), "")
+            if isinstance(told, bytes | str):
+                table.units[name.replace("/", ".")] = told.decode(errors="replace") if isinstance(told, bytes) else told
+
+        file.visititems(keep_unit)
+        return table
 
 
 def _value(file: Any, item: Any, of_matlab: bool, depth: int) -> Any:
@@ -39,6 +47,8 @@ def _value(file: Any, item: Any, of_matlab: bool, depth: int) -> Any:
     if _is_text(item):
         return "".join(chr(int(code)) for code in np.ravel(data))
     array = np.asarray(data)
+    if array.dtype.names:
+        return {name: array[name] for name in array.dtype.names}
     if array.dtype.kind == "S":
         return np.char.decode(array, "utf-8", "replace")
     return array.T if of_matlab and array.ndim > 1 else array

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Literal
 
+from bridge.faults import Fault
+
 Kind = Literal["text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap"]
 KINDS: tuple[Kind, ...] = ("text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap")
 _MARKS: tuple[tuple[bytes, Kind], ...] = (
@@ -13,6 +15,14 @@ _MARKS: tuple[tuple[bytes, Kind], ...] = (
     (b"PK\x03\x04", "sheet"),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "sheet"),
     (b"\x89MCAP0\r\n", "mcap"),
+)
+_PACKED = (
+    (b"\x1f\x8b", "gzip"),
+    (b"BZh", "bzip2"),
+    (b"\xfd7zXZ\x00", "xz"),
+    (b"\x28\xb5\x2f\xfd", "zstd"),
+    (b"7z\xbc\xaf\x27\x1c", "7-Zip"),
+    (b"Rar!", "RAR"),
 )
 _HDF5_AT = 512  # MATLAB v7.3 writes its own head before the HDF5
 _BY_SUFFIX: dict[str, Kind] = {
@@ -26,7 +36,10 @@ _BY_SUFFIX: dict[str, Kind] = {
 
 
 def kind_of(path: Path) -> Kind:
-    """The kind of a table: by its marks; by its suffix where a damaged file has none; else text."""
+    """The kind of a table: by its marks; by its suffix where a damaged file has none; else text.
+
+    Raises Fault BAD_TABLE when the file is packed.
+    """
     with path.open("rb") as file:
         start = file.read(_HDF5_AT + 8)
     if start[_HDF5_AT:].startswith(b"\x89HDF"):
@@ -34,4 +47,7 @@ def kind_of(path: Path) -> Kind:
     for mark, kind in _MARKS:
         if start.startswith(mark):
             return kind
+    for mark, name in _PACKED:
+        if start.startswith(mark):
+            raise Fault("BAD_TABLE", f"{path.name}: is packed by {name}; unpack it, and give the file that is in it")
     return _BY_SUFFIX.get(path.suffix.lower(), "text")

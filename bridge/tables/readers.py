@@ -53,9 +53,13 @@ def read_table(path: Path, dialect: Dialect | None = None, kind: Kind | None = N
 
 
 def _read_parquet(path: Path) -> Table:
+    """Its columns, those of structs as `NAME.FIELD`."""
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
     table = pq.read_table(path)
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
     units = {
         field.name: field.metadata[b"unit"].decode()
         for field in table.schema

@@ -9,10 +9,11 @@ import numpy as np
 from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.table import Table
-from bridge.tables.text.dialect import Dialect, Form
+from bridge.tables.text.dialect import Dialect, Form, form_of
 from bridge.tables.text.head import read_head
 from bridge.tables.unit_words import unknown_units
 
+_BETWEEN = "\x1f"  # no cell has a unit separator in it
 _HEAD_ROWS = 400  # in which the rows of numbers must begin
 
 
@@ -29,17 +30,16 @@ def read_sheet(path: Path, given: Dialect) -> Table:
     rows: list[list[Any]] = read[name]
     if not rows:
         raise Fault("BAD_TABLE", f"{path.name}: is empty; give a file with rows")
-    form = Form("\x1f", "", ".", "")  # no cell has a unit separator in it
-    lines = [form.delimiter.join(_text(cell) for cell in row) for row in rows[:_HEAD_ROWS]]
-    body = [
-        form.delimiter.join(_text(cell) for cell in row) for row in rows[len(rows) // 3 :: max(len(rows) // 200, 1)]
-    ]
+    some = rows[len(rows) // 3 :: max(len(rows) // 200, 1)]
+    texts = [_BETWEEN.join(cell if isinstance(cell, str) else "" for cell in row) for row in some]
+    form = form_of(texts, given._replace(delimiter=_BETWEEN), quoted=False)  # of numbers that are stored as text
+    lines, body = ([_line(row, form) for row in part] for part in (rows[:_HEAD_ROWS], some))
     head = read_head(lines, body, form, given, path.name)
     width = len(head.names)
     columns: dict[str, Any] = {}
     for i, column in enumerate(head.names):
         cells = [row[i] if i < len(row) else "" for row in rows[head.lines :]]
-        columns[column] = _column(cells)
+        columns[column] = _column(cells, form)
     findings = [Finding("assumed", path.name, f"sheet {name!r} of {', '.join(names)}")] if len(names) > 1 else []
     if head.units:
         findings.append(
@@ -48,16 +48,34 @@ def read_sheet(path: Path, given: Dialect) -> Table:
         if unknown := unknown_units(head.unit_of):
             findings.append(Finding("units", path.name, f"no known unit: {unknown}; taken as it is"))
     rate_Hz = 1.0 / head.step_s if head.step_s else None
-    return Table(path, columns, head.unit_of, {}, rate_Hz, findings=findings, written={"sheet": name, "columns": width})
+    return Table(
+        path,
+        columns,
+        head.unit_of,
+        {},
+        rate_Hz,
+        decimal=form.decimal,
+        thousands=form.thousands,
+        findings=findings,
+        written={"sheet": name, "columns": width},
+    )
 
 
-def _column(cells: list[Any]) -> Any:
-    """Numbers as float64, an empty cell NaN; anything else as it is."""
+def _column(cells: list[Any], form: Form) -> Any:
+    """Numbers as float64, an empty cell NaN; anything else as it is, with the numbers among it as texts of the same form."""
     kinds = Counter(type(cell) for cell in cells if cell != "")
     if kinds.keys() <= {float, int, bool}:
         return np.array([np.nan if cell == "" else float(cell) for cell in cells])
+    if str in kinds:
+        return np.array([None if cell == "" else _text(cell, form) for cell in cells], object)
     return np.array([None if cell == "" else cell for cell in cells], object)
 
 
-def _text(cell: Any) -> str:
+def _line(row: list[Any], form: Form) -> str:
+    return _BETWEEN.join(_text(cell, form) for cell in row)
+
+
+def _text(cell: Any, form: Form) -> str:
+    if isinstance(cell, float):
+        return str(cell).replace(".", form.decimal)
     return cell.isoformat() if hasattr(cell, "isoformat") else str(cell)

@@ -15,6 +15,9 @@ from bridge.tables.unit_words import bare_name, unit_in_name
 
 Floats = npt.NDArray[np.float64]
 
+_SECONDS = re.compile(r"(.*?)(?:secs?|seconds)")  # of a stamp, with one of these for what is over
+_NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanosecs", "nanoseconds")
+
 
 class Clock(NamedTuple):
     """When a channel with a clock of its own was sampled: `start_s + i * step_s`, or at `times_s` [samples]."""
@@ -79,11 +82,23 @@ class Table:
         """
         key = self.find(name)
         where = f"{self.path.name}: column {key}"
+        if nanoseconds := self._nanoseconds_beside(key):
+            whole_s = self.column(key)
+            found = [Finding("time", where, f"goes on in column {nanoseconds}: both are one time")]
+            self.findings.extend(one for one in found if one not in self.findings)
+            # a calendar in seconds would cost the digits of the nanoseconds
+            times_s = whole_s - whole_s[:1] + 1e-9 * self.column(nanoseconds)
+            return times_s - times_s[:1], True
         times_s, found = seconds(self.columns[key], where)
         if times_s is None:
             return self.column(key), False
         self.findings.extend(one for one in found if one not in self.findings)
         return times_s, True
+
+    def _nanoseconds_beside(self, key: str) -> str:
+        """The column of nanoseconds that belongs to one of whole seconds, as in a stamp of ROS; empty where there is none."""
+        stem = _SECONDS.fullmatch(key)
+        return next((f"{stem[1]}{end}" for end in _NANOSECONDS if stem and f"{stem[1]}{end}" in self.columns), "")
 
     def unit(self, name: str | int) -> str:
         """The unit of a column, from the file's own list or the column's name; empty where neither says one."""

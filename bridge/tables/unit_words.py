@@ -75,6 +75,7 @@ _AFTER_LINE = {
     "g",
     "rpm",
 }
+_INDEX = re.compile(r".*\S\[\d+\]")  # `data[1]` is an element of an array; a unit of 1 stands apart, as in `mu [1]`
 _LONGEST_UNIT = 8  # characters of a unit that is not known here
 
 
@@ -111,7 +112,7 @@ def si_unit(what: str) -> str:
 
 def unit_in_name(name: str) -> str:
     """The unit at the end of a column's name, as it is written there; empty where there is none that is known."""
-    found = _BEHIND.match(name)
+    found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
     if found is None:
         return ""
     unit = next((text for key in "abcdef" if (text := found[key]) is not None), "").strip()
@@ -123,7 +124,7 @@ def unit_in_name(name: str) -> str:
 def bare_name(name: str) -> str:
     """A column's name without the unit at its end, and with single blanks."""
     name = re.sub(r"\s+", " ", name).strip()
-    found = _BEHIND.match(name)
+    found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
     brackets = found is not None and (found["a"] is not None or found["b"] is not None)
     return found["name"] if found is not None and (brackets or unit_in_name(name)) else name
 

@@ -16,9 +16,8 @@ PERIOD_NS = 1_500_000
 # How late a timer must be. Shorter: ordinary waking up is told, one in 1000 of which takes 0.16 to 0.26 ms. Longer: pauses are
 # missed that make a command late, as it takes 0.25 ms itself and has 1 ms. From PERIOD_NS + LEAST_NS on each pause is seen.
 LEAST_NS = 300_000
-_LOOKS = (
-    16  # wakings between two looks at the parent and at the time spent waiting, which cost as much as a waking does
-)
+# Wakings between two looks at the parent and at the time spent waiting, which cost as much as a waking does
+_LOOKS = 16
 
 
 def stood_still_until_ns(due_ns: int, woke_ns: int, waited_ns: int) -> int:

@@ -71,7 +71,9 @@ def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
     return session
 
 
-def _dialled(config: BusConfig, role: str, lockstep: bool, stop: threading.Event, patience_s: float) -> zenoh.Session:
+def _dialled(config: BusConfig, role: str, lockstep: bool, stop: threading.Event, own_s: float | None) -> zenoh.Session:
+    """Dial for `own_s`, the patience of a command that has no --wait, else for `config.wait_s`."""
+    patience_s = config.wait_s if own_s is None else own_s
     until_s = time.monotonic() + patience_s
     while not stop.is_set():
         security = role_security(config, role)  # anew each time: the rig may make it meanwhile
@@ -81,7 +83,9 @@ def _dialled(config: BusConfig, role: str, lockstep: bool, stop: threading.Event
         except zenoh.ZError:
             if time.monotonic() > until_s:
                 line = f"{config.endpoint}: no plant answers there after {patience_s:g} s"
-                more = "; a first start compiles before it answers: --wait S waits longer"
+                more = "; a first start compiles before it answers" + (
+                    ": --wait S waits longer" if own_s is None else ""
+                )
                 raise Fault("NO_PEER", f"{line}; {_remedy(config, bool(security))}{more}") from None
     raise Fault("NO_PEER", f"{config.endpoint}: no plant answered there before the stop")
 
@@ -147,7 +151,7 @@ class Bus:
                 role if role in loopback_users.ROLES else "viewer",
                 lockstep,
                 stop or threading.Event(),
-                config.wait_s if patience_s is None else patience_s,
+                patience_s,
             )
         )
         # in a thread of Python's own, as it looks at every file of this process

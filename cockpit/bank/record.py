@@ -21,9 +21,8 @@ RING = 8192  # samples of the longest window: 0.4 s at 20 kHz
 BLOCK_RING = 512  # blocks of the longest loop delay
 BINS = 16  # in the time over which the drive's largest speed counts
 REASONS = 64  # more than there are
-_BESIDE_SPRING = (
-    2.2  # v_s / v_d that a pair without a drop of friction may reach at a start: the spring alone makes it 2
-)
+# v_s / v_d that a pair without a drop of friction may reach at a start: the spring alone makes it 2
+_BESIDE_SPRING = 2.2
 _SLIP = 1.5
 _SIGMAS = 5.0
 _STIFF_BLOCKS = 20.0  # natural stick below which a controller may announce by the first slip that it sees

@@ -15,7 +15,7 @@ from cockpit.bank.scenario import BankScenario
 from cockpit.bank.suite import Done, find_least, run_bank, warm_up
 
 OWN = rules.NAMES[rules.CONTROLLER]
-_WIDTH = 26
+_WIDTH = 2 + max(map(len, rules.NAMES.values()))  # of the column with the names of controller and rivals
 
 
 class BankResult(NamedTuple):

@@ -1,5 +1,6 @@
 """`stickslip explain`: what a fault code, an exit status, an event or a word of the controller means."""
 
+from difflib import get_close_matches
 from typing import Annotated, NamedTuple
 
 import typer
@@ -9,6 +10,7 @@ from bridge.wire.event_codes import EVENTS, LETTERS, EventCode
 from bridge.wire.words import Word, words
 from cockpit.commands.as_json.option import Json, carry_out, tell
 
+_ALIKE = 0.5  # as `difflib` has it: FORCE_FROZEN is as near to FROZEN as 0.67
 _NO_FAULTS = {
     0: "all is well; a diagnosis that was made is, whatever it says",
     1: "the command did its work, and the run, the log or the comparison is not as it should be; or, with a traceback, "
@@ -69,11 +71,13 @@ def explain(
         of_a_log = [one for one in logged if code.upper() in {one.word, one.column.upper()}]
         events = [one for one in EVENTS.values() if code.upper() in {one.code, "EVENT"}]
         if not (wanted or of_a_log or events):
-            statuses = ", ".join(map(str, sorted({one.exit_status for one in meanings})))
-            line = f"{code}: is no fault code, exit status, event or word of a log; known: {', '.join(FAULTS)}; "
-            line += f"exit statuses {statuses}"
-            columns = ", ".join(dict.fromkeys(one.column for one in logged))
-            raise Fault("CONFIG", f"{line}; columns of a log {columns}; events {', '.join(EVENTS)}")
+            known = [*FAULTS, *(one.word for one in logged), *(one.column.upper() for one in logged), *EVENTS]
+            near = get_close_matches(code.upper(), dict.fromkeys(known), 3, _ALIKE)
+            meant = f"did you mean {' or '.join(near)}? " if near else ""
+            line = (
+                f"{code}: is no fault code, exit status, event or word of a log; {meant}`stickslip explain` lists all"
+            )
+            raise Fault("CONFIG", line)
         paragraphs = ["\n\n".join(one.in_words() for one in wanted)] if wanted else []
         lines = [*paragraphs, *map(_in_words, of_a_log), *map(_event_in_words, events)]
         tell(as_json, [*wanted, *of_a_log, *events], lines)

@@ -57,6 +57,9 @@ def inject(bus_config: BusConfig, name: str, tables: Sequence[FaultTable], clear
     of_processes = [table for table in tables if table.group == PROCESS]
     done: list[str] = []
     with Bus(bus_config, "operator", lockstep=True, patience_s=_DIAL_S) as bus:
+        if (of_rig or clear) and bus.wait_for(["plant"], _HEADERS_S):
+            line = f"{where}: a bus answers, but no rig is on it: --prefix must be that of the run"
+            raise Fault("NO_PEER", f"{line}; give the --prefix of the run")
         roles = {table.target for table in of_processes}
         headers = bus.headers(roles, _HEADERS_S, threading.Event()) if roles else {}
         if missing := roles - headers.keys():

@@ -17,7 +17,8 @@ from bridge.wire import stickslip_pb2 as wire
 from cockpit.figures.curves import Curve, as_table, curve_of, window_of
 from cockpit.figures.request import PAPER, SCREEN, Request
 from cockpit.figures.signals import Signal, limits_of, named
-from cockpit.judge.verdict import RunVerdict, cycles_of, judge_run
+from cockpit.judge.slips import cycles_of
+from cockpit.judge.verdict import RunVerdict, judge_run
 from cockpit.judge.verdict_words import headline
 from diagnosis.features.cycles import Cycles
 

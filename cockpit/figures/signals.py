@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, block_period_ns, sample_times_s
 from bridge.log.metadata import is_number
-from cockpit.judge.verdict import absent_channels
+from cockpit.judge.slips import absent_channels
 
 Floats = npt.NDArray[np.float64]
 

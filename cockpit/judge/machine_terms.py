@@ -118,8 +118,8 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
     if not len(at):
         return []
     changes, lasts = moving[at], moving[at - 1]  # the first block with another sign, and the last with the one before
-    seen_m = _SEEN_SIGMAS * np.hypot(_noise(slide_m), _noise(drive_m))
-    at_turn_m = _AT_TURN_SIGMAS * _noise(drive_m)
+    seen_m = _SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m))
+    at_turn_m = _AT_TURN_SIGMAS * noise_of(drive_m)
     begins = [0]
     for change in changes:  # from the sign to the place at which the drive turned, which was before
         place_m = direction[change] * drive_m[begins[-1] : change + 1]
@@ -149,7 +149,7 @@ def _reversal(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> R
     return Reversal(float(t_s[0]), float(t_s[first] - t_s[0]), max(float(peak_m - error_m[first:].mean()), 0.0))
 
 
-def _noise(place_m: Floats) -> float:
+def noise_of(place_m: Floats) -> float:
     """Standard deviation of white noise on what moves smoothly most of the time, from second differences."""
     if len(place_m) < 3:
         return 0.0

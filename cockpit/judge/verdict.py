@@ -1,6 +1,5 @@
 """What came of a run, read from its log alone, in numbers."""
 
-import math
 import re
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bridge.log.in_charge import GONE_S, InCharge, in_charge
-from bridge.log.logfile import RunData, block_period_ns, read_run, sample_times_s
-from bridge.log.metadata import number_of, source_of_import, texts_of
+from bridge.log.logfile import RunData, read_run
+from bridge.log.metadata import number_of, source_of_import
 from bridge.log.storage.chain import Chain
 from bridge.units import counted
 from bridge.wire import realtime
@@ -18,7 +17,7 @@ from cockpit.judge.log_faults import of_bytes, of_clock, of_events
 from cockpit.judge.machine_terms import motion_of
 from cockpit.judge.pauses import Pauses, pauses_in
 from cockpit.judge.phases import Phase, Told, alone, phase, slips_in
-from diagnosis.features.cycles import Cycles, find_cycles
+from cockpit.judge.slips import cycles_of
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
@@ -95,24 +94,6 @@ def judge(path: Path) -> RunVerdict:
     return judge_run(read_run(path))
 
 
-def cycles_of(run: RunData) -> Cycles | None:
-    """The slips in the drive force of a log that was read; None where it holds no force. Raises Fault BAD_LOG."""
-    if not len(run.sensors) or "drive_force_N" in absent_channels(run):
-        return None
-    force_N = run.sensors["drive_force_N"].astype(np.float64)
-    finite = np.isfinite(force_N).all(axis=1)
-    if not finite.any():
-        return None
-    imported = source_of_import(run.headers, run.path)
-    period_ns = (
-        block_period_ns(run.sensors)
-        if imported
-        else 1e9 * number_of(run.configuration("controller"), "block_s", run.path)
-    )
-    sample_s = sample_times_s(run.sensors[finite], period_ns)
-    return find_cycles(sample_s.ravel(), force_N[finite].ravel(), slowest_fall_s=_slowest_fall_s(run))
-
-
 def stretch_of(run: RunData, from_s: float, to_s: float) -> Phase | None:
     """What happened in a stretch of a run; None where it has no block. Raises Fault BAD_LOG."""
     mean_N = run.sensors["drive_force_N"].astype(np.float64).mean(axis=1)
@@ -120,11 +101,6 @@ def stretch_of(run: RunData, from_s: float, to_s: float) -> Phase | None:
     block_s = number_of(run.configuration("controller"), "block_s", run.path)
     told_by = Told(cycles_of(run), run.sensors["t_ns"][finite] * 1e-9, mean_N[finite], motion_of(run, block_s))
     return phase(told_by, from_s, to_s, [])
-
-
-def absent_channels(run: RunData) -> list[str]:
-    """Channels that the file of another program did not hold; they are zeros in its log. Raises Fault BAD_LOG."""
-    return texts_of(run.headers, "import", "missing", run.path)
 
 
 def judge_run(run: RunData) -> RunVerdict:
@@ -290,17 +266,6 @@ def _untested(run: RunData, after: Phase | None, in_charge_s: float) -> str:
     if in_charge_s > _SETTLING_S:  # the force is no number, or the operator left it no second to settle in
         why = "but nothing there can be judged"
     return f"the controller was in charge for {in_charge_s:.2g} s, {why}"
-
-
-def _slowest_fall_s(run: RunData) -> float:
-    """How long a slip may last: 1.6 times that of the plant's slide on its spring, and never less than 0.1 s."""
-    if "plant" not in run.headers:
-        return 0.1
-    try:
-        rig = run.configuration("plant")["rig"]
-        return max(0.1, 3.0 * math.sqrt(rig["slide"]["mass_kg"] / rig["drive"]["stiffness_N_per_m"]))
-    except (KeyError, TypeError, ValueError, ArithmeticError):  # another rig need not tell
-        return 0.1
 
 
 def _stops(trace: Any, block_s: float) -> list[tuple[float, float]]:

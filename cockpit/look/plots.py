@@ -49,7 +49,7 @@ def whole(seen: Look, size_in: tuple[float, float] = (9.0, 3.2)) -> "Figure":
         ends = np.array([(cycle.restick_t_s, cycle.restick_force_N) for cycle in seen.cycles])
         axes.plot(tops[:, 0], sign * tops[:, 1], "v", color=_RED, markersize=4, label="breakaway")
         axes.plot(ends[:, 0], sign * ends[:, 1], "^", color=_BLUE, markersize=4, label="re-stick")
-        axes.legend(loc="lower right", frameon=False, ncols=2)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=2)  # above the curve
     axes.set_xlabel("time [s]")
     axes.set_ylabel("friction coefficient" if seen.known.coefficient else f"force [{seen.known.force_unit}]")
     return figure
@@ -64,7 +64,8 @@ def laid_over(seen: Look) -> "Figure":
         if part is None or not np.isfinite(cycle.dwell_s) or not np.isfinite(cycle.restick_t_s):
             continue
         slip_s = cycle.restick_t_s - cycle.breakaway_t_s
-        own = (part.t_s >= cycle.breakaway_t_s - cycle.dwell_s) & (part.t_s <= cycle.restick_t_s + slip_s)
+        ends_s = cycle.breakaway_t_s - cycle.dwell_s, cycle.restick_t_s + slip_s
+        own = slice(*np.searchsorted(part.t_s, ends_s).tolist())
         _draw(axes, part.t_s[own] - cycle.breakaway_t_s, part.force_N[own], alpha=max(0.08, 1.0 / len(cycles) ** 0.5))
     axes.set_xlabel("time from breakaway [s]")
     axes.set_ylabel(
@@ -96,6 +97,7 @@ def histograms(seen: Look) -> "Figure":
         axes.axvline(float(values.mean()), color=_RED, linewidth=1.2)
         axes.set_xlabel(label)
         axes.set_ylabel("slips")
+        axes.yaxis.get_major_locator().set_params(integer=True)
         _plain(axes)
     return figure
 

@@ -13,7 +13,8 @@ from bridge.provenance import Provenance, shown_name
 from bridge.wire.event_codes import EVENTS, LETTERS
 from cockpit.figures.grid import Envelope, Grid, on_grid
 from cockpit.figures.signals import SIGNALS, Floats, Signal, holds, limits_of, samples_of
-from cockpit.judge.verdict import RunVerdict, cycles_of, judge_run
+from cockpit.judge.slips import cycles_of
+from cockpit.judge.verdict import RunVerdict, judge_run
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.review.bands import bands_of, title_of, used_words
 from cockpit.review.differences import differences, parameters_of

@@ -17,7 +17,7 @@ def forget_motion(p: Record, s: Record) -> None:
         table[:, :] = 0.0
     s.slope_before[:, :, :] = 0.0
     s.law_mps[:], s.resolution[:], s.kept_mps[:], s.kept_N_per_m = 0.0, 0.0, 0.0, 0.0
-    s.agreements[:], s.differences[:] = 0, 0
+    s.bends[:], s.agreements[:], s.differences[:] = 0.0, 0, 0
     s.looks[:, :], s.lively[:, :], s.first_seen = 0, 0.0, 0
     s.bend_m, s.bent, s.noise_told_s, s.unbelieved_s, s.slip_count, s.slips_wound = 0.0, 0, 0.0, 0.0, 0.0, 0.0
     _forget_velocities(s)

@@ -10,9 +10,8 @@ import math
 
 from bridge.kernel import Record, kernel
 
-KNOWN_S = (
-    0.1  # of even vibration that the known gain is a mean of; shorter: the noise of one fit; longer: later bounded
-)
+# Of even vibration that the known gain is a mean of; shorter: the noise of one fit; longer: later bounded
+KNOWN_S = 0.1
 
 CHECK_BLOCKS = 16  # after a check, in which its tones come; there are 8 at most
 OTHER_TOLD_S = 2.0  # for which it is told that the check measured another gain than the configuration says

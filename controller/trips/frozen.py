@@ -9,6 +9,8 @@ import math
 
 from bridge.kernel import Record, kernel
 from controller.codes import DRIVE_DOUBTED, FROZEN, LOOSE
+from controller.estimate.spikes import sum_without
+from controller.estimate.windows import DRIVE as DRIVE_ROW
 from controller.trips.doubts import (
     ACCELEROMETER,
     CHANNELS,
@@ -27,9 +29,8 @@ HOLD_S, FEWEST = (
     0.05,
     40,
 )  # of equal samples, and blocks of them, until it trips: at a noise of one step half of all are equal
-_ALL_PARTS = (
-    2  # of this time, for one of which all channels repeat: what reads them hangs, as a rig that is silent for so long
-)
+# Of this time, for one of which all channels repeat: what reads them hangs, as a rig that is silent for so long
+_ALL_PARTS = 2
 _FASTEST_MPS = 100.0  # of a drive; a place that goes faster was not gone through
 _LOOK_STEPS = 16  # blocks from one look at the noise of a channel to that of the next
 _LOOKS = 8  # until a channel counts as one with noise
@@ -50,10 +51,11 @@ def watch_frozen(p: Record, s: Record, block: Record) -> None:
         look_at_noise(s, block.drive_position_m)
     blocks = s.block - s.seen_block
     s.seen_block = s.block
-    went_m = math.fabs(float(block.drive_position_m[0]) - s.first_sample[OF_DRIVE])
+    place_m = sum_without(s, DRIVE_ROW, block.drive_position_m, 0, 1)
+    went_m = math.fabs(place_m - s.first_sample[OF_DRIVE])
     if blocks > 0 and s.first_seen == 1 and went_m > _FASTEST_MPS * blocks * p.block_s:
         trip(s, DRIVE_DOUBTED, DRIVE)
-    watch_jumps(p, s, float(block.drive_position_m[0]), blocks)
+    watch_jumps(p, s, place_m, blocks)
     s.first_seen = 1
     if p.use_force == 1 and _repeats(p, s, OF_FORCE, float(block.drive_force_N[0])):
         trip(s, FROZEN, CONTACT)
@@ -61,7 +63,7 @@ def watch_frozen(p: Record, s: Record, block: Record) -> None:
         trip(s, FROZEN, CONTACT)  # it never changed at all, and a drive that moves winds up its spring
     if p.use_slide_position == 1 and _repeats(p, s, OF_SLIDE, float(block.mass_position_m[0])):
         trip(s, FROZEN, CONTACT)
-    if _repeats(p, s, OF_DRIVE, float(block.drive_position_m[0])):
+    if _repeats(p, s, OF_DRIVE, place_m):
         trip(s, FROZEN, DRIVE)
     if _repeats(p, s, OF_BASE, float(block.base_accel_mps2[0])):
         trip(s, FROZEN, ACCELEROMETER)

@@ -30,9 +30,8 @@ _GAP_STEPS = 10.0  # times the median step between samples from which a step is 
 # Longest gap, and largest share of gaps in a run. In a longer gap the rig slips unseen, and the model goes on slipping.
 _LONGEST_GAP_S, _LARGEST_GAP_SHARE = 1.0, 0.1
 _VELOCITY_TOLERANCE = 0.1  # relative difference of the stated drive velocity and the drive position's slope
-_OTHER_RUN_FACTOR = (
-    3.0  # factor between the two (or another sign) from which the stated velocity is that of another run
-)
+# Factor between the two (or another sign) from which the stated velocity is that of another run
+_OTHER_RUN_FACTOR = 3.0
 _MOST_TRAVEL = 10.0  # times the way of the drive that a position may travel; mm in place of m are a factor of 1000
 _LEAST_TRAVEL = 0.002  # of the way to the first slip that a drive must move; the noise of a drive at rest is less
 _FASTEST = 300.0  # times the Stribeck velocity; mm/s in place of m/s are a factor of 1000

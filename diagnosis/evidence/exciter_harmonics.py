@@ -19,9 +19,8 @@ _MULTIPLES = (0.5, 1.5, 2.0, 3.0)  # of the commanded frequency, at which a line
 # fails, 1.05 passes). Too small: the hysteresis of every piezo, some per cent, is reported. Too large: harmonics stay unseen.
 # Counted on 56 synthetic rigs (docs/method/evidence.md).
 _SHARE = 0.05
-_TIMES_BESIDE = (
-    4.0  # times the amplitude beside the line that the line must have; noise and slips are at both frequencies
-)
+# Times the amplitude beside the line that the line must have; noise and slips are at both frequencies
+_TIMES_BESIDE = 4.0
 
 
 class Distortion(NamedTuple):

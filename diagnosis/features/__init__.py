@@ -7,6 +7,7 @@ turns, falls                turning points of a record; the same compiled, and w
 feature                     definition of a feature
 spring_drive, force_drive   the features of a run with a spring drive, and with a force drive
 axis_motion                 the measured motion along which a force-driven model is led
+moving_mean                 a moving mean, compiled
 spring_law                  how the force follows the extension of the spring
 noise                       the noise of a run, taken from the run
 """

@@ -90,7 +90,7 @@ def find_cycles(
     spring, finite; both [samples].
 
     A slip is a big and fast fall from a local maximum to the next local minimum. Big: at least
-    `minimum_drop_N`, by default the larger of 3 % of the median force and ten times the noise of the record.
+    `minimum_drop_N`, by default the larger of 3 % of the median magnitude of the force and ten times the noise of the record.
     (At 3 kHz, close to elimination, the paper's pairs still swing by 12 % of their force.)
     Fast: from 10 to 90 % of the fall within `slowest_fall_s`, by default 0.1 s, three times the 36 ms of a
     slip on the paper's spring; a softer drive needs more.
@@ -99,7 +99,7 @@ def find_cycles(
     """
     t_s, force_N = _binned(np.asarray(t_s, np.float64), np.asarray(drive_force_N, np.float64))
     if minimum_drop_N is None:
-        minimum_drop_N = _minimum_drop_N(force_N)
+        minimum_drop_N = _smallest_drop_N(force_N)
     at = [0] * len(force_N)
     count = turns(force_N.tolist(), minimum_drop_N, at)
     peaks, troughs = at[:count:2], at[1:count:2]
@@ -110,6 +110,14 @@ def find_cycles(
     peaks = [peak for peak, is_fast in zip(peaks, fast, strict=True) if is_fast]
     troughs = [trough for trough, is_fast in zip(troughs, fast, strict=False) if is_fast]
     return Cycles(t_s[peaks], force_N[peaks], t_s[troughs], force_N[troughs])
+
+
+def smallest_drop_N(t_s: npt.ArrayLike, drive_force_N: npt.ArrayLike) -> float:
+    """The `minimum_drop_N` that `find_cycles` takes by default; t_s and drive_force_N are [samples].
+
+    Raises ValueError when the two differ in length.
+    """
+    return _smallest_drop_N(_binned(np.asarray(t_s, np.float64), np.asarray(drive_force_N, np.float64))[1])
 
 
 def _binned(t_s: Floats, force_N: Floats) -> tuple[Floats, Floats]:
@@ -123,13 +131,13 @@ def _binned(t_s: Floats, force_N: Floats) -> tuple[Floats, Floats]:
     return t_s[:whole].reshape(-1, width).mean(axis=1), force_N[:whole].reshape(-1, width).mean(axis=1)
 
 
-def _minimum_drop_N(force_N: Floats) -> float:
+def _smallest_drop_N(force_N: Floats) -> float:
     if len(force_N) < 3:
         return 0.0
     # second differences remove the climb of a stick, and their median ignores the few bins of the slips
     bend_N = np.abs(np.diff(force_N, 2))
     noise_N = 1.4826 * _median(bend_N) / 6.0**0.5
-    return max(0.03 * abs(_median(force_N)), _NOISE_SPANS * noise_N)
+    return max(0.03 * _median(np.abs(force_N)), _NOISE_SPANS * noise_N)  # of either sign: a drive may turn
 
 
 def _median(values: Floats) -> float:

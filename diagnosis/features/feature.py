@@ -1,5 +1,6 @@
 """Definition of a feature: one number of a run that does not depend on the instants of the slips; its band and its scales."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,21 +41,30 @@ class Scales(NamedTuple):
 
 
 class Features:
-    """Collects features of one run."""
+    """Collects features of one run, with their labels where somebody wants them."""
 
-    def __init__(self) -> None:
-        self._labels: list[tuple[str, str, str, Band, int]] = []
+    def __init__(self, labelled: bool = True) -> None:
+        self._labels: list[tuple[str, str, str, Band, int]] | None = [] if labelled else None
         self.values: list[float] = []
 
     @property
     def labels(self) -> list[Feature]:
-        """Label of every value, in order. Built on demand: thousands of predictions never need their labels."""
-        return [Feature(*label) for label in self._labels]
+        """Label of every value, in order; none without labels."""
+        return [Feature(*label) for label in self._labels or ()]
 
     def add(self, name: str, signal: str, regime: str, band_Hz: Band, segment: int, value: float) -> None:
         """Append one number; NaN where this run has no such feature."""
-        self._labels.append((name, signal, regime, band_Hz, segment))
+        if self._labels is not None:
+            self._labels.append((name, signal, regime, band_Hz, segment))
         self.values.append(value)
+
+    def add_all(
+        self, names: Sequence[tuple[str, str]], signal: str, band_Hz: Band, segment: int, values: Sequence[float]
+    ) -> None:
+        """Append many numbers of one signal and band, whose names and regimes are `names`."""
+        if self._labels is not None:
+            self._labels += [(name, signal, regime, band_Hz, segment) for name, regime in names]
+        self.values += values
 
 
 # Smallest fall of the force that is a slip, as a share of the static friction.

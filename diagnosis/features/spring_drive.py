@@ -7,44 +7,45 @@ model. A measured and a predicted run pass through the same code; a feature that
 
 import math
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.fft import dct
-from scipy.ndimage import uniform_filter1d
 
 from diagnosis.features.feature import DRIVE_WAVES, HIGH, LOW, MIDDLE, RESOLVED_M, Features, Scales, Signals
 from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.moving_mean import moving_mean
 from diagnosis.features.segments import Commands, Segment
 from diagnosis.features.slips import NO_SLIPS, SHAPE_AT, Slips, find_slips, slip_pairs
 from diagnosis.features.spring_law import spring_bend, spring_law
 
 Floats = npt.NDArray[np.floating[Any]]
 
+_LOW_AND_HIGH = np.array([0.05, 0.95])
 _LEVELS = 8  # bins over a segment without slips
 _BREAKAWAY_WAVES = 5  # half waves of the breakaway force over a segment; more follow shorter friction waves and noise
 
 
-def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Features:
+def spring_features(signals: Signals, commands: Commands, scales: Scales, labelled: bool = True) -> Features:
     """All features of a run with a spring drive; commands and channels alone decide which features there are.
 
     Args:
         signals: [blocks] each, measured or predicted, from `without_vibration`.
         commands: of the run, with settled segments.
         scales: of the rig.
+        labelled: whether the labels are wanted; without them it takes a tenth less time.
 
     """
-    found = Features()
+    found = Features(labelled)
     for number, segment in enumerate(commands.segments):
         own = slice(segment.first, segment.last)
         cut = {
             name: values[own] if name.endswith("shake_mps2") else segment.sign * values[own]
             for name, values in signals.items()
         }
-        slips = find_slips(cut, scales)
-        if segment.slips == 0:
-            slips = NO_SLIPS
+        slips = find_slips(cut, scales) if segment.slips > 0 else NO_SLIPS
         if "drive_force_N" in cut:
             travel_m = abs(segment.drive_velocity_mps) * (segment.last - segment.first) * BLOCK_S
             expected = travel_m * scales.stiffness_N_per_m / scales.fall_N
@@ -60,15 +61,23 @@ def spring_features(signals: Signals, commands: Commands, scales: Scales) -> Fea
     return found
 
 
+_CYCLE_WAVES = {"breakaway": _BREAKAWAY_WAVES, "restick": 3}
+_LACKING = [math.nan] * _BREAKAWAY_WAVES
+_MOMENTS = {
+    regime: tuple((name, regime) for name in ("mean", *(f"wave {wave}" for wave in range(1, waves + 1)), "scatter"))
+    for regime, waves in _CYCLE_WAVES.items()
+}
+_RATES = tuple((f"rate {part}", "stick") for part in ("early", "middle", "late"))
+
+
 def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment, expected: float) -> None:
     name = "drive_force_N"
-    for regime, at, waves in (("breakaway", slips.tops, _BREAKAWAY_WAVES), ("restick", slips.bottoms, 3)):
+    for regime, at in (("breakaway", slips.tops), ("restick", slips.bottoms)):
+        waves = _CYCLE_WAVES[regime]
         carried = min(waves, max(int(expected / 2.0) - 1, 0)) if expected >= 5.0 else 0
         moments, scatter = _moments(force_N[at], at / len(force_N), slips.weights, carried)
-        found.add("mean", name, regime, LOW, number, moments[0])
-        for wave in range(1, waves + 1):
-            found.add(f"wave {wave}", name, regime, LOW, number, moments[wave] if wave <= carried else math.nan)
-        found.add("scatter", name, regime, LOW, number, scatter)
+        values = [*moments, *_LACKING[carried:waves], scatter]
+        found.add_all(_MOMENTS[regime], name, LOW, number, values)
     # the climb between a re-stick and the next breakaway, in three parts
     rates = np.full(3, np.nan)
     weights = slip_pairs(slips)
@@ -80,8 +89,7 @@ def _cycles(found: Features, number: int, force_N: Floats, slips: Slips, segment
         parts = zip(level[:-1], level[1:], (0.3, 0.3, 0.25), strict=True)
         rates = np.array([float(weights @ ((high - low) / (share * length))) for low, high, share in parts])
         rates /= weights.sum()
-    for part, rate in zip(("early", "middle", "late"), rates, strict=True):
-        found.add(f"rate {part}", name, "stick", LOW, number, float(rate))
+    found.add_all(_RATES, name, LOW, number, rates.tolist())
 
 
 def _moments(values: Floats, at: Floats, weights: Floats, carried: int) -> tuple[list[float], float]:
@@ -114,6 +122,12 @@ def _period(found: Features, number: int, slips: Slips, segment: Segment) -> Non
     found.add("period", "drive_force_N", "stick", LOW, number, value)
 
 
+_LEVEL_NAMES = tuple(
+    (name, "steady")
+    for name in ("mean level", "deviation", "low level", "high level", *(f"level {bin_}" for bin_ in range(_LEVELS)))
+)
+
+
 def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment: Segment) -> None:
     """Add levels of the force: over whole cycles, weighted as their slips are; over the segment where nothing slips.
 
@@ -128,23 +142,35 @@ def _level(found: Features, number: int, force_N: Floats, slips: Slips, segment:
         whole, counts = force_N[slips.tops[0] : slips.tops[-1]], np.repeat(weights, np.diff(slips.tops))
     levels = np.full(4, np.nan)
     if still or (segment.slips > 2 and not segment.at_the_edge):
-        mean_N = np.average(whole, weights=counts)
-        deviation_N = np.average((whole - mean_N) ** 2, weights=counts) ** 0.5
-        levels = np.array(
-            [mean_N, deviation_N, *np.quantile(whole, (0.05, 0.95), weights=counts, method="inverted_cdf")]
-        )
-    for level, value in zip(("mean level", "deviation", "low level", "high level"), levels.tolist(), strict=True):
-        found.add(level, name, "steady", LOW, number, value)
-    edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64)
-    for bin_ in range(_LEVELS):
-        value = float(force_N[edges[bin_] : edges[bin_ + 1]].mean()) if still else math.nan
-        found.add(f"level {bin_}", name, "steady", LOW, number, value)
+        total = counts.sum()
+        mean_N = (whole * counts).sum() / total
+        about_N = whole - mean_N
+        levels = np.array([mean_N, ((about_N * about_N) * counts).sum() / total, *_quantiles(whole, counts)])
+        levels[1] **= 0.5
+    bins = [math.nan] * _LEVELS
     middle = fast = math.nan
     if still:
-        short = uniform_filter1d(force_N, 5)
-        middle, fast = float(np.var(short - uniform_filter1d(force_N, 100))), float(np.var(force_N - short))
+        edges = np.linspace(0, len(force_N), _LEVELS + 1).astype(np.int64).tolist()
+        bins = [_mean(force_N[first:last]) for first, last in pairwise(edges)]
+        short = moving_mean(force_N, 5)
+        middle, fast = float(np.var(short - moving_mean(force_N, 100))), float(np.var(force_N - short))
+    found.add_all(_LEVEL_NAMES, name, LOW, number, [*levels.tolist(), *bins])
     found.add("ripple", name, "steady", MIDDLE, number, middle)
     found.add("ripple", name, "steady", HIGH, number, fast)
+
+
+def _quantiles(values: Floats, weights: Floats) -> Floats:
+    """What `numpy.quantile` finds at 5 and 95 % by the inverted distribution, in a fifth of its time."""
+    order = np.argsort(values)
+    share = weights[order].cumsum()
+    share /= share[-1]
+    found = values[order[np.minimum(np.searchsorted(share, _LOW_AND_HIGH), len(values) - 1)]]
+    return np.full(2, np.nan) if np.isnan(values[order[-1]]) else found  # of a model that diverges
+
+
+def _mean(values: Floats) -> float:
+    """As `values.mean()`, which takes five times as long for some hundred values."""
+    return float(np.add.reduce(values)) / len(values)
 
 
 def _regime(at: float) -> str:
@@ -171,7 +197,7 @@ def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Sc
         before = np.minimum(at.astype(np.int64), last - 1)
         low = signals[:, before]
         shapes = weights @ (low + (at - before) * (signals[:, before + 1] - low))
-        fast = signals - uniform_filter1d(signals, 5)
+        fast = np.array([one - moving_mean(one, 5) for one in signals])
         rings = fast[:, np.minimum((middles + np.arange(int(3.0 * width))).astype(np.int64), last)]
         powers = np.einsum("nij,nij,i->n", rings, rings, weights) / rings.shape[2]
     for i, name in enumerate(names):
@@ -180,8 +206,7 @@ def _shapes(found: Features, number: int, cut: Signals, slips: Slips, scales: Sc
             shape = shape - shape.mean()
         if name == "mass_position_m":
             shape = shape - shape[0]
-        for (label, regime), value in zip(_SHAPES, shape.tolist(), strict=True):
-            found.add(label, name, regime, MIDDLE, number, value)
+        found.add_all(_SHAPES, name, MIDDLE, number, shape.tolist())
         found.add("ring", name, "restick", HIGH, number, ring)
 
 
@@ -193,7 +218,7 @@ def _vibration(found: Features, number: int, cut: Signals) -> None:
         mean = float(shake.mean())
         found.add("vibration", source, "steady", HIGH, number, math.log(mean + 1e-9))
         if source == "base_accel_mps2":
-            time = np.linspace(-1.0, 1.0, len(shake))
+            time = _line(len(shake))
             shaken = mean > 0.0  # a dead sensor or a tripped amplifier shows 0, and 0 cannot divide
             over_time = float(shake @ time) / (mean * len(shake) / 3.0) if shaken else math.nan
             found.add("vibration over time", source, "steady", HIGH, number, over_time)
@@ -214,6 +239,9 @@ def _parity(found: Features, signals: Signals, commands: Commands, scales: Scale
         found.add(f"spring {name}", "drive_force_N", "stick", MIDDLE if name == "rest" else LOW, -1, value)
 
 
+_DRIVE_WAVES = tuple((f"wave {wave}", "steady") for wave in range(1, DRIVE_WAVES + 1))
+
+
 def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
     """Add waves and power of the drive position's deviation from a line and a bow in each segment."""
     rest_m = np.zeros_like(position_m)
@@ -221,9 +249,8 @@ def _drive(found: Features, position_m: Floats, commands: Commands) -> None:
         rows = slice(segment.first, segment.last)
         rest_m[rows] = _without_line(position_m[rows], segment)
     waves = np.asarray(dct(rest_m))[1 : DRIVE_WAVES + 1] / len(rest_m)
-    for wave, value in enumerate(waves.tolist(), start=1):
-        found.add(f"wave {wave}", "drive_position_m", "steady", LOW, -1, value)
-    fast = rest_m - uniform_filter1d(rest_m, 100)
+    found.add_all(_DRIVE_WAVES, "drive_position_m", LOW, -1, waves.tolist())
+    fast = rest_m - moving_mean(rest_m, 100)
     found.add("rest", "drive_position_m", "steady", MIDDLE, -1, float(fast.var()) + RESOLVED_M**2)
 
 
@@ -235,8 +262,13 @@ def _without_line(position_m: Floats, segment: Segment) -> Floats:
 
 
 @lru_cache(maxsize=64)
+def _line(blocks: int) -> Floats:
+    return np.linspace(-1.0, 1.0, blocks)
+
+
+@lru_cache(maxsize=64)
 def _line_and_bow(blocks: int) -> tuple[tuple[Floats, float], ...]:
     """A line (zero of the sensor, and speed) and a bow (linearity of the sensor): [blocks] each, with its sum of squares."""
-    line = np.linspace(-1.0, 1.0, blocks)
+    line = _line(blocks)
     bow = line * line - 1.0 / 3.0
     return (line, float(line @ line)), (bow, float(bow @ bow))

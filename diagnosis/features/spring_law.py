@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter1d
 
 from diagnosis.features.grid import BLOCK_S
+from diagnosis.features.moving_mean import moving_mean
 from diagnosis.features.segments import Segment
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -33,7 +33,7 @@ def spring_law(
 
     """
     even = _away_from_entries(segments, len(force_N), _ENTRY_MARGIN)
-    rate_mps = np.gradient(uniform_filter1d(extension_m, 5), BLOCK_S)[even]
+    rate_mps = np.gradient(moving_mean(extension_m, 5), BLOCK_S)[even]
     force_N, extension_m = force_N[even], extension_m[even]
     extension_m = extension_m - extension_m.mean() + force_N.mean() / stiffness_N_per_m
     reaches = extension_m * (stiffness_N_per_m / scale_N)
@@ -59,7 +59,7 @@ def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment
     a low-pass and a frame apart.
     """
     short, long = (max(round(slips * slip_s / BLOCK_S), 1) for slips in (_SHORT, _LONG))
-    level_m = uniform_filter1d(extension_m, short)
+    level_m = moving_mean(extension_m, short)
     padded_m = np.pad(level_m, short, mode="edge")
     earlier_m, later_m = padded_m[: -2 * short], padded_m[2 * short :]
     columns = {
@@ -68,9 +68,9 @@ def spring_bend(force_N: Floats, extension_m: Floats, segments: Sequence[Segment
         "bend": (later_m - 2.0 * level_m + earlier_m) / (short * BLOCK_S) ** 2,
     }
     even = _away_from_entries(segments, len(force_N), _ENTRY_MARGIN + 2 * short)
-    fast = {name: (values - uniform_filter1d(values, long))[even] for name, values in columns.items()}
-    level_N = uniform_filter1d(force_N, short)
-    law, _ = _sequential_fit(fast, (level_N - uniform_filter1d(level_N, long))[even])
+    fast = {name: (values - moving_mean(values, long))[even] for name, values in columns.items()}
+    level_N = moving_mean(force_N, short)
+    law, _ = _sequential_fit(fast, (level_N - moving_mean(level_N, long))[even])
     return law["bend"]
 
 

@@ -33,7 +33,12 @@ _LEAST_OF_SECOND = 15.0  # of chi2 that a second effect would take by its direct
 
 
 def refitted(
-    fitter: Fitter, base_chi2: float, screening: Screening, hinted: frozenset[str] = frozenset(), jobs: int = 1
+    fitter: Fitter,
+    base_chi2: float,
+    screening: Screening,
+    hinted: frozenset[str] = frozenset(),
+    jobs: int = 1,
+    least: float = 0.0,
 ) -> list[Fit]:
     """The refits of what a screening promises most, the best one of every effect, best first.
 
@@ -46,10 +51,11 @@ def refitted(
         screening: of the rig without effects.
         hinted: effects that are refitted whatever they promise.
         jobs: processes.
+        least: gain of chi2 in two steps, below which no fit goes on to the end.
 
     """
     starts = _shortlist(screening.singles, hinted) + _levels(screening.singles)
-    return _refitted(fitter, base_chi2, starts, _FULL, jobs)
+    return _refitted(fitter, base_chi2, starts, _FULL, jobs, least)
 
 
 def refitted_rest(fitter: Fitter, base: Fit, seen: list[Fit], trials: list[Trial], jobs: int = 1) -> list[Fit]:
@@ -122,11 +128,13 @@ def _levels(found: list[Screened]) -> list[Screened]:
     return starts
 
 
-def _refitted(fitter: Fitter, base_chi2: float, starts: list[Screened], most: int, jobs: int) -> list[Fit]:
+def _refitted(
+    fitter: Fitter, base_chi2: float, starts: list[Screened], most: int, jobs: int, least: float = 0.0
+) -> list[Fit]:
     """The starts refitted a little, and the best `most` effects or pairs that are worth it to the end; best of each first."""
     quick = best_of_each(sorted(each_beside(jobs, _quick, fitter, starts), key=lambda fit: fit.chi2))
     gain = base_chi2 - quick[0].chi2 if quick else 0.0
-    worth = [fit for fit in quick[:most] if base_chi2 - fit.chi2 > _WORTH_FULL * gain]
+    worth = [fit for fit in quick[:most] if base_chi2 - fit.chi2 > max(_WORTH_FULL * gain, least)]
     worth.sort(key=lambda fit: -len(fit.w))  # long refits first: else one process ends with one, alone
     full = refits(fitter, [(fit.hypothesis, fit.deviations, fit.w) for fit in worth], jobs)
     done = {id(fit) for fit in worth}

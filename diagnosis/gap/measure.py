@@ -74,14 +74,11 @@ def whitened(floor: Floor, problem: Problem, predicted: Floats, knee: float = KN
     z = between(floor, predicted, problem.measured)
     lacking = np.logical_not(np.isfinite(z))
     if lacking.any():
-        segments = {run.file: run.commands.segments for run in problem.runs}
-        places = [
-            (file, label.segment) for (file, label), use in zip(problem.labels, floor.compared, strict=True) if use
-        ]
-        for file, segment in {place for place, lacks in zip(places, lacking, strict=True) if lacks}:
-            own = lacking & np.array([place == (file, segment) for place in places])
-            slips = segments[file][segment].slips if segment >= 0 else 1
-            z[own] = _LACKING_SLIP * max(slips, 1) ** 0.5 / np.linalg.norm(floor.whitening[:, own].sum(axis=1))
+        places = problem.place[floor.compared]
+        for place in np.unique(places[lacking]).tolist():
+            own = lacking & (places == place)
+            slips = max(problem.slips[place], 1)
+            z[own] = _LACKING_SLIP * slips**0.5 / np.linalg.norm(floor.whitening[:, own].sum(axis=1))
     return floor.whitening @ compress(z, knee), slope_of_compress(z, knee)
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from diagnosis.evidence.manifest import RigTable
-from diagnosis.features.feature import Feature, Features, Signals, scales_of
+from diagnosis.features.feature import Features, Signals, scales_of
 from diagnosis.features.force_drive import axis_features
 from diagnosis.features.grid import BLOCK_S, averaged, without_vibration
 from diagnosis.features.segments import Commands
@@ -84,19 +84,20 @@ class Problem:
         self.force_peak_N = max(float(np.abs(run.signals.get("drive_force_N", np.zeros(1))).max()) for run in runs)
         self._simulated: dict[object, Signals | None] = {}
         self._averaged = {run.file: averaged(run.commands.frequency_Hz) for run in runs}
-        self._measured = [self._features(run, run.signals) for run in runs]
-        self.measured = np.concatenate([np.array(found.values) for found in self._measured])
+        measured = [self._features(run, run.signals, labelled=True) for run in runs]
+        self.measured = np.concatenate([np.array(found.values) for found in measured])
+        self.labels = [
+            (run.file, label) for run, found in zip(runs, measured, strict=True) for label in found.labels
+        ]  # file and feature of every entry, [features]
+        places = [(file, label.segment) for file, label in self.labels]
+        numbers = {place: number for number, place in enumerate(dict.fromkeys(places))}
+        self.place = np.array([numbers[place] for place in places], np.int64)  # segment of every entry, [features]
+        segments = {run.file: run.commands.segments for run in runs}
+        self.slips = [segments[file][segment].slips if segment >= 0 else 1 for file, segment in numbers]  # [places]
 
     def __getstate__(self) -> dict[str, Any]:
         """State for another process, without the kept simulations."""
         return self.__dict__ | {"_simulated": {}}
-
-    @property
-    def labels(self) -> list[tuple[str, Feature]]:
-        """File and feature of every entry, [features]."""
-        return [
-            (run.file, label) for run, found in zip(self.runs, self._measured, strict=True) for label in found.labels
-        ]
 
     def predicted(self, point: Point) -> Floats:
         """Features of the model at `point`, [features]; all NaN where such a rig cannot be simulated."""
@@ -240,10 +241,12 @@ class Problem:
         by_number = dict(zip(configs, found, strict=True))
         return [by_number.get(number) for number in range(len(requests))]
 
-    def _features(self, run: Prepared, signals: Signals) -> Features:
+    def _features(self, run: Prepared, signals: Signals, labelled: bool = False) -> Features:
         if self.rig.drive == "force":
             return axis_features(signals, run.commands, self.rig)
-        return spring_features(without_vibration(signals, self._averaged[run.file]), run.commands, self.scales)
+        return spring_features(
+            without_vibration(signals, self._averaged[run.file]), run.commands, self.scales, labelled
+        )
 
 
 def _true_N(reading_N: float, effects: Effects, t_s: float) -> float:

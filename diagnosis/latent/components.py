@@ -22,9 +22,8 @@ _SPEEDS = 0.1  # spread of the logarithm of the speed from which a curve over th
 _REVISITED = 0.3  # share of rows that have a neighbour in place which is far in time, from which places are revisited
 _LOAD_VARIES = 0.02  # relative
 _NEAR_ROWS = 2.0  # times the usual distance of rows: shortest length of a process along the track
-_LONG = (
-    4.0  # shortest length of what goes with place, where a rough track is there besides: in lengths of the rough track
-)
+# Shortest length of what goes with place, where a rough track is there besides: in lengths of the rough track
+_LONG = 4.0
 _CENTRED = 1e-9  # mean diagonal below which a centred covariance is constant
 
 

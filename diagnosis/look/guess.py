@@ -67,6 +67,11 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
         reasons = [reason for reason in reasons if not reason.startswith("load = ")]
         reasons.append(f"force = {found['force']!r}, as no other column is one")
     if "time" not in found and not table.clocks:
+        dated = next((name for name in table.columns if name not in numeric and _has_dates(table, name)), "")
+        if dated:
+            found["time"] = dated
+            reasons.append(f"time = {dated!r}, which holds times")
+    if "time" not in found and not table.clocks:
         left = [name for name in numeric if name not in found.values()]
         rising = next((name for name in left if _is_clock(table, name)), "")
         # beside a column that numbers the rows it may be the way of an even drive
@@ -140,6 +145,14 @@ def _has_times(table: Table, name: str) -> bool:
     """Whether a column holds a time at all: LabVIEW writes the names of columns that it leaves empty."""
     try:
         return bool(np.isfinite(table.seconds(name)[0]).any())
+    except Fault:
+        return False
+
+
+def _has_dates(table: Table, name: str) -> bool:
+    """Whether a column holds dates or clock times, and no numbers."""
+    try:
+        return table.seconds(name)[1]
     except Fault:
         return False
 

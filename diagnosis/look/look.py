@@ -10,7 +10,7 @@ import numpy.typing as npt
 from diagnosis.look.breakaway import breakaway_of
 from diagnosis.look.numbers import Number, groups_of, jackknifed, mean_of
 from diagnosis.look.record import Part, noise_of, parts_of
-from diagnosis.look.slip_shape import LESS, Falls, Shape, falls_of, fit_shape
+from diagnosis.look.slip_shape import LESS, Falls, Shape, falls_of, fit_from_rest, fit_shape
 from diagnosis.look.slips import Slips, find_slips
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
@@ -19,6 +19,9 @@ Floats = npt.NDArray[np.float64]
 _FEWEST_FOR_SCATTER = 3
 _SURE = 1.2  # half intervals of 90 % from which a decay is there
 _ALIKE = 0.1  # share up to which what a decay does to level and ends is alike
+# Of a swing from rest: half intervals from which its decay is there; decay over frequency that creep and friction that falls
+# slowly do not look like, up to 0.041 on 127 rigs; and by what share of it the middle of the fall is lifted: 0.16 in theory.
+_SURER, _LEAST_DECAY, _LIFT = 1.6, 0.05, (0.1, 0.25)
 _LARGEST_DECAY = 2.5  # over a fall: a decay at the end of what is tried is none
 # names of numbers of a force, where a coefficient is looked at
 _MU = {
@@ -273,4 +276,20 @@ def _shape(falls: Falls) -> tuple[Shape | None, list[Shape], Shape | None]:
         level = (shape.force_N - falls.bottom_N) / (falls.top_N - falls.bottom_N)
         damped = there and abs((0.5 - level) / (0.5 - shape.level_of_ends()) - 1.0) < _ALIKE
     shape, others = found[damped]
+    if shape is not None and not damped and (rest := fit_from_rest(falls)) is not None:
+        again = [fit_from_rest(falls.without(group), rest) for group in groups]
+        without = [one for one in again if one is not None]
+        if _swings_from_rest(falls, shape, rest, without):
+            return rest, without, fit_from_rest(falls, rest, LESS)
     return shape, others, fit_shape(falls, damped, shape, LESS) if shape is not None else None
+
+
+def _swings_from_rest(falls: Falls, undamped: Shape, rest: Shape, without: list[Shape]) -> bool:
+    """Whether a swing from rest to rest surely decays, and lifts the middle of one without a decay as a decay does."""
+    if len(without) < _FEWEST_FOR_SCATTER:
+        return False
+    ratio = rest.decay_per_s / rest.omega_rad_per_s
+    half = jackknifed(ratio, [one.decay_per_s / one.omega_rad_per_s for one in without], "1")
+    lift = (undamped.force_N - falls.bottom_N) / (falls.top_N - falls.bottom_N) - 0.5
+    sure = ratio > _LEAST_DECAY and ratio > _SURER * (half.high - half.value)
+    return sure and _LIFT[0] * ratio < lift < _LIFT[1] * ratio

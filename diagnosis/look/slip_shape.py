@@ -94,6 +94,39 @@ def half_done(force_N: Floats, top: int, bottom: int, width: int) -> float:
     return float(near.mean()) + (half - float(y.mean())) / slope if slope < 0.0 else float(near.mean())
 
 
+def fit_from_rest(falls: Falls, near: Shape | None = None, first: float = FIRST) -> Shape | None:
+    """The swing with a decay that begins at rest at the mean breakaway and ends at rest at the mean re-stick; None: no fit.
+
+    These ends tie the level and the size to the decay, which is seen through more noise then. Friction that falls slowly after
+    the breakaway does not swing from rest, and gives no decay here or one below 0.
+    """
+    t, y = _inside(falls, first)
+
+    def rest(p: Floats) -> Floats:
+        ratio, w, middle = p
+        level = 1.0 / (1.0 + math.exp(math.pi * ratio))
+        phase = w * (t - middle) + 0.5 * math.pi
+        return level + (1.0 - level) * np.exp(-ratio * phase) * (np.cos(phase) + ratio * np.sin(phase)) - y
+
+    if len(t) < 6:
+        return None
+    start = list(near.found) if near is not None else [0.05, math.pi, 0.0]
+    ends = [-0.5, 1.0, -0.5], [1.5, 6.0, 0.5]
+    fitted = least_squares(rest, start, bounds=ends, x_scale=[0.1, 1.0, 0.1], xtol=1e-6, ftol=1e-8)
+    ratio, w, _ = (float(one) for one in fitted.x)
+    level = 1.0 / (1.0 + math.exp(math.pi * ratio))
+    force_N = falls.bottom_N + (falls.top_N - falls.bottom_N) * level
+    return Shape(force_N, w / falls.length_s, ratio * w / falls.length_s, tuple(fitted.x)) if fitted.success else None
+
+
+def _inside(falls: Falls, first: float) -> tuple[Floats, Floats]:
+    """Times over the length of a fall and forces over its height, without a share `first` of the height at either end."""
+    reach_s = math.acos(1.0 - 2.0 * first) / math.pi  # of the fall before its ends
+    inside = np.abs(falls.since_s) < (0.5 - reach_s) * falls.length_s
+    drop_N = falls.top_N - falls.bottom_N
+    return falls.since_s[inside] / falls.length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
+
+
 def fit_shape(falls: Falls, damped: bool, near: Shape | None = None, first: float = FIRST) -> Shape | None:
     """The swing in all falls, with a decay or without, from one that is near; None where it does not fit.
 
@@ -102,9 +135,7 @@ def fit_shape(falls: Falls, damped: bool, near: Shape | None = None, first: floa
     drop_N, length_s = falls.top_N - falls.bottom_N, falls.length_s
     if drop_N <= 0.0:
         return None
-    reach_s = math.acos(1.0 - 2.0 * first) / math.pi  # of the fall before its ends
-    inside = np.abs(falls.since_s) < (0.5 - reach_s) * length_s
-    t, y = falls.since_s[inside] / length_s, (falls.force_N[inside] - falls.bottom_N) / drop_N
+    t, y = _inside(falls, first)
     count = 5 if damped else 4
     if len(t) < 2 * count:
         return None

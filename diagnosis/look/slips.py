@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.look.record import Part, noise_of, smoothed
-from diagnosis.look.turns import turns
+from diagnosis.look.turns import long_turns
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -53,8 +53,9 @@ def find_slips(part: Part) -> Slips | None:
     width = 1
     widest = max(1, int(_WIDEST * len(part.force_N)))
     found: tuple[Indices, Indices] | None = None
+    noise_N = noise_of(part.force_N)
     while width <= widest:
-        tops, bottoms = _turning(part.force_N, width)
+        tops, bottoms = _turning(part.force_N, width, noise_N)
         if len(tops):
             found = tops, bottoms
             falls = bottoms - tops[: len(bottoms)]
@@ -68,25 +69,24 @@ def find_slips(part: Part) -> Slips | None:
         return None
     width = min(width, widest)
     tops, bottoms = found
-    return Slips(part, tops, bottoms, width, _straight(part, tops, bottoms, width))
+    return Slips(part, tops, bottoms, width, _straight(part, tops, bottoms, width, noise_N))
 
 
-def _turning(force_N: Floats, width: int) -> tuple[Indices, Indices]:
+def _turning(force_N: Floats, width: int, noise_N: float) -> tuple[Indices, Indices]:
     """Maxima and minima that alternate and differ by more than noise does, of the smoothed force."""
     smooth = smoothed(force_N, width)
     low, high = np.quantile(smooth, (0.01, 0.99))
-    drop_N = max(_NOISE_SPANS * noise_of(force_N) / (width | 1) ** 0.5, _SHARE * float(high - low))
+    drop_N = max(_NOISE_SPANS * noise_N / (width | 1) ** 0.5, _SHARE * float(high - low))
     if drop_N <= 0.0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    at = [0] * len(smooth)
-    count = turns(smooth.tolist(), drop_N, at)
-    return np.array(at[:count:2], np.int64), np.array(at[1:count:2], np.int64)
+    at = long_turns(smooth, drop_N)
+    return at[::2], at[1::2]
 
 
-def _straight(part: Part, tops: Indices, bottoms: Indices, width: int) -> float:
+def _straight(part: Part, tops: Indices, bottoms: Indices, width: int, sample_noise_N: float) -> float:
     """Share of the climbs between a re-stick and the next breakaway that are straight; of the first climb where it is alone."""
     smooth = smoothed(part.force_N, width)
-    noise_N = _NOISE_OF_MANY * noise_of(part.force_N) / (width | 1) ** 0.5
+    noise_N = _NOISE_OF_MANY * sample_noise_N / (width | 1) ** 0.5
     begins = bottoms[: len(tops) - 1]
     limit = _STRAIGHT
     if len(begins):

@@ -10,10 +10,13 @@ from diagnosis.look.sticks import cycles_of
 Floats = npt.NDArray[np.float64]
 # Speed in a stick over the mean speed around it: 1 for a drive; for a slide 0, and a few hundredths where its contact gives way.
 _LEAST_OF_DRIVE = 0.5
+_ENOUGH = 1 << 20  # samples that are looked at: a hundred slips of a slow rig at 10 kHz
 
 
 def is_of_slide(t_s: Floats, force_N: Floats, position_m: Floats) -> bool:
     """Whether a position is that of the slide, [samples] each, SI units. False where no stick shows it."""
+    few = slice(_ENOUGH)
+    t_s, force_N, position_m = t_s[few], force_N[few], position_m[few]
     shares: list[float] = []
     for part in parts_of(t_s, force_N, position_m):
         slips = find_slips(part)

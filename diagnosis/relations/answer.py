@@ -30,9 +30,8 @@ from diagnosis.relations.spring import spring_relation
 
 _FREE = 30.0  # spread of a pattern's coefficients, in rms of what is left: as good as free
 _SAME_SIZE = 0.1  # relative scatter of a size between runs that a formula a little beside the rig's makes
-_INFORMED = (
-    4.0  # information on a size, in inverse squares of it, from which a run is asked: a relative error of a half
-)
+# Information on a size, in inverse squares of it, from which a run is asked: a relative error of a half
+_INFORMED = 4.0
 
 
 class Trace(NamedTuple):

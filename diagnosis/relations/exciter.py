@@ -12,9 +12,8 @@ from diagnosis.relations.shapes import free
 _ROW_BLOCKS = 20  # blocks of a row: 20 ms
 _FEWEST_ROWS = 5  # stretches of vibration
 _RESOLUTION = 1e-3  # least noise of a row
-_ROLLED_OFF = (
-    0.5  # of ordinary accelerometers, with as much spread: see `accel_rolled_off` in `diagnosis.model.sensor_chain`
-)
+# Of ordinary accelerometers, with as much spread: see `accel_rolled_off` in `diagnosis.model.sensor_chain`
+_ROLLED_OFF = 0.5
 _GAIN = 0.01  # spread of an ordinary accelerometer's gain
 _UNEVEN = 0.003  # scatter of an ordinary accelerometer's gain from one frequency to another
 _CORNERS_HZ = (1000.0, 1500.0, 2200.0, 3200.0, 4500.0, 6500.0, 9500.0)  # of a roll-off

@@ -25,7 +25,7 @@ from diagnosis.fits.screening import screened
 from diagnosis.fits.search import middle_fits, pairs_of_effects, refitted, refitted_rest
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.starts import Trial
-from diagnosis.verdict.judge import COST_OF_EFFECT, Verdict, judge, of_another_place, refittable
+from diagnosis.verdict.judge import COST_OF_EFFECT, JITTER, Verdict, judge, of_another_place, refittable
 
 Progress = Callable[[str, float], None]
 # log evidence from which a name is not checked: a guess, as the one check seen to overturn a name took 8 to -7
@@ -44,6 +44,9 @@ _NEAR = 0.6  # of the gap: of 11 effects outside the library the best single one
 # of chi2 that the best single effect takes, of two that show one takes more; and that it leaves above the expected, as a second
 # effect that takes less would not pay
 _WORTH_MORE = 40.0
+# Of chi2: where the rig without effects leaves no more than a right one, a fit that has taken less in two steps ends there. An
+# effect is named only for twice that. Smaller: time. Larger: a bent effect, of which two steps see little, would be passed over.
+_HALF_A_NAME = JITTER * COST_OF_EFFECT
 
 
 class Known(NamedTuple):
@@ -128,7 +131,9 @@ class Contest:
         fitter, jobs = self.rig.fitter, self._jobs
         self._screening = screened(fitter, self.rig.fit, self._tried, jobs)
         progress("every effect was tried once; the leading ones are fitted", 0.35)
-        found = refitted(fitter, self.rig.fit.chi2, self._screening, self._known.hinted, jobs)
+        at_noise = not self._known.hinted and self.rig.fit.chi2 <= self.rig.expected_chi2
+        least = _HALF_A_NAME if at_noise else 0.0
+        found = refitted(fitter, self.rig.fit.chi2, self._screening, self._known.hinted, jobs, least)
         self.singles = self._finished(found)
         if self._shows_more():
             # an effect must not win because its refit found a valley of the nuisances that the others had missed

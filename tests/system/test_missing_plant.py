@@ -9,6 +9,7 @@ import pytest
 
 from bridge.faults import FAULTS, Fault
 from bridge.wire.zenoh_link import Bus, BusConfig
+from cockpit.faults.injection import inject
 from tests.system.ports import free_endpoint
 from tests.system.told import told
 
@@ -39,6 +40,14 @@ def test_a_controller_without_a_plant_is_told_what_to_start() -> None:
     with pytest.raises(Fault, match="no plant answers there after 1 s; start `stickslip plant`") as raised:
         Bus(config, "controller", lockstep=True, patience_s=1.0)
     assert raised.value.kind is FAULTS["NO_PEER"]
+    assert "--wait" not in str(raised.value)  # its patience is its own, as that of a command without the option
+
+
+def test_faults_are_not_said_to_be_over_where_no_rig_hears_it() -> None:
+    endpoint = free_endpoint()
+    rig = Bus(BusConfig(endpoint=endpoint, prefix="one"), "plant", lockstep=True)
+    with rig, pytest.raises(Fault, match="no rig is on it: --prefix must be that of the run"):
+        inject(BusConfig(endpoint=endpoint, prefix="other"), "clear", [], clear=True)
 
 
 def test_a_stop_is_heard_while_nobody_answers() -> None:

@@ -32,6 +32,7 @@ LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the nex
 LATE_SHARE = 0.01
 _MOST_EVENTS = 10  # of one source and code that are told one by one: a storm of them must not fill the memory
 _DEAD_S = 1.0  # a longer stretch of equal values is a dead sensor, as a live one has noise
+_OF_EVERY_BLOCK = {"plant": ("applied",), "controller": ("command", "trace")}  # topics by who sends them
 # the ends of a sensor's range in the rig's configuration; an acceleration's is the same both ways
 _RANGES = {
     "drive_force_N": ("force_lowest_N", "force_range_N"),
@@ -184,6 +185,8 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
     ]
     if seen.topics["sensors"].messages == 0:
         found.append(Finding("empty", path.name, "holds no sensor block"))
+    else:
+        found += _of_absent_topics(reader, seen)
     for event in seen.events:
         dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
         # a gap is a finding of its topic already
@@ -204,6 +207,21 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
     if reader.damage.closed and "START" in plant_codes and "END" not in plant_codes:
         found.append(Finding("no-end", "/event/plant", "the plant began its run and never ended it"))
     return found
+
+
+def _of_absent_topics(reader: LogReader, seen: _Pass) -> list[Finding]:
+    """A finding for each topic without a message that a process of the run sends for every block; an imported log has none."""
+    if "import" in reader.metadata:
+        return []
+    blocks = counted(seen.topics["sensors"].messages, "block")
+    return [
+        Finding(
+            "absent", f"/{name}", f"no message beside {blocks}: the {role} sent none, or a program left the topic out"
+        )
+        for role, names in _OF_EVERY_BLOCK.items()
+        for name in names
+        if role in reader.metadata and not seen.topics[name].messages
+    ]
 
 
 def _of_signal(where: str, seen: SignalLook, sample_s: float, ends: tuple[float, float]) -> list[Finding]:

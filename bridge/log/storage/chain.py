@@ -254,7 +254,8 @@ def chain_in_words(chain: Chain) -> str:
             "whether a byte was changed cannot be seen"
         )
     if not (chain.links or chain.changes):
-        return "chain    none: this log was written without one, so a changed byte outside of its chunks cannot be seen"
+        where = "this log was written without one" if chain.closed else "no link is in what is left of this log"
+        return f"chain    none: {where}, so a changed byte outside of its chunks cannot be seen"
     if chain.changes:
         return f"chain    BROKEN at {counted(chain.changes, 'place')} of {counted(chain.links, 'link')}"
     until = "every byte is" if chain.ended and chain.closed else "up to the last whole chunk every byte is"

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from bridge.tables.cells import APOSTROPHES, BLANKS, is_time
+from bridge.tables.text.unit_cells import number_and_unit
 
 BLANK = " "  # the delimiter of columns that are parted by any number of blanks and tabs
 _DELIMITERS = (",", ";", "\t", "|", " ")
@@ -54,8 +55,8 @@ class Form(NamedTuple):
         return row
 
     def is_number(self, cell: str) -> bool:
-        """Whether a cell is a number of this form."""
-        return _pattern(self.decimal, self.thousands).fullmatch(cell.strip()) is not None
+        """Whether a cell is a number of this form, with or without a unit."""
+        return _pattern(self.decimal, self.thousands).fullmatch(number_and_unit(cell)[0]) is not None
 
     def is_value(self, cell: str) -> bool:
         """Whether a cell is a number, a time, empty, or a word that stands for a missing number."""
@@ -107,7 +108,7 @@ def _one_column_with_commas(lines: Sequence[str]) -> bool:
 def _numbers(lines: Sequence[str], begin: Sequence[str], delimiter: str, quote: str, given: Dialect) -> tuple[str, str]:
     """Marks of decimals and thousands with which most cells are numbers."""
     trial = Form(delimiter, quote, ".", "")
-    cells = [cell.strip() for line in lines for cell in trial.cells(line)]
+    cells = [number_and_unit(cell)[0] for line in lines for cell in trial.cells(line)]
     decimals = {
         found[1] for line in begin for cell in trial.cells(line) if (found := _BELOW_ONE.fullmatch(cell.strip()))
     }

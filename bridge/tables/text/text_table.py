@@ -4,15 +4,18 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 
 from bridge.faults import Fault
 from bridge.log.finding import Finding
+from bridge.tables.cells import is_text, texts_of
 from bridge.tables.table import Table
 from bridge.tables.text.dialect import BLANK, Dialect, Form, form_of
 from bridge.tables.text.encoding import decoded
 from bridge.tables.text.head import COMMENTS, Head, read_head
+from bridge.tables.text.unit_cells import units_apart
 from bridge.tables.unit_words import unknown_units
 from bridge.units import counted
 
@@ -22,12 +25,16 @@ pa.enable_signal_handlers(False)
 _HEAD_CHARACTERS = 1 << 18  # in which the rows must begin; LabVIEW and DIAdem write some 10 kB above them
 _PIECES, _PIECE_CHARACTERS = 12, 4096  # of the rest, in which the form of the rows is found
 _MOST_LEFT_OUT = 0.1  # share of rows with too many or too few cells, from which it is another kind of file
+# a quoted name over several lines, as spreadsheets write a cell with line breaks; a quote elsewhere is an inch
+_NAME_OF_LINES = re.compile(r'(?:^|(?<=[,;\t|]))"[^"\r\n]{0,80}[\r\n][^"]{0,80}"(?=[,;\t|\r\n]|\Z)', re.MULTILINE)
 _SHOWN = 60  # characters of a line in a finding
 
 
 def read_text(path: Path, given: Dialect) -> Table:
     """Read a text table; what `given` leaves open is found and said. Raises Fault BAD_TABLE."""
     text, encoding = decoded(path.read_bytes(), given.encoding, path.name)
+    if '"' in text[:_HEAD_CHARACTERS]:
+        text = _NAME_OF_LINES.sub(lambda name: re.sub(r"\s+", " ", name[0]), text)
     head_lines = text[:_HEAD_CHARACTERS].splitlines()
     if not any(line.strip() for line in head_lines):
         raise Fault("BAD_TABLE", f"{path.name}: is empty; give a file with rows")
@@ -35,15 +42,20 @@ def read_text(path: Path, given: Dialect) -> Table:
     form = form_of(body, given, any('"' in line for line in (*head_lines, *body)), head_lines)
     head = read_head(head_lines, body, form, given, path.name)
     rows, left_out, some = _rows(text, head, form, given)
-    columns = {name: rows.column(i) for i, name in enumerate(head.names)}
+    columns: dict[str, Any] = {name: rows.column(i) for i, name in enumerate(head.names)}
     findings = [*_told(path.name, head, form, encoding, given), *_lost(path.name, left_out, some, rows.num_rows)]
+    units = head.unit_of
+    for name, column in columns.items():
+        if is_text(column.type) and (apart := units_apart(texts_of(column), form.decimal, form.thousands)):
+            columns[name], units[name] = np.array(apart[0]), apart[1]
+            findings.append(Finding("assumed", path.name, f"column {name} has the unit {apart[1]} in its cells"))
     written: dict[str, Any] = {"delimiter": form.delimiter, "decimal": form.decimal, "encoding": encoding}
     written |= {"thousands": form.thousands} if form.thousands else {}
     written |= {"names": head.names} if head.names_line < 0 else {"skip_rows": head.names_line}
     return Table(
         path,
         columns,
-        units=head.unit_of,
+        units=units,
         sample_rate_Hz=1.0 / head.step_s if head.step_s else None,
         decimal=form.decimal,
         thousands=form.thousands,

@@ -261,3 +261,10 @@ def test_the_files_of_a_log_may_number_their_channels_differently(tmp_path: Path
         writer.finish()
     assert read_run(path).sensors["sequence"].tolist() == list(range(400))
     assert [finding.kind for finding in check_log(path).findings if finding.kind in {"changed", "damaged"}] == []
+
+
+def test_a_topic_that_a_filter_left_out_is_named(tmp_path: Path) -> None:
+    path = written_anew(tmp_path / "filtered.mcap", keep=lambda topic: topic not in {"/trace", "/applied"})
+    found = {one.where: one.text for one in check_log(path).findings if one.kind == "absent"}
+    assert found.keys() == {"/trace", "/applied"}
+    assert "the controller sent none, or a program left the topic out" in found["/trace"]

@@ -77,6 +77,15 @@ def test_a_file_of_unnamed_columns_is_asked_about(tmp_path: Path) -> None:
     assert result.exit_code == 0
 
 
+def test_a_column_of_clock_times_is_the_time_whatever_its_name(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    rows = (f"10:00:{second:09.6f},{force:.4f}\n" for second, force in zip(t_s, force_N, strict=True))
+    (tmp_path / "a.csv").write_text("When,F [N]\n" + "".join(rows))
+    table = seen_in(tmp_path / "a.csv")
+    assert table["slips"] == 5
+    assert "time = 'When', which holds times" in said(table)
+
+
 def test_an_import_without_a_map_writes_the_one_it_assumed(tmp_path: Path) -> None:
     source, out = tribometer(tmp_path), tmp_path / "evidence"
     result = CliRunner().invoke(app, ["log", "import", str(source), "--out", str(out)])

@@ -19,9 +19,8 @@ from plant.node import PlantNode
 
 
 def rig(*settings: str):
-    free = (
-        "guard.loud_ratio={alarm=1e9,abort=1e9}"  # the amplitude tells which command acts, and grows beyond all sense
-    )
+    # The amplitude tells which command acts, and grows beyond all sense
+    free = "guard.loud_ratio={alarm=1e9,abort=1e9}"
     slewing = ["piezo.amplitude_slew_m_per_s=0.0", "piezo.amplitude_max_m=0.001"]
     return load_rig("paper-c45-c45", [free, *slewing, *settings])
 

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import scipy.io
 import xlsxwriter
 from mcap_ros2.writer import Writer
@@ -85,6 +87,28 @@ def _sheet(path: Path) -> None:
             sheet.write_row(row + 3, 0, values)
 
 
+def _text_sheet(path: Path) -> None:
+    with xlsxwriter.Workbook(str(path)) as book:
+        sheet = book.add_worksheet("data")
+        sheet.write_row(0, 0, ["Zeit", "Kraft"])
+        for row, (time, force) in enumerate(zip(T, FORCE, strict=True)):
+            sheet.write_number(row + 1, 0, time)
+            sheet.write_string(row + 1, 1, german(f"{force:.5f}"))
+
+
+def _record(path: Path) -> None:
+    table = np.zeros(len(T), [("t", "f8"), ("n", "i4")])
+    table["t"] = T
+    with h5py.File(path, "w") as file:
+        file["table"], file["x"], file["data"] = table, 1e3 * POSITION, np.column_stack([T, FORCE])
+        file["x"].attrs["units"] = "mm"
+
+
+def _parquet(path: Path) -> None:
+    stamps = pa.array((T * 1e9).round().astype(np.int64), pa.duration("ns"))
+    pq.write_table(pa.table({"stamp": stamps, "ft": pa.StructArray.from_arrays([pa.array(FORCE)], ["force"])}), path)
+
+
 _HEADER = "std_msgs/Header header\n"
 _TYPES = {
     "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id",
@@ -143,6 +167,13 @@ KINDS = (
     Kind("labview.lvm", _LVM + "X_Value\tKraft\tWeg\tComment\r\n" + german(rows(T, FORCE, POSITION, sep="\t", end="\r\n")), ("X_Value", "Kraft", "")),
     Kind("plotjuggler.csv", "__time,/ft/force,/axis/position\n" + "".join(f"{1.7e9 + s:.6f},{f:.5f},\n" if i % 2 == 0 else f"{1.7e9 + s:.6f},,{p:.8f}\n" for i, (s, f, p) in enumerate(zip(T, FORCE, POSITION, strict=True))), ("__time", "/ft/force", "/axis/position"), slice(2, 1000, 2), says="has its own clock"),
     Kind("rosbag.csv", "%time,field.wrench.force.x\n" + "".join(f"{1_700_000_000_000_000_000 + round(s * 1e9)},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("%time", "field.wrench.force.x", ""), says="time of the calendar"),
+    Kind("sec-nanosec.csv", "header.stamp.sec,header.stamp.nanosec,F\n" + "".join(f"{1_700_000_000 + int(s)},{round(s % 1 * 1e9)},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("header.stamp.sec", "F", ""), says="both are one time"),
+    Kind("minutes.csv", "Elapsed,F\n" + rows([f"{(3599 + s) % 3600 // 60:02.0f}:{(59 + s) % 60:06.3f}" for s in T], FORCE), ("Elapsed", "F", "")),
+    Kind("unit-in-cells.csv", "t,F\n" + "".join(f"{s:.6f},{f'{f:.5f} N' if i % 3 else f'{1e3 * f:.2f} mN'}\n" for i, (s, f) in enumerate(zip(T, FORCE, strict=True))), ("t", "F", ""), says="has the unit N in its cells"),
+    Kind("names-of-two-lines.csv", '"Time\n[s]";"Force\n[kN]"\n' + rows(T, 1e-3 * FORCE, sep=";", form="{:.8f}"), ("Time", "Force", ""), says="is in kN: times 1000"),
+    Kind("record.h5", _record, ("table.t", "data[1]", "x"), says="x is in mm: times 0.001"),
+    Kind("struct.parquet", _parquet, ("stamp", "ft.force", "")),
+    Kind("numbers-as-text.xlsx", _text_sheet, ("Zeit", "Kraft", "")),
     Kind("dspace.mat", _dspace, ("rec001.X.Data", "rec001.Y[0].Data", "Position")),
     Kind("dspace-names.mat", _dspace, ("", "Force", "Position")),
     Kind("v73.mat", _hdf5, ("run.t", "run.F", "run.x")),

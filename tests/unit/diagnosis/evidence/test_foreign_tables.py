@@ -1,5 +1,6 @@
 """Tables of other programs come in as they are, with a map that names the columns and nothing else."""
 
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -67,3 +68,9 @@ def test_without_a_time_one_line_asks_for_it(tmp_path: Path) -> None:
         Fault, match=r"a.csv: no time: .*add under \[source\] sample_rate_Hz = 1000.0 \(columns here: F\)"
     ):
         import_file(tmp_path / "a.csv", channel_map(tmp_path, drive_force_N="F"), tmp_path / "out")
+
+
+def test_a_packed_file_is_named_as_one(tmp_path: Path) -> None:
+    (tmp_path / "a.csv.gz").write_bytes(gzip.compress(b"t,F\n0,1\n"))
+    with pytest.raises(Fault, match=r"a.csv.gz: is packed by gzip; unpack it, and give the file that is in it"):
+        import_file(tmp_path / "a.csv.gz", channel_map(tmp_path, t_s="t", drive_force_N="F"), tmp_path / "out")

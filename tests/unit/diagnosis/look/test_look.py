@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis.look.look import Known, Look, look
+from diagnosis.look.turns import long_turns, turns
 from diagnosis.look.words import cannot_tell
 from plant.config import RigConfig
 from plant.simulate import simulate
@@ -174,3 +175,27 @@ def test_a_drift_and_several_speeds_are_told_and_an_even_record_tells_neither() 
     assert "no single speed" not in even
     assert "the breakaway rises by 2.85 N" in told((scatter + np.linspace(0.0, 3.0, 30)).tolist(), [1e-3] * 30)
     assert "no single speed: sticks climb by 11.7 to 23.5" in told(scatter.tolist(), [1e-3] * 15 + [2e-3] * 15)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.06, 0.15])
+def test_what_viscous_damping_takes_from_a_fall_is_not_taken_for_friction(decay: float) -> None:
+    t_s = np.arange(0.0, 20.0, 1e-3)
+    phase = np.pi * (t_s % 1.0 - 0.97) / 0.03  # of a swing from rest to rest, decay over frequency known
+    end = -np.exp(-decay * np.pi)
+    swing = np.exp(-decay * phase.clip(0.0)) * (np.cos(phase) + decay * np.sin(phase))
+    share = np.where(phase < 0.0, end + (1.0 - end) * (t_s % 1.0) / 0.97, swing)
+    force_N = 20.0 + 10.0 * share + 0.05 * np.random.default_rng(3).standard_normal(len(t_s))
+    seen = look(t_s, force_N, None, Known(1e-3))
+    assert seen is not None
+    found = seen.numbers["kinetic_force_N"]
+    assert found.value == pytest.approx(20.0, rel=0.006)
+    assert found.low <= 20.0 <= found.high
+
+
+def test_pieces_that_are_passed_over_hold_no_turn() -> None:
+    random = np.random.default_rng(0)
+    for length, step, drop in ((0, 1.0, 1.0), (255, 1.0, 1.0), (3000, 1.0, 3.0), (5000, 0.1, 1.0), (5000, 0.1, 30.0)):
+        values = np.round(np.cumsum(step * random.standard_normal(length)), 1)  # with equal ones
+        at = [0] * (length + 1)
+        count = turns(values.tolist(), drop, at)
+        assert long_turns(values, drop).tolist() == at[:count]

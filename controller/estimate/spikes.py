@@ -1,0 +1,175 @@
+"""Samples that stand alone: far from both neighbours, which go on as if it were not there.
+
+No slide, drive or spring goes away and comes back within one sample, so such a sample says nothing of any of them, and the mean
+of its neighbours takes its place (Hampel's rule, with the noise in the place of the median of deviations). One a channel, and
+not in two blocks in a row: more of them are noise, or a fault. The last sample of a block has no neighbour on its right, so a
+leap there counts from the next block on.
+"""
+
+import math
+
+import numpy as np
+
+from bridge.kernel import Record, kernel
+from controller.estimate.windows import DRIVE, FORCE, ROWS, SLIDE
+
+# Of the mean bend of white noise, times the root of the samples in a bin: the spike is then 6 sigma of the slope of four bins,
+# and a smaller one is no slip.
+BENDS = 9.0
+_STEPS = 4.0  # of the resolution: a step up and down again bends by two
+_ROUNDED = 2e-7  # of a value, by which the wire's float32 rounds
+_LEFT = 0.25  # share of a bend that the mean of the neighbours leaves beside it; of a step or a kink it leaves half
+_NEAR = 0.25  # of the bend of a spike: where no sample is farther from the one before the block, none is a spike
+_LARGEST = 3e38  # of a bend that a float32 holds
+_LEARN = 0.125  # share of one look
+_GROWS = 2.0  # most by which the noise grows in one block
+
+
+@kernel
+def find_spikes(p: Record, s: Record, block: Record) -> bool:
+    """Find the spikes of a block; false where a sample is no number: it would stay in the filters for ever.
+
+    A channel that the configuration leaves out is not looked at.
+    """
+    if s.missing_blocks > 0:
+        s.tail[:, :] = math.nan
+    if s.spiked == 1:
+        s.spiked, s.spike_at[:] = 0, -1
+    bad = _not_finite(block.base_accel_mps2) + _look(p, s, DRIVE, block.drive_position_m)
+    if p.use_force == 1:
+        bad += _look(p, s, FORCE, block.drive_force_N)
+    if p.use_slide_position == 1:
+        bad += _look(p, s, SLIDE, block.mass_position_m)
+    return bad == 0
+
+
+@kernel
+def sum_without(s: Record, row: int, samples: Record, first: int, count: int) -> float:
+    """Sum of some samples, in which the mean of its neighbours takes the place of a spike."""
+    total = 0.0
+    for i in range(first, first + count):
+        total += s.spike[row] if i == s.spike_at[row] else float(samples[i])
+    return total
+
+
+@kernel
+def learn_bends(p: Record, s: Record, look: int, block: Record) -> None:
+    """Follow the noise of one channel in turn; `look` counts."""
+    if look % ROWS == FORCE:
+        _learn(p, s, FORCE, block.drive_force_N)
+    elif look % ROWS == SLIDE:
+        _learn(p, s, SLIDE, block.mass_position_m)
+    else:
+        _learn(p, s, DRIVE, block.drive_position_m)
+
+
+@kernel
+def _learn(p: Record, s: Record, row: int, samples: Record) -> None:
+    """Follow the noise of a channel: its mean bend from sample to sample."""
+    bend = 0.0
+    for i in range(2, samples.shape[0]):
+        bend += math.fabs(float(samples[i]) - 2.0 * float(samples[i - 1]) + float(samples[i - 2]))
+    bend /= samples.shape[0] - 2
+    known = s.bends[row]
+    known += bend if known == 0.0 else _LEARN * min(bend - known, known)
+    _know(p, s, row, known, float(samples[0]))
+
+
+@kernel
+def _look(p: Record, s: Record, row: int, samples: Record) -> int:
+    """Look at one channel; return how many samples are no numbers."""
+    count, bad = samples.shape[0], 0
+    if _count_far(s.tail[row, 1], samples, _NEAR * s.most_bend[row]) > 0:
+        bad = _look_closer(p, s, row, samples)
+    s.tail[row, 0], s.tail[row, 1] = float(samples[count - 2]), float(samples[count - 1])
+    if s.spiked == 1 and s.spike_at[row] >= count - 2:
+        s.tail[row, s.spike_at[row] - count + 2] = s.spike[row]
+    return bad
+
+
+@kernel
+def _look_closer(p: Record, s: Record, row: int, samples: Record) -> int:
+    bad = 0
+    if _count_bent(s.tail[row, 0], s.tail[row, 1], samples, s.most_bend[row]) > 0:
+        bad = _not_finite(samples)
+        if bad == 0 and s.bends[row] > 0.0:
+            _search(p, s, row, samples)
+    return bad
+
+
+@kernel
+def _count_far(last: float, samples: Record, most: float) -> int:
+    """How many samples are farther away, or are no numbers; counted without a branch, as eight at once are."""
+    near, limit, far = np.float32(last), np.float32(most), 0
+    for i in range(samples.shape[0]):
+        far += 0 if abs(samples[i] - near) <= limit else 1
+    return far
+
+
+@kernel
+def _count_bent(before: float, last: float, samples: Record, most: float) -> int:
+    """How many samples bend by more, or are no numbers; counted without a branch."""
+    first, second, bent = float(samples[0]), float(samples[1]), 0
+    bent += 0 if math.fabs(before - 2.0 * last + first) <= most else 1
+    bent += 0 if math.fabs(last - 2.0 * first + second) <= most else 1
+    limit = np.float32(most)
+    for i in range(2, samples.shape[0]):
+        bend = (samples[i] - samples[i - 1]) - (samples[i - 1] - samples[i - 2])
+        bent += 0 if abs(bend) <= limit else 1
+    return bent
+
+
+@kernel
+def _not_finite(samples: Record) -> int:
+    """How many are no number; counted without a branch, as eight at once are."""
+    bad = 0
+    for i in range(samples.shape[0]):
+        value = float(samples[i])
+        bad += 1 if value - value != 0.0 else 0
+    return bad
+
+
+@kernel
+def _search(p: Record, s: Record, row: int, samples: Record) -> None:
+    """Note the largest spike; where there is none, the noise has grown."""
+    count, largest, total = samples.shape[0], s.most_bend[row], 0.0
+    steep = 0.0  # bend before that of the last three samples
+    for i in range(count - 1):
+        left, here, right = _at(s, row, samples, i - 1), float(samples[i]), float(samples[i + 1])
+        bend = math.fabs(left - 2.0 * here + right)
+        if i == count - 3:
+            steep = bend
+        total += bend if math.isfinite(bend) else 0.0
+        if bend > largest:
+            mean = 0.5 * (left + right)
+            stays = math.fabs(_at(s, row, samples, i - 2) - 2.0 * left + mean) > _LEFT * bend
+            stays = stays or math.fabs(mean - 2.0 * right + _at(s, row, samples, i + 2)) > _LEFT * bend
+            if not stays:
+                largest = bend
+                s.spiked, s.spike_at[row], s.spike[row] = 1, i, mean
+    end, before = float(samples[count - 1]), float(samples[count - 2])
+    bend = math.fabs(end - 2.0 * before + float(samples[count - 3]))
+    if bend > largest and not steep > _LEFT * bend:
+        s.spiked, s.spike_at[row], s.spike[row] = 1, count - 1, before
+    if s.spike_at[row] < 0:
+        _know(p, s, row, min(max(total / count, s.bends[row]), _GROWS * s.bends[row]), end)
+        return
+    if s.steps == s.spike_step[row] + 1:
+        s.spike_at[row] = -1  # not alone: what spikes block after block is for the trips to doubt
+    s.spike_step[row] = s.steps
+
+
+@kernel
+def _know(p: Record, s: Record, row: int, bend: float, value: float) -> None:
+    """Know the mean bend of the noise, and with it that of the least spike; `value` is one of the samples."""
+    s.bends[row] = bend
+    floor = _STEPS * max(s.resolution[row], _ROUNDED * math.fabs(value))
+    s.most_bend[row] = min(max(p.spike_bends * bend, floor), _LARGEST)
+
+
+@kernel
+def _at(s: Record, row: int, samples: Record, i: int) -> float:
+    """A sample of this block, or one of the two before it; no number where it is not known."""
+    if i >= samples.shape[0]:
+        return math.nan
+    return float(samples[i]) if i >= 0 else float(s.tail[row, 2 + i])

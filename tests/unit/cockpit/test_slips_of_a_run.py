@@ -1,0 +1,65 @@
+"""Which falls of the force of a run are slips, against motions worked out by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridge.log.logfile import RunData, read_run
+from cockpit.judge.slips import cycles_of
+from tests.logs import Tables, doctored
+
+STIFFNESS_N_PER_M = 1e6
+SPEED_MPS = 1e-3
+
+
+def made_run(folder: Path, drive_m: np.ndarray, behind_m: np.ndarray, places: bool = True) -> RunData:
+    """A run of 400 blocks whose slide is so far behind its drive; [samples]."""
+    count = len(drive_m)
+    noise_N = 0.01 * np.random.default_rng(1).standard_normal(count)
+
+    def make(tables: Tables) -> None:
+        sensors = tables["sensors"]
+        shape = sensors["drive_force_N"].shape
+        sensors["drive_position_m"] = drive_m.reshape(shape)
+        sensors["mass_position_m"] = (drive_m - behind_m).reshape(shape) if places else 0.0
+        sensors["drive_force_N"] = (STIFFNESS_N_PER_M * behind_m + noise_N).reshape(shape)
+
+    return read_run(doctored(folder, make))
+
+
+T_S = np.arange(8000) / 20000.0  # 400 blocks of 20 samples
+
+
+def sawtooth_m(t_s: np.ndarray) -> np.ndarray:
+    """The slide sticks for 36 ms and slips by 40 um in 4 ms."""
+    at = np.mod(t_s, 0.04)
+    return np.where(at < 0.036, at * SPEED_MPS, 3.6e-5 * (0.04 - at) / 0.004) + 2e-5
+
+
+def test_slips_count_on_both_ways_and_a_turn_is_none(tmp_path: Path) -> None:
+    drive_m = SPEED_MPS * np.where(T_S < 0.2, T_S, 0.4 - T_S)
+    behind_m = np.where(T_S < 0.2, 1.0, -1.0) * sawtooth_m(np.mod(T_S, 0.2))
+    cycles = cycles_of(made_run(tmp_path, drive_m, behind_m))
+    assert cycles is not None
+    assert cycles.slips == 10
+    assert np.sign(cycles.breakaway_force_N).tolist() == [1.0] * 5 + [-1.0] * 5
+    assert np.mod(cycles.breakaway_t_s, 0.04) == pytest.approx(0.036, abs=2e-3)
+
+
+@pytest.mark.parametrize("places", [True, False])
+def test_a_slide_that_comes_after_a_drive_that_stops_does_not_slip(tmp_path: Path, places: bool) -> None:
+    drive_m = SPEED_MPS * np.minimum(T_S, 0.2)
+    coasts_m = np.clip((T_S - 0.2) * SPEED_MPS, 0.0, 1e-5)
+    cycles = cycles_of(made_run(tmp_path, drive_m, 5e-5 - coasts_m, places))
+    assert cycles is not None
+    assert cycles.slips == 0
+
+
+@pytest.mark.parametrize(("swing", "slips"), [(0.2, 0), (0.9, 4)])
+def test_a_drive_that_rings_does_not_slip_until_the_slide_runs_ahead(tmp_path: Path, swing: float, slips: int) -> None:
+    rad_per_s = 2.0 * np.pi / 0.1
+    behind_m = 2e-5 + swing * SPEED_MPS / rad_per_s * np.cos(rad_per_s * T_S)  # v_s = v_d (1 + swing sin)
+    cycles = cycles_of(made_run(tmp_path, SPEED_MPS * T_S, behind_m))
+    assert cycles is not None
+    assert cycles.slips == slips
