@@ -41,7 +41,7 @@ class PolicyConfig(Strict):
         description="on-demand: when it sticks; moving: while the drive moves; start-only: for start_s after each start; "
         "settle: on-demand, and for settle_s less and less after each move.",
     )
-    enabled_from_s: NotNegative = Field(default=0.0, description="From the start of the run.")
+    enabled_from_s: NotNegative = Field(default=0.0, le=1e9, description="From the start of the run.")
     first_probe_s: Positive = Field(default=0.5, description="After the first vibration at a speed.")
     probe_every_s: Positive = Field(
         default=10.0,

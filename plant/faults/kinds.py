@@ -61,7 +61,7 @@ ALL = (
     _at_least_0(EXCITER, "hot", "its share falls to the value, with a time constant of 1 s", "factor", 0.3, 1.0),
     Kind(EXCITER, "dead", "does not move"),
     _at_least_0(EXCITER, "slow", "its amplitude changes no faster", "m/s", None),
-    Kind(CLOCK, "jump", "t_ns of the blocks is off", "s", None),
+    Kind(CLOCK, "jump", "t_ns of the blocks is off", "s", None, -1e9, 1e9),
     Kind(CLOCK, "frozen", "t_ns of the blocks stands"),
     Kind(CLOCK, "fast", "t_ns of the blocks runs fast", "share", 0.01, -0.9, 10.0),
     Kind(CLOCK, "renumbered", "the numbers of the blocks are off", "blocks", 1e6, -1e9, 1e15),

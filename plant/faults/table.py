@@ -8,6 +8,8 @@ from bridge.config import Strict
 from bridge.wire.messages import CHANNELS
 from plant.faults.kinds import BUS, KINDS, LARGEST, PROCESS, SENSORS, TARGETS, group_of
 
+_LONGEST_S = 1e9  # 30 years; a time far beyond is no number of blocks
+
 
 class FaultTable(Strict):
     """A fault that a run has on purpose. The rig must be simulated."""
@@ -17,8 +19,10 @@ class FaultTable(Strict):
     )
     kind: str = Field(description="What goes wrong: `stickslip fault --list` has all kinds.")
     target: str = Field(description="A channel, sensors, exciter, clock, blocks, commands, link, or a process.")
-    from_s: Annotated[float, Field(ge=0)] = Field(default=0.0, description="Time of the run at which it begins.")
-    for_s: Annotated[float, Field(ge=0)] = Field(default=0.0, description="How long; 0: to the end.")
+    from_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(
+        default=0.0, description="Time of the run at which it begins."
+    )
+    for_s: Annotated[float, Field(ge=0, le=_LONGEST_S)] = Field(default=0.0, description="How long; 0: to the end.")
     value: float | None = Field(default=None, description="Its size, by kind.")
     other: str = Field(default="", description="Of `swapped`: the other channel.")
 

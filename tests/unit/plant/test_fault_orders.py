@@ -58,6 +58,9 @@ def test_clear_ends_what_acts_and_what_is_to_come() -> None:
         (order([1]), "is no JSON object"),
         (order(OFF | {"kind": "x"}), "kind = x: must fit target"),
         (order({"kind": "killed", "target": "controller"}), "a rig ends no process"),
+        (order(OFF | {"for_s": 1e308}), "for_s = 1e.308: must be less than"),
+        (order(OFF | {"from_s": 1e300}), "from_s = 1e.300: must be less than"),
+        (order({"kind": "jump", "target": "clock", "value": -1e200}), "value = -1e.200: must be -1e.09 to 1e.09"),
     ],
 )
 def test_what_is_no_order_is_refused(payload: bytes, line: str) -> None:

@@ -147,6 +147,7 @@ def test_delay_and_jitter_make_the_same_tables_in_one_process_and_block_by_block
         ),
         (["rig.loop.delay_s=0.3"], ["rig.loop.delay_s = 0.3", "less than or equal to 0.2"]),
         (["rig.solver.block_s=0.0002"], ["rig.solver.block_s = 0.0002", "greater than or equal to 0.00025"]),
+        (["controller.policy.enabled_from_s=1e300"], ["enabled_from_s = 1e+300", "less than or equal to"]),
         (["rig.solver.block_s=0.021"], ["rig.solver.block_s = 0.021", "less than or equal to 0.02"]),
     ],
 )
