@@ -45,14 +45,20 @@ def read_json(path: Path) -> Any:
 
 _MOST_LINKS = 40  # one after the other, as the kernel's own limit is
 _LONGEST_STEM_BYTES = 100  # of a file's name that the name of its unfinished copy begins with
-LOG, JSON = "run log", "JSON"
-_BEGINS = {LOG: (b"\x89MCAP",), JSON: (b"{", b"[")}
+LOG, JSON, PICTURE, PAGE = "run log", "JSON", "picture", "page"
+_BEGINS = {  # in small letters
+    LOG: (b"\x89mcap",),
+    JSON: (b"{", b"["),
+    PICTURE: (b"\x89png", b"%pdf", b"<?xml", b"<svg"),
+    PAGE: (b"<!doctyp", b"<html"),
+}
 
 
 def refuse_to_replace(path: Path, kind: str, place: str) -> None:
-    """Raise Fault CONFIG where `path` is a file that is not of this kind (LOG or JSON), or a log would go into a pipe.
+    """Raise Fault CONFIG where `path` is a file that is not of this `kind`, or a log would go into a pipe.
 
-    `place` is what the error names: the option that gave the path, or the path.
+    A kind is LOG, JSON, PICTURE or PAGE, told by the first bytes. `place` is what the error names: the option that gave
+    the path, or the path.
     """
     try:
         if kind == LOG and (path.is_fifo() or path.is_socket()):  # would wait for a reader, and cannot be read again
@@ -60,7 +66,7 @@ def refuse_to_replace(path: Path, kind: str, place: str) -> None:
         if not path.is_file() or path.stat().st_size == 0:
             return
         with path.open("rb") as file:
-            begins = file.read(8).lstrip()
+            begins = file.read(8).lstrip().lower()
     except OSError:  # who writes it says why it cannot
         return
     if not begins.startswith(_BEGINS[kind]):

@@ -120,10 +120,10 @@ def blind_pool(
     def work() -> None:
         from diagnosis.blind.pooling import pooled
 
-        if report is not None:
-            check_output("--report", report, PAGE)
         for option, path in (("--json", as_json), ("--report", report)):
             refuse_to_lose(files, "one of the files to read", option, path)
+        if report is not None:
+            check_output("--report", report, PAGE)
         _told(pooled(files), ", ".join(path.stem for path in files), as_json, report, files)
 
     carry_out(work, as_json)

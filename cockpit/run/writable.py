@@ -20,6 +20,8 @@ CSV = (".csv",)
 _NEVER_LOST: dict[tuple[str, ...], str] = {
     LOG: files.LOG,
     JSON: files.JSON,
+    PICTURE: files.PICTURE,
+    PAGE: files.PAGE,
 }  # a file of another kind under such a name is not replaced
 _NO_FOLDER = {*LOG, *PICTURE, *PAGE, *RIG, *JSON, *TABLE, ".tdms", ".txt"}
 
@@ -27,8 +29,9 @@ _NO_FOLDER = {*LOG, *PICTURE, *PAGE, *RIG, *JSON, *TABLE, ".tdms", ".txt"}
 def check_output(option: str, path: Path, suffixes: tuple[str, ...]) -> None:
     """Raise Fault where a file of this kind cannot be written: CONFIG for its name, LOG_WRITE for its place."""
     check_writable(option, path)
-    if suffixes in _NEVER_LOST:
-        refuse_to_replace(path, _NEVER_LOST[suffixes], f"{option} {path}")
+    for known, kind in _NEVER_LOST.items():
+        if suffixes == known or path.suffix.lower() in known:
+            refuse_to_replace(path, kind, f"{option} {path}")
     if path.is_dir():
         raise Fault("CONFIG", f"{option} {path}: must be a file, not a folder; choose another")
     if path.suffix.lower() not in suffixes:

@@ -17,7 +17,7 @@ RUN = ("run", "--in-process", "--set", "duration_s=0.05")
 
 @pytest.fixture
 def files(tmp_path: Path) -> dict[str, Path]:
-    made = {name: tmp_path / name for name in ("run.mcap", "log.json", "plant.py", "rig.toml")}
+    made = {name: tmp_path / name for name in ("run.mcap", "log.json", "plant.py", "rig.toml", "mine.png", "mine.html")}
     for name, path in made.items():
         path.write_bytes(short_log() if name in {"run.mcap", "log.json"} else b"mine = 1\n")
     return made
@@ -32,6 +32,9 @@ def files(tmp_path: Path) -> dict[str, Path]:
         (("log", "recover", "run.mcap", "--out", "plant.py"), "plant.py"),
         (("log", "info", "log.json", "--json", "log.json"), "log.json"),
         (("log", "check", "log.json", "--json", "log.json"), "log.json"),
+        (("plot", "run.mcap", "--out", "mine.png"), "mine.png"),
+        (("review", "run.mcap", "--out", "mine.html"), "mine.html"),
+        (("map", "--out", "mine.png"), "mine.png"),
     ],
 )
 def test_what_is_there_and_of_another_kind_stays(files, monkeypatch, words, victim):
