@@ -147,7 +147,7 @@ def _is_slip(stroke: _Stroke, first: int, last: int, bin_s: float) -> bool:
         return True
     was = (stroke.drive_m[begin] - stroke.drive_m[before]) / (begin - before)
     goes_on = (stroke.drive_m[after] - stroke.drive_m[end]) / (after - end)
-    slides = (stroke.slide_m[end] - stroke.slide_m[begin]) / (end - begin)
-    if np.isnan(slides):
+    slides, drives = ((place_m[end] - place_m[begin]) / (end - begin) for place_m in (stroke.slide_m, stroke.drive_m))
+    if not slides > drives:  # no place, or one that is wrong: a force falls only where the slide outruns its drive
         return not goes_on < _STOPS * was
     return not slides <= _RUNS_AHEAD * max(was, goes_on)

@@ -63,3 +63,12 @@ def test_a_drive_that_rings_does_not_slip_until_the_slide_runs_ahead(tmp_path: P
     cycles = cycles_of(made_run(tmp_path, SPEED_MPS * T_S, behind_m))
     assert cycles is not None
     assert cycles.slips == slips
+
+
+def test_a_place_that_froze_hides_no_slip(tmp_path: Path) -> None:
+    run = made_run(tmp_path, SPEED_MPS * T_S, sawtooth_m(T_S))
+    frozen = run.sensors.copy()
+    frozen["mass_position_m"][100:] = frozen["mass_position_m"][100, 0]
+    cycles = cycles_of(run._replace(sensors=frozen))
+    assert cycles is not None
+    assert cycles.slips == 10
