@@ -7,7 +7,8 @@ from pydantic import Field, model_validator
 from bridge.config import Strict, Two
 
 Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+_LONGEST_S = 1e9  # 30 years; a time far beyond is no number of blocks
+HoldTime = Annotated[float, Field(ge=0, le=_LONGEST_S)]
 Share = Annotated[float, Field(gt=0, le=1)]
 MOST_BANDS = 8
 
@@ -17,7 +18,7 @@ class Level(Strict):
 
     alarm: Positive
     abort: Positive
-    hold_s: NotNegative = 0.2
+    hold_s: HoldTime = 0.2
 
     @model_validator(mode="after")
     def _in_order(self) -> "Level":
@@ -57,7 +58,7 @@ class GuardConfig(Strict):
     forbidden_Hz: Annotated[list[Two], Field(max_length=MOST_BANDS)] = Field(
         default=[], description="Bands [low, high] in which nothing is vibrated."
     )
-    band_hold_s: NotNegative = Field(default=0.2, description="Of commands outside of the bands, until it trips.")
+    band_hold_s: HoldTime = Field(default=0.2, description="Of commands outside of the bands, until it trips.")
     duty: Level = Field(
         default=Level(alarm=1.0, abort=1.0), description="Share of the time in which it vibrates; 1: no limit."
     )
@@ -67,7 +68,9 @@ class GuardConfig(Strict):
         default=0.5,
         description="Time constant in which the drive's velocity is forgotten: a vibration outlasts its move.",
     )
-    command_lost_s: Positive = Field(default=0.5, description="Without a fresh command, until the rig is DISARMED.")
+    command_lost_s: Annotated[HoldTime, Field(gt=0)] = Field(
+        default=0.5, description="Without a fresh command, until the rig is DISARMED."
+    )
     check_Hz: Annotated[list[Positive], Field(max_length=8)] = Field(
         default=[], description="Frequencies of the loop check, rising. Not given: five over piezo's range."
     )
