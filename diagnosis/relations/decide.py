@@ -147,7 +147,7 @@ def _limit(one: Answered) -> float:
 
 
 def _of_library(one: Answered, cause: str) -> str:
-    """The cause, or the best of the library where that would do as well: a force 0.3 ms early is a damped spring's."""
+    """The cause, or the best of the library where that would do as well."""
     if cause not in OUTSIDE or len(one.chosen.terms) > 1:
         return cause
     known = next((found for found in one.ranking.singles if found.causes[0] not in OUTSIDE), None)

@@ -19,7 +19,6 @@ _YIELDS = (0.04, 0.06, 0.09, 0.13, 0.18, 0.25)  # of the extension at the larges
 _EDGES = (0.02, 0.05, 0.1)  # softness of a backlash, of the largest force
 _MODES_HZ = np.geomspace(25.0, 320.0, 30)  # a frame's ringing is some periods long: steps of 9 %
 _SKEW = 5e-4  # between two recorders of which one is timed by software
-_EARLY_S = 3e-3  # a recorder's own delay, as that of a force sensor
 _SETTLING_S = (1.5, 3.0, 6.0, 12.0)
 
 
@@ -45,7 +44,7 @@ def spring_effects(
             for each_Hz in _MODES_HZ.tolist()
         ),
         *_drifting(runs, most_N),
-        *_clocks(stiffness, pull, rates),
+        *_clocks(stiffness, rates),
     ]  # fmt: skip
 
 
@@ -75,17 +74,13 @@ def _slow(values: Floats, order: int, time_s: float) -> Floats:
     return values
 
 
-def _clocks(stiffness: float, pull: Sequence[Floats], rates: Sequence[Floats]) -> list[Term]:
-    """Force and positions from two loggers: clocks that run apart within a run, or a force that is logged before it acts."""
-    apart = [-stiffness * v * (np.arange(len(v)) * BLOCK_S) for v in rates]
+def _clocks(stiffness: float, rates: Sequence[Floats]) -> list[Term]:
+    """Force and positions from two loggers: clocks that run apart within a run."""
+    pulls = [-stiffness * v for v in rates]
+    apart = [pull * (np.arange(len(pull)) * BLOCK_S) for pull in pulls]
     return [
         term("logger-clock", "runs apart in each run", apart, _SKEW, 0, "skew"),
-        *(
-            term("logger-clock", f"force {1e3 * time_s:g} ms early",
-                 [(delayed(p, -time_s) - p) / time_s for p in pull], _EARLY_S, 1, "lead_s")
-            for time_s in _DELAYS_S
-        ),
-    ]  # fmt: skip
+    ]
 
 
 def _bent(pull: Sequence[Floats], most_N: float) -> list[Term]:

@@ -106,10 +106,6 @@ def is_logged_apart(_: int, signals: Signals) -> None:
     signals["drive_force_N"] = np.interp(T_S * (1.0 + 4e-4), T_S, signals["drive_force_N"])
 
 
-def is_early(_: int, signals: Signals) -> None:
-    signals["drive_force_N"] = np.interp(T_S + 2e-3, T_S, signals["drive_force_N"])
-
-
 def drops_out(number: int, signals: Signals) -> None:
     for first in np.random.default_rng(number).integers(0, 7900, 12):
         signals["drive_force_N"][first : first + 10] *= 0.9
@@ -121,7 +117,6 @@ def drops_out(number: int, signals: Signals) -> None:
         (saturates, "spring", "force-amplifier: from 1"),
         (runs_fast, "motion", "acceleration-clock: in each run"),
         (is_logged_apart, "spring", "logger-clock: runs apart"),
-        (is_early, "spring", "logger-clock: force 2 ms early"),
         (drops_out, "spring", "in bursts"),
     ],
 )
