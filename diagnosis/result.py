@@ -114,6 +114,11 @@ class Share(NamedTuple):
         float | None
     )  # what the same noise without that cause would show in 9 of 10; None for noise and unexplained
 
+    @property
+    def beyond_chance(self) -> bool:
+        """Whether the whole interval lies above what chance shows."""
+        return self.interval_90 is not None and self.null_90 is not None and self.interval_90[0] > self.null_90
+
 
 class Remainder(NamedTuple):
     """What no known cause explains, where it is largest."""

@@ -31,6 +31,11 @@ class LatentShare(NamedTuple):
     null_90: float | None  # what the other processes alone would make of it in 9 of 10; None for scatter and noise
     gain: float  # log likelihood by which the rows are less likely without it; 0 where it was not asked
 
+    @property
+    def beyond_chance(self) -> bool:
+        """Whether the whole interval lies above what chance shows."""
+        return self.null_90 is not None and self.interval_90[0] > self.null_90
+
 
 def shares_of(found: Fitted, rows: Rows, fit: Indices, held: Indices) -> tuple[LatentShare, ...]:
     """The shares on the rows `held` of a model fitted to the rows `fit` (indices); the largest first, noise last."""

@@ -49,7 +49,7 @@ def latent_findings(latent: Sequence[LatentSignal]) -> tuple[Finding, ...]:
 
 
 def latent_line(latent: Sequence[LatentSignal]) -> str:
-    """The largest share that is more than chance, for a person who waits; empty where there is none."""
+    """The largest share that is surely more than chance, for a person who waits; empty where there is none."""
     found = [(share.share, one.signal, share) for one in latent for share in one.shares if share.what in _causes(one)]
     if not found:
         return ""
@@ -65,9 +65,7 @@ def mostly(diagnosis: Diagnosis) -> Share | None:
         if share.signal in (BREAKAWAY, SLIDING)
         and share.what not in (SCATTER, NOISE, *diagnosis.effects)
         and share.share > MOST
-        and share.interval_90 is not None
-        and share.null_90 is not None
-        and share.interval_90[0] > share.null_90
+        and share.beyond_chance
     ]
     return max(sure, key=lambda share: share.share, default=None)
 
@@ -91,9 +89,9 @@ def latent_sentences(diagnosis: Diagnosis, kept: str) -> list[str]:
         more = sorted((share for share in own if share.what in row.causes), key=lambda share: -share.share)
         told = "; ".join(share_in_words(one) for one in more[:_UNTIL_TOLD])
         of = f"Of the {quantity(row.refitted, row.unit)} that differ in the {row.relation}{kept}"
-        sentences.append(f"{of}: {told}." if told else f"{of}, nothing explains more than chance would.")
+        sentences.append(f"{of}: {told}." if told else f"{of}, nothing surely explains more than chance would.")
     return sentences
 
 
 def _causes(one: LatentSignal) -> tuple[str, ...]:
-    return tuple(share.what for share in one.shares if share.null_90 is not None and share.share > share.null_90)
+    return tuple(share.what for share in one.shares if share.beyond_chance)

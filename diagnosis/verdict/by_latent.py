@@ -18,8 +18,7 @@ def named_by(latent: Sequence[LatentSignal]) -> tuple[str, ...]:
     found: dict[str, float] = {}
     for signal in latent:
         for one in signal.shares if signal.judged_on_held_out else ():
-            sure = one.what in _KNOWN and one.null_90 is not None and one.gain > _SURE
-            if sure and one.null_90 is not None and one.interval_90[0] > one.null_90 and one.share > MOST:
+            if one.what in _KNOWN and one.beyond_chance and one.gain > _SURE and one.share > MOST:
                 found[one.what] = max(one.share, found.get(one.what, 0.0))
     return tuple(sorted(found, key=lambda what: -found[what]))
 

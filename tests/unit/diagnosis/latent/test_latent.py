@@ -7,6 +7,7 @@ from diagnosis.latent.answer import LatentSignal, latent_of, signal_of
 from diagnosis.latent.components import DIRECTION, FORCE_PLACE, PLACE, SCATTER
 from diagnosis.latent.rows import BREAKAWAY, MOST_ROWS, SLIDING, Rows
 from diagnosis.latent.shares import LatentShare
+from diagnosis.report.latent_block import latent_line, latent_rows
 from diagnosis.verdict.by_latent import named_by, with_latent
 from diagnosis.verdict.judge import Verdict
 from tests.unit.diagnosis.relations.kinematic import rig, runs
@@ -59,6 +60,16 @@ def test_scatter_alone_has_no_name():
     found = signal_of(one_pass(0.0))
     assert named_by([found]) == ()
     assert of(found, SCATTER).share > 0.5
+
+
+def test_a_share_is_told_as_a_cause_only_where_its_whole_interval_is_beyond_chance():
+    found = signal_of(one_pass(0.3))
+    assert latent_rows([found])[0].causes == (PLACE,)
+    wave = of(found, PLACE)
+    within = wave._replace(null_90=0.5 * (wave.interval_90[0] + wave.share))
+    assert within.share > within.null_90
+    assert latent_rows([found._replace(shares=(within,))])[0].causes == ()
+    assert latent_line([found._replace(shares=(within,))]) == ""
 
 
 def test_a_force_with_the_place_is_no_friction():
