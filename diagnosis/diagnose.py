@@ -77,7 +77,7 @@ def _diagnosed(evidence: Evidence, progress: Progress, jobs: int, budget_s: floa
     if comparable(runs):
         done = _by_fits(evidence, seen, progress, jobs, (began, began + budget_s))
     if done is None:
-        verdict = with_latent(in_view_of(unfitted(), seen.decision, [], Closed(None, None)), seen.latent)
+        verdict = with_latent(in_view_of(unfitted(), seen.decision, [], Closed(None, None)), seen.latent, None)
         verdict = with_vibration_findings(verdict, evidence.runs)
         done = without_fits(verdict, runs, LONGER if comparable(runs) else HOLD, began)
         done = done._replace(findings=(*evidence.findings, _NO_FIT))
@@ -121,7 +121,7 @@ def _by_fits(
     nearest = outcome.gone or outcome.verdict.runner_up
     closes = _closed(outcome.held_out, nearest)
     verdict = in_view_of(outcome.verdict, seen.decision, [*contest.singles, *contest.pairs], Closed(nearest, closes))
-    verdict = with_latent(verdict, seen.latent)
+    verdict = with_latent(verdict, seen.latent, outcome.held_out)
     verdict = with_vibration_findings(verdict, evidence.runs)
     outcome = outcome._replace(verdict=verdict, best=verdict.named or contest.rig.fit)
     progress(f"verdict: {outcome.verdict.kind}", 0.8)

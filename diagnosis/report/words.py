@@ -7,15 +7,13 @@ from bridge.units import decimals_of, fixed_digits, interval, name_and_unit, per
 from diagnosis.hypotheses.catalogue import CATALOGUE
 from diagnosis.report.latent_block import mostly
 from diagnosis.result import PARAMETERS, Diagnosis, Estimate
+from diagnosis.verdict.held_out import FAR_FOR_NO_GAP
 
 EFFECT_WORDS: Final = {name: row.words for name, row in CATALOGUE.items()} | {
     "none": "the rig as described, inside its tolerances, is enough",
     "unexplained": "there is a gap, and nothing in the library closes it",
 }
 _BELOW_0: Final = {("drive-hardening", "ratio"): "a softening"}  # by effect and parameter
-# Noise floors that the baseline may leave on held-out runs for an answer of "no gap". Too small: a good "no gap" is doubted.
-# Too large: a gap that shows only on held-out runs is not told. Counted: docs/method/report.md.
-_FAR_FOR_NO_GAP = 2.0
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -26,7 +24,7 @@ def headline(diagnosis: Diagnosis) -> str:
 def cannot_tell(diagnosis: Diagnosis) -> bool:
     """Whether the fitted runs show no gap and the held-out runs do."""
     gap = diagnosis.gap
-    return diagnosis.verdict == "no-gap" and bool(gap.runs) and gap.retuned > _FAR_FOR_NO_GAP
+    return diagnosis.verdict == "no-gap" and bool(gap.runs) and gap.retuned > FAR_FOR_NO_GAP
 
 
 def answer(diagnosis: Diagnosis) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from diagnosis.latent.answer import LatentSignal
 from diagnosis.latent.components import DIRECTION, PLACE, TIME
+from diagnosis.verdict.held_out import FAR_FOR_NO_GAP, HeldOut
 from diagnosis.verdict.judge import Verdict
 
 _KNOWN = (PLACE, DIRECTION, TIME)  # processes that are effects of the library
@@ -23,10 +24,15 @@ def named_by(latent: Sequence[LatentSignal]) -> tuple[str, ...]:
     return tuple(sorted(found, key=lambda what: -found[what]))
 
 
-def with_latent(verdict: Verdict, latent: Sequence[LatentSignal]) -> Verdict:
-    """What is "unexplained" becomes "partly" where the friction goes for the most part with something that the library has."""
+def with_latent(verdict: Verdict, latent: Sequence[LatentSignal], held_out: HeldOut | None) -> Verdict:
+    """What is not explained becomes "partly" where the friction goes for the most part with something that the library has.
+
+    Not explained is what is "unexplained", and "no gap" in the fitted runs where the held-out runs show one.
+    """
     names = named_by(latent)[:1]
-    if verdict.kind != "unexplained" or not names or verdict.outside or set(names) & set(verdict.refuted):
+    shows_elsewhere = verdict.kind == "no-gap" and held_out is not None and held_out.retuned > FAR_FOR_NO_GAP
+    not_explained = verdict.kind == "unexplained" or shows_elsewhere
+    if not not_explained or not names or verdict.outside or set(names) & set(verdict.refuted):
         return verdict
     top, value = next(iter(verdict.probabilities.items()))
     swapped = {top: verdict.probabilities.get(names[0], 0.0), names[0]: value}

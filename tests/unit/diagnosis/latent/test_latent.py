@@ -1,5 +1,8 @@
 """The latent friction: shares of made rows whose truth is known, and rows of made runs."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -67,6 +70,7 @@ def test_a_share_is_told_as_a_cause_only_where_its_whole_interval_is_beyond_chan
     assert latent_rows([found])[0].causes == (PLACE,)
     wave = of(found, PLACE)
     within = wave._replace(null_90=0.5 * (wave.interval_90[0] + wave.share))
+    assert within.null_90 is not None
     assert within.share > within.null_90
     assert latent_rows([found._replace(shares=(within,))])[0].causes == ()
     assert latent_line([found._replace(shares=(within,))]) == ""
@@ -88,12 +92,19 @@ def test_unexplained_becomes_partly_by_what_is_named_and_no_other_verdict_moves(
     found = signal_of(one_pass(0.3))
     names = (PLACE, "none", "unexplained")
     verdict = Verdict("unexplained", None, dict.fromkeys(names, 1.0 / 3.0), None, (), 1.0)
-    after = with_latent(verdict, [found])
+    after = with_latent(verdict, [found], None)
     assert (after.kind, after.names) == ("partly", (PLACE,))
     assert sum(after.probabilities.values()) == pytest.approx(1.0)
-    assert with_latent(verdict._replace(kind="no-gap"), [found]).kind == "no-gap"
-    assert with_latent(verdict._replace(refuted=(PLACE,)), [found]).kind == "unexplained"
-    assert with_latent(verdict, [found._replace(judged_on_held_out=False)]).kind == "unexplained"
+    assert with_latent(verdict._replace(kind="no-gap"), [found], None).kind == "no-gap"
+    assert with_latent(verdict._replace(refuted=(PLACE,)), [found], None).kind == "unexplained"
+    assert with_latent(verdict, [found._replace(judged_on_held_out=False)], None).kind == "unexplained"
+
+
+@pytest.mark.parametrize(("left", "kind"), [(1.6, "no-gap"), (20.5, "partly")])
+def test_no_gap_becomes_partly_where_the_held_out_runs_show_one(left: float, kind: str):
+    verdict = Verdict("no-gap", None, dict.fromkeys((PLACE, "none", "unexplained"), 1.0 / 3.0), None, (), 1.0)
+    held_out: Any = SimpleNamespace(retuned=left)
+    assert with_latent(verdict, [signal_of(one_pass(0.3))], held_out).kind == kind
 
 
 def test_every_slip_of_a_run_is_a_row_at_its_place():
