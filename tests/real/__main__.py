@@ -25,6 +25,7 @@ parser.add_argument(
 )
 parser.add_argument("--latent", action="store_true", help="only what the friction goes with, without a simulation")
 parser.add_argument("--jobs", type=int, default=1)
+parser.add_argument("--budget", type=float, metavar="S", help="seconds after which an answer is what is known by then")
 
 if __name__ == "__main__":
     told = parser.parse_args()
@@ -53,6 +54,7 @@ if __name__ == "__main__":
                 load_evidence(Path(folder)),
                 lambda text, _share, name=name: print(f"{name}: {text}", file=sys.stderr, flush=True),
                 told.jobs,
+                told.budget,
             )
         write_report(found, name, told.out / f"{name}.html")
         results[name] = to_json(found)

@@ -17,7 +17,7 @@ _SHOWN = 4  # candidates
 def lines(found: Diagnosis) -> list[str]:
     """Verdict, candidates with their parameters, gap on the held-out runs, where it lies, seconds."""
     gap = found.gap
-    said = [f"verdict     {found.verdict}: {headline(found)}"]
+    said = [f"verdict     {headline(found)}"]
     for one in found.candidates[:_SHOWN]:
         sizes = "; ".join(estimate_in_words(one.effect, *item) for item in one.parameters.items())
         said.append(f"candidate   {one.effect} {percent(one.probability)}{': ' if sizes else ''}{sizes}")
