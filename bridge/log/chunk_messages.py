@@ -10,7 +10,7 @@ import numpy.typing as npt
 from mcap.opcode import Opcode
 
 _RECORD = struct.Struct("<BQ")  # opcode, length of what follows
-_HEAD = np.dtype(
+HEAD = np.dtype(  # of a message record, before its payload
     [
         ("opcode", "u1"),
         ("length", "<u8"),
@@ -20,7 +20,7 @@ _HEAD = np.dtype(
         ("publish_ns", "<u8"),
     ]
 )
-_FIELDS_BYTES = _HEAD.itemsize - _RECORD.size
+_FIELDS_BYTES = HEAD.itemsize - _RECORD.size
 _INDEX_HEAD_BYTES = 6  # channel, length of the entries
 _INDEX_ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
 
@@ -60,7 +60,7 @@ class Messages(NamedTuple):
     def of(self, channel: int) -> "Messages":
         """The messages of one channel."""
         mine = np.flatnonzero(self.channel == channel)
-        return Messages(self.data, _as_bytes(self.heads)[mine].view(_HEAD), self.channel[mine], self.start[mine])
+        return Messages(self.data, _as_bytes(self.heads)[mine].view(HEAD), self.channel[mine], self.start[mine])
 
     def payload_bytes(self) -> Column:
         """The size of each payload."""
@@ -88,10 +88,10 @@ def messages_of(chunks: Sequence[Chunked]) -> Messages:
     if heads is None or not _tile(begins, offsets, heads):
         walks = [_walked(chunk.data) for chunk in chunks]
         offsets = np.concatenate([walk.offsets + begin for walk, begin in zip(walks, begins, strict=False)])
-        heads = cut(data, offsets, _HEAD.itemsize).view(_HEAD)
+        heads = cut(data, offsets, HEAD.itemsize).view(HEAD)
         others = [other for walk in walks for other in walk.others]
         broken = sum(walk.broken for walk in walks)
-    return Messages(data, heads, heads["channel"].astype(np.int64), offsets + _HEAD.itemsize, others, broken)
+    return Messages(data, heads, heads["channel"].astype(np.int64), offsets + HEAD.itemsize, others, broken)
 
 
 def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
@@ -108,9 +108,9 @@ def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:
 
 def _heads(data: Bytes, offsets: Column) -> npt.NDArray[Any] | None:
     """The bytes at the offsets, read as heads of messages, [messages]; None where one lies outside of the data."""
-    if not len(offsets) or offsets[0] < 0 or offsets[-1] > len(data) - _HEAD.itemsize:
+    if not len(offsets) or offsets[0] < 0 or offsets[-1] > len(data) - HEAD.itemsize:
         return None
-    return cut(data, offsets, _HEAD.itemsize).view(_HEAD)
+    return cut(data, offsets, HEAD.itemsize).view(HEAD)
 
 
 def _tile(begins: Column, offsets: Column, heads: npt.NDArray[Any]) -> bool:
@@ -148,7 +148,7 @@ def _walked(data: bytes) -> Walk:
 
 def _as_bytes(heads: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The same without fields: numpy copies these as a whole, and records with fields one field after the other."""
-    return heads.view(f"V{_HEAD.itemsize}")
+    return heads.view(f"V{HEAD.itemsize}")
 
 
 def cut(data: Bytes, starts: Column, size: int) -> npt.NDArray[Any]:

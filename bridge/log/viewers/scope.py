@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from bridge.log.block_rows import FIELDS_BYTES, HEAD_BYTES, Rows, rows
-from bridge.log.chunk_messages import Bytes, Column, cut
-from bridge.log.viewers.stretches import Blocks, Stretches
+from bridge.log.block_rows import FIELDS_BYTES, Rows, rows
+from bridge.log.chunk_messages import HEAD, Bytes, Column, cut
+from bridge.log.viewers.stretches import Blocks, Stretches, last_of_stretches
 from bridge.wire import topics
 from bridge.wire.messages import APPLIED, CHANNELS, TRACE, Layout, sensor_block
 
@@ -15,7 +16,6 @@ from bridge.wire.messages import APPLIED, CHANNELS, TRACE, Layout, sensor_block
 # writing the log costs with the 100 blocks of a chunk; more: a kill loses more of this topic, and viewers look further ahead.
 AT_ONCE_BLOCKS = 1000
 _ENTRY_BYTES = 16  # of an index
-_TIME_AT = 10  # of `t_ns` in every canonical message
 
 
 class ScopeMaker:
@@ -54,18 +54,20 @@ class ScopeMaker:
         data = np.frombuffer(joined, np.uint8)
         begins = np.cumsum([0, *(len(data) for data, _ in waiting)])
         for topic, layout in ((topics.APPLIED.name, APPLIED), (topics.TRACE.name, TRACE)):
-            starts, _ = _places([indexes[topic] for _, indexes in waiting], begins)
-            starts = starts[_lengths(data, starts) == layout.size]
-            self._stretches.say(topic, cut(data, starts, layout.size).view(layout.dtype))
-        blocks = self._blocks(data, *_places([indexes[topics.SENSORS.name] for _, indexes in waiting], begins))
+            heads, starts = _found(data, [indexes[topic] for _, indexes in waiting], begins)
+            right = np.flatnonzero(heads["length"] == FIELDS_BYTES + layout.size)
+            last_ones = right[last_of_stretches(heads["publish_ns"].astype(np.int64)[right])]
+            self._stretches.say(topic, cut(data, starts[last_ones], layout.size).view(layout.dtype))
+        blocks = self._blocks(data, *_found(data, [indexes[topics.SENSORS.name] for _, indexes in waiting], begins))
         records, log_ns = self._stretches.made(blocks, last)
         return None if records is None else rows({channels[topics.SCOPE.name]: records}, {}, log_ns)
 
-    def _blocks(self, data: Bytes, starts: Column, log_ns: Column) -> Blocks | None:
-        """Blocks by their starts; None for none. Another number of samples than before begins anew."""
+    def _blocks(self, data: Bytes, heads: npt.NDArray[Any], starts: Column) -> Blocks | None:
+        """Blocks by their heads and starts; None for none. Another number of samples than before begins anew."""
         if not len(starts):
             return None
-        lengths = _lengths(data, starts)
+        lengths, t_ns, log_ns = (heads[name].astype(np.int64) for name in ("length", "publish_ns", "log_ns"))
+        lengths -= FIELDS_BYTES
         if self._layout is None or lengths[0] != self._layout.size:
             self._layout = _of_blocks(int(lengths[0])) or self._layout
         if self._layout is None:
@@ -76,26 +78,14 @@ class ScopeMaker:
         places = np.array([fields[name][1] for name in CHANNELS])
         samples = cut(data, (places[:, None] + starts).ravel(), 4 * self._layout.samples).view("<f4")
         samples = samples.reshape(len(CHANNELS), len(starts), self._layout.samples)
-        return Blocks(_times(data, starts), log_ns[right], samples)
+        return Blocks(t_ns[right], log_ns[right], samples)
 
 
-def _places(indexes: Sequence[bytes], begins: Column) -> tuple[Column, Column]:
-    """Where the payloads of the messages are in the joined data of chunks, and their log times, from the chunks' indexes."""
-    each = [np.frombuffer(index, "<i8").reshape(-1, 2) for index in indexes]
-    starts = [index[:, 1] + (begin + HEAD_BYTES) for index, begin in zip(each, begins, strict=False)]
-    log_ns = [index[:, 0] for index in each]
-    none = np.empty(0, np.int64)
-    return np.concatenate([none, *starts]), np.concatenate([none, *log_ns])
-
-
-def _lengths(data: Bytes, starts: Column) -> Column:
-    """The number of bytes of each payload."""
-    return cut(data, starts + (1 - HEAD_BYTES), 8).view("<i8") - FIELDS_BYTES
-
-
-def _times(data: Bytes, starts: Column) -> Column:
-    """`t_ns` of each canonical message."""
-    return cut(data, starts + _TIME_AT, 8).view("<i8")
+def _found(data: Bytes, indexes: Sequence[bytes], begins: Column) -> tuple[npt.NDArray[Any], Column]:
+    """Heads of the messages in the joined data of chunks, whose publish time is their `t_ns`, and where their payloads start."""
+    each = [np.frombuffer(index, "<i8")[1::2] + begin for index, begin in zip(indexes, begins, strict=False)]
+    offsets = np.concatenate([np.empty(0, np.int64), *each])
+    return cut(data, offsets, HEAD.itemsize).view(HEAD), offsets + HEAD.itemsize
 
 
 def _of_blocks(payload_bytes: int) -> Layout | None:

@@ -33,6 +33,11 @@ _OF_TRACE = (
 )
 
 
+def last_of_stretches(t_ns: Column) -> Column:
+    """Which of these messages, in order, are the last of their stretch."""
+    return np.flatnonzero(np.diff((t_ns - 1) // PERIOD_NS, append=-1))
+
+
 class Blocks(NamedTuple):
     """Blocks, in order."""
 
@@ -42,16 +47,16 @@ class Blocks(NamedTuple):
 
 
 class _Said:
-    """What one topic says: the last message of each stretch. Kept are those that were not used, and the newest that was."""
+    """What one topic says. Kept are the messages that were not used, and the newest that was."""
 
     def __init__(self, layout: Layout, fields: Sequence[str]) -> None:
         self._fields = fields
         self._kept = np.empty(0, layout.dtype)
 
     def add(self, messages: Records) -> None:
-        """Canonical messages, in order."""
-        last = np.flatnonzero(np.diff((messages["t_ns"].astype(np.int64) - 1) // PERIOD_NS, append=-1))
-        self._kept = np.concatenate([self._kept, messages[last]])
+        """Canonical messages, in order, of which only the last of each stretch is of use."""
+        whole = f"V{messages.dtype.itemsize}"  # numpy joins these as a whole, and records with fields one field after the other
+        self._kept = np.concatenate([self._kept.view(whole), messages.view(whole)]).view(messages.dtype)
 
     def fill(self, records: Records) -> None:
         """Write the fields of the newest message up to the end of each stretch; they stay 0 before the first."""
@@ -75,7 +80,7 @@ class Stretches:
         }
 
     def say(self, topic: str, messages: Records) -> None:
-        """Take canonical messages of the topic `applied` or `trace`, in order."""
+        """Take canonical messages of the topic `applied` or `trace`, in order; of each stretch its last is enough."""
         self._said[topic].add(messages)
 
     def made(self, blocks: Blocks | None, last: bool) -> tuple[Records | None, Column]:
