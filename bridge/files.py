@@ -75,11 +75,12 @@ def refuse_to_replace(path: Path, kind: str, place: str) -> None:
 
 def refuse_to_lose(inputs: Iterable[Path], what: str, option: str, path: Path | None) -> None:
     """Raise Fault CONFIG where `path`, which `option` names, is one of `inputs` by any name; a hard link is one too."""
-    if path is not None and any(_same_file(path, one) for one in inputs):
+    if path is not None and any(same_file(path, one) for one in inputs):
         raise Fault("CONFIG", f"{option} {path}: is {what}, which would be lost; choose another file")
 
 
-def _same_file(one: Path, other: Path) -> bool:
+def same_file(one: Path, other: Path) -> bool:
+    """Whether two paths mean one file, by a link of either kind as well."""
     try:
         return one.samefile(other)
     except (OSError, ValueError):  # one of them is not there, or no file can have its name

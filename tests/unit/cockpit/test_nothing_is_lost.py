@@ -68,6 +68,22 @@ def test_another_name_of_an_input_is_no_place_for_a_result(files, monkeypatch, w
     assert log.read_bytes() == short_log()
 
 
+@pytest.mark.parametrize("name", ["run.mcap", "./run.mcap", "hard.mcap", "soft.mcap"])
+def test_a_log_is_recovered_in_its_place_only_where_that_is_asked_for(files, monkeypatch, name):
+    log = files["run.mcap"]
+    monkeypatch.chdir(log.parent)
+    Path("hard.mcap").hardlink_to(log)
+    Path("soft.mcap").symlink_to(log)
+    cut = log.read_bytes()[:-100]
+    log.write_bytes(cut)
+    result = CliRunner().invoke(app, ["log", "recover", "run.mcap", "--out", name])
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert "would be replaced; ask for that with --in-place, or choose another file" in result.output
+    assert log.read_bytes() == cut
+    assert CliRunner().invoke(app, ["log", "recover", "run.mcap", "--in-place"]).exit_code == 0
+    assert log.read_bytes() != cut
+
+
 def test_a_log_is_not_replaced_by_the_result_of_its_run(tmp_path):
     log, other_name = tmp_path / "same.mcap", tmp_path / "other-name.json"
     other_name.symlink_to(log)
