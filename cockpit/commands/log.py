@@ -58,7 +58,7 @@ def log_recover(
             check_output("--out", out, LOG)
         check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
         if not in_place and any(same_file(new, part) for part in parts_of(path)):
-            line = f"--out {new}: is the log, or a file of it, and would be replaced; ask for that with --in-place, or choose another file"
+            line = f"--out {new}: is a file of the log, and would be replaced; ask for it with --in-place, or choose another"
             raise Fault("CONFIG", line)
         check_output("--in-place" if in_place else "--out", new, LOG)
         saved = recover(path, new)

@@ -13,6 +13,8 @@ from cockpit.figures.grid import Envelope, Grid, on_grid
 from cockpit.figures.request import Request
 from cockpit.figures.signals import Floats, Signal, samples_of
 
+_HEAD = ("log", "signal", "t_s", "least", "mean", "largest")
+FIRST_LINE = ",".join(_HEAD) + "\n"  # of the table; a file that begins with another is somebody's own
 _BINS = 2000  # across a figure: 300 dots an inch over 170 mm; fewer samples are drawn as they are
 
 
@@ -53,7 +55,7 @@ def as_table(curves: Sequence[Curve]) -> str:
     """The curves as CSV: a row for each point, values in SI units as the signal's name says; nothing where there is no value."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(["log", "signal", "t_s", "least", "mean", "largest"])
+    table.writerow(_HEAD)
     for curve in curves:
         rows = np.column_stack([curve.t_s, curve.values.least, curve.values.mean, curve.values.most])
         for row in rows[np.isfinite(rows[:, 2])].tolist():

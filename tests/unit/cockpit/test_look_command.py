@@ -30,8 +30,9 @@ def test_a_file_at_a_glance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     source = tribometer(tmp_path)
     outs = [tmp_path / f"out{suffix}" for suffix in (".html", ".csv", ".xlsx", ".svg", ".toml")]
     arguments = ["look", str(source), "--speed", "0.5mm/s", "--mass", "700kg", "--json"]
-    result = CliRunner().invoke(app, [*arguments, *(word for out in outs for word in ("--out", str(out)))])
-    assert result.exit_code == 0, result.output
+    for _ in range(2):  # what it wrote it replaces
+        result = CliRunner().invoke(app, [*arguments, *(word for out in outs for word in ("--out", str(out)))])
+        assert result.exit_code == 0, result.output
     table = json.loads(result.stdout)
     assert table["slips"] == 5
     assert table["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, rel=2e-3)
