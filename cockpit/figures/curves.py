@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -29,13 +30,18 @@ class Curve(NamedTuple):
 
 
 def window_of(runs: Sequence[RunData], request: Request) -> tuple[float, float]:
-    """From and until when a figure shows the logs [s]. Raises Fault CONFIG where that is outside of them."""
-    ends_s = [float(run.sensors["t_ns"].max()) * 1e-9 for run in runs if len(run.sensors)]
-    starts_s = [max(float(run.sensors["t_ns"].min()) * 1e-9, 0.0) for run in runs if len(run.sensors)]
-    end_s, start_s = max(ends_s, default=0.0), min(starts_s, default=0.0)
+    """From and until when a figure shows the logs [s]. Raises Fault CONFIG for what is outside of them, BAD_LOG for no block."""
+    for run in runs:
+        if not len(run.sensors):
+            line = f"{run.path}: holds no block of sensors that can be read, so there is nothing to draw"
+            raise Fault("BAD_LOG", f"{line}; `stickslip log check` says what is in it")
+    end_s = max(float(run.sensors["t_ns"].max()) * 1e-9 for run in runs)
+    start_s = min(max(float(run.sensors["t_ns"].min()) * 1e-9, 0.0) for run in runs)
     from_s, to_s = max(request.from_s, start_s), min(request.to_s, end_s)
     if request.is_window and from_s >= to_s:
-        line = f"--from {request.from_s:g} --to {request.to_s:g}: the log is from {start_s:g} to {end_s:g} s"
+        options = ("--from", request.from_s), ("--to", request.to_s)
+        given = " ".join(f"{option} {time_s:g}" for option, time_s in options if math.isfinite(time_s))
+        line = f"{given}: the log is from {start_s:g} to {end_s:g} s"
         raise Fault("CONFIG", f"{line}; choose times inside")
     return from_s, to_s
 
