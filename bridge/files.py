@@ -73,13 +73,32 @@ def refuse_to_replace(path: Path, kind: str, place: str) -> None:
         raise Fault("CONFIG", f"{place}: {path.name} is there and is no {kind}, it would be lost; choose another file")
 
 
+def refuse_to_replace_text(path: Path, begins: str, place: str) -> None:
+    """Raise Fault CONFIG where `path` is a text that does not begin with what the command that would write it begins with."""
+    try:
+        if not path.is_file() or path.stat().st_size == 0:
+            return
+        with path.open("rb") as file:
+            same = file.read(len(begins.encode())) == begins.encode()
+    except OSError:  # who writes it says why it cannot
+        return
+    if not same:
+        raise Fault("CONFIG", not_ours(path, place))
+
+
+def not_ours(path: Path, place: str) -> str:
+    """The line of a Fault for a file that a command would replace and did not write."""
+    return f"{place}: {path.name} is there and is none that this command wrote, it would be lost; choose another file"
+
+
 def refuse_to_lose(inputs: Iterable[Path], what: str, option: str, path: Path | None) -> None:
     """Raise Fault CONFIG where `path`, which `option` names, is one of `inputs` by any name; a hard link is one too."""
-    if path is not None and any(_same_file(path, one) for one in inputs):
+    if path is not None and any(same_file(path, one) for one in inputs):
         raise Fault("CONFIG", f"{option} {path}: is {what}, which would be lost; choose another file")
 
 
-def _same_file(one: Path, other: Path) -> bool:
+def same_file(one: Path, other: Path) -> bool:
+    """Whether two paths mean one file, by a link of either kind as well."""
     try:
         return one.samefile(other)
     except (OSError, ValueError):  # one of them is not there, or no file can have its name

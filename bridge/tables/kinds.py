@@ -7,12 +7,14 @@ from bridge.faults import Fault
 
 Kind = Literal["text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap"]
 KINDS: tuple[Kind, ...] = ("text", "parquet", "mat", "hdf5", "tdms", "sheet", "mcap")
+_NUMPY = b"\x93NUMPY"
+_ZIP, _ZIP_NAME_LENGTH, _ZIP_NAME = b"PK\x03\x04", slice(26, 28), 30  # of the first file in an archive
 _MARKS: tuple[tuple[bytes, Kind], ...] = (
     (b"PAR1", "parquet"),
     (b"MATLAB 5.0", "mat"),
     (b"TDSm", "tdms"),
     (b"\x89HDF\r\n\x1a\n", "hdf5"),
-    (b"PK\x03\x04", "sheet"),
+    (_ZIP, "sheet"),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "sheet"),
     (b"\x89MCAP0\r\n", "mcap"),
 )
@@ -35,15 +37,25 @@ _BY_SUFFIX: dict[str, Kind] = {
 }
 
 
+def _first_in_archive(start: bytes) -> bytes:
+    """The name of the first file in an archive that begins so; empty where it is none."""
+    length = int.from_bytes(start[_ZIP_NAME_LENGTH], "little") if start.startswith(_ZIP) else 0
+    return start[_ZIP_NAME : _ZIP_NAME + length]
+
+
 def kind_of(path: Path) -> Kind:
     """The kind of a table: by its marks; by its suffix where a damaged file has none; else text.
 
-    Raises Fault BAD_TABLE when the file is packed.
+    Raises Fault BAD_TABLE when the file is packed, or one of NumPy.
     """
     with path.open("rb") as file:
         start = file.read(_HDF5_AT + 8)
     if start[_HDF5_AT:].startswith(b"\x89HDF"):
         return "hdf5"
+    if start.startswith(_NUMPY) or _first_in_archive(start).endswith(b".npy"):
+        line = f"{path.name}: holds arrays of NumPy, which do not say what is a time and what a force; write them as columns"
+        how = 'numpy.savetxt("NAME.csv", numpy.column_stack([t, F]), delimiter=",", header="t (s),F (N)", comments="")'
+        raise Fault("BAD_TABLE", f"{line} of a text: {how}")
     for mark, kind in _MARKS:
         if start.startswith(mark):
             return kind

@@ -16,6 +16,7 @@ from bridge.tables.unit_words import bare_name, unit_in_name
 Floats = npt.NDArray[np.float64]
 
 _SECONDS = re.compile(r"(.*?)(?:secs?|seconds)")  # of a stamp, with one of these for what is over
+_AGAIN = re.compile(r"\.\d+$")  # what a reader adds to a name that is in the file already
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanosecs", "nanoseconds")
 
 
@@ -41,6 +42,9 @@ class Table:
     columns: dict[str, Any]
     units: dict[str, str] = field(default_factory=dict[str, str])  # by column, as the file writes them
     clocks: dict[str, Clock] = field(default_factory=dict[str, Clock])  # of the channels that have their own
+    own_times: dict[str, str] = field(
+        default_factory=dict[str, str]
+    )  # the columns of times that clocks come from, by channel
     sample_rate_Hz: float | None = None  # where the file states one rate for all
     decimal: str = "."  # of numbers that are stored as text
     thousands: str = ""
@@ -103,7 +107,8 @@ class Table:
     def unit(self, name: str | int) -> str:
         """The unit of a column, from the file's own list or the column's name; empty where neither says one."""
         key = self.find(name)
-        return self.units.get(key) or unit_in_name(key)
+        first = _AGAIN.sub("", key)
+        return self.units.get(key) or unit_in_name(first if first in self.columns else key)
 
 
 def _bare(text: str) -> str:

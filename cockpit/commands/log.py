@@ -46,9 +46,10 @@ def log_recover(
     """Save every message that can be read from a cut or damaged log in a new file with an index; topics stay what they are."""
 
     def work() -> None:
-        from bridge.files import check_file
+        from bridge.files import check_file, same_file
         from bridge.log.damage import lost_in_words
         from bridge.log.recover import recover
+        from bridge.log.storage.parts import parts_of
 
         if out is not None and in_place:
             raise Fault("CONFIG", f"--out {out}: cannot go with --in-place; give one of the two")
@@ -56,6 +57,9 @@ def log_recover(
         if out is not None:
             check_output("--out", out, LOG)
         check_file(path, "BAD_LOG", "give the path of a run log, .mcap")
+        if not in_place and any(same_file(new, part) for part in parts_of(path)):
+            line = f"--out {new}: is a file of the log, and would be replaced; ask for it with --in-place, or choose another"
+            raise Fault("CONFIG", line)
         check_output("--in-place" if in_place else "--out", new, LOG)
         saved = recover(path, new)
         left_out = (

@@ -6,12 +6,12 @@ from typing import Annotated, Any
 import typer
 
 from bridge.faults import Fault
-from bridge.files import check_file, refuse_to_lose
+from bridge.files import check_file, refuse_to_lose, refuse_to_replace_text
 from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.look.quantity import quantity, turns
-from cockpit.run.writable import PAGE, PICTURE, RIG, check_output, writing
+from cockpit.run.writable import PAGE, PICTURE, RIG, SHEETS, check_output, writing
 
-_OUTPUTS = (*PAGE, ".csv", ".xlsx", *PICTURE, *RIG)
+_OUTPUTS = (*PAGE, *SHEETS, *PICTURE, *RIG)
 
 
 def look(
@@ -38,7 +38,8 @@ def look(
     """Say what is in a measured file: slips, period, F_s, F_k, mu, stiffness, mass, each with its 90 % interval."""
 
     def work() -> None:
-        from cockpit.look.source import Asked, read_record
+        from cockpit.look.cycles import refuse_to_replace_sheet
+        from cockpit.look.source import MAP_BEGINS, Asked, read_record
         from diagnosis.look.look import look as look_at
         from diagnosis.look.words import headline, sentences
 
@@ -46,6 +47,10 @@ def look(
         for one in out:
             check_output("--out", one, _OUTPUTS)
             refuse_to_lose([path], "the measured file", "--out", one)
+            if one.suffix.lower() in SHEETS:
+                refuse_to_replace_sheet(one, f"--out {one}")
+            elif one.suffix.lower() in RIG:
+                refuse_to_replace_text(one, MAP_BEGINS, f"--out {one}")
         asked = Asked(
             quantity("--speed", speed, "velocity"),
             quantity("--load", load, "force"),

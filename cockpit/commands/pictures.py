@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from bridge.faults import Fault
-from bridge.files import check_file, refuse_to_lose
+from bridge.files import check_file, refuse_to_lose, refuse_to_replace_text
 from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.commands.options import DEFAULT_SCENARIO
 from cockpit.run.writable import CSV, PAGE, PICTURE, check_output, writing
@@ -57,6 +57,7 @@ def plot(
     """Draw the run in a log: drive force, v_a against v_d, and what the controller did; or any of its signals."""
 
     def work() -> None:
+        from cockpit.figures.curves import FIRST_LINE
         from cockpit.figures.request import request_of
         from cockpit.figures.run_figure import draw_logs
         from cockpit.run.replay import time_s
@@ -72,6 +73,7 @@ def plot(
         refuse_to_lose(logs, "the log", "--data", data)
         if data is not None:
             check_output("--data", data, CSV)
+            refuse_to_replace_text(data, FIRST_LINE, f"--data {data}")
         with _written(picture, PICTURE):
             verdict = draw_logs(logs, picture, request, data)[0]
         words = [f"picture  {picture}", *([f"data     {data}"] if data is not None else [])]

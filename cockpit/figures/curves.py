@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,6 +14,8 @@ from cockpit.figures.grid import Envelope, Grid, on_grid
 from cockpit.figures.request import Request
 from cockpit.figures.signals import Floats, Signal, samples_of
 
+_HEAD = ("log", "signal", "t_s", "least", "mean", "largest")
+FIRST_LINE = ",".join(_HEAD) + "\n"  # of the table; a file that begins with another is somebody's own
 _BINS = 2000  # across a figure: 300 dots an inch over 170 mm; fewer samples are drawn as they are
 
 
@@ -27,13 +30,18 @@ class Curve(NamedTuple):
 
 
 def window_of(runs: Sequence[RunData], request: Request) -> tuple[float, float]:
-    """From and until when a figure shows the logs [s]. Raises Fault CONFIG where that is outside of them."""
-    ends_s = [float(run.sensors["t_ns"].max()) * 1e-9 for run in runs if len(run.sensors)]
-    starts_s = [max(float(run.sensors["t_ns"].min()) * 1e-9, 0.0) for run in runs if len(run.sensors)]
-    end_s, start_s = max(ends_s, default=0.0), min(starts_s, default=0.0)
+    """From and until when a figure shows the logs [s]. Raises Fault CONFIG for what is outside of them, BAD_LOG for no block."""
+    for run in runs:
+        if not len(run.sensors):
+            line = f"{run.path}: holds no block of sensors that can be read, so there is nothing to draw"
+            raise Fault("BAD_LOG", f"{line}; `stickslip log check` says what is in it")
+    end_s = max(float(run.sensors["t_ns"].max()) * 1e-9 for run in runs)
+    start_s = min(max(float(run.sensors["t_ns"].min()) * 1e-9, 0.0) for run in runs)
     from_s, to_s = max(request.from_s, start_s), min(request.to_s, end_s)
     if request.is_window and from_s >= to_s:
-        line = f"--from {request.from_s:g} --to {request.to_s:g}: the log is from {start_s:g} to {end_s:g} s"
+        options = ("--from", request.from_s), ("--to", request.to_s)
+        given = " ".join(f"{option} {time_s:g}" for option, time_s in options if math.isfinite(time_s))
+        line = f"{given}: the log is from {start_s:g} to {end_s:g} s"
         raise Fault("CONFIG", f"{line}; choose times inside")
     return from_s, to_s
 
@@ -53,7 +61,7 @@ def as_table(curves: Sequence[Curve]) -> str:
     """The curves as CSV: a row for each point, values in SI units as the signal's name says; nothing where there is no value."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(["log", "signal", "t_s", "least", "mean", "largest"])
+    table.writerow(_HEAD)
     for curve in curves:
         rows = np.column_stack([curve.t_s, curve.values.least, curve.values.mean, curve.values.most])
         for row in rows[np.isfinite(rows[:, 2])].tolist():

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cockpit.judge.machine_terms import Following, Motion
+from cockpit.judge.strokes import swing_of
 from diagnosis.features.cycles import Cycles
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -18,7 +19,12 @@ class Phase(NamedTuple):
     seconds: float
     slips: int
     slips_per_min: float
-    swing_N: float  # of the drive force, largest to smallest block mean
+    swing_N: (
+        float  # of the drive force, largest to smallest block mean in the steady part of a stroke; median of strokes
+    )
+    strokes: (
+        int  # of which that is the median; 0 where the drive moves evenly in none, and the swing is that of all blocks
+    )
     mean_force_N: float
     following: Following | None  # None where no drive moved, or a position was not measured
     vibration_dose_mm2_per_s: float  # integral of v_a^2
@@ -29,11 +35,12 @@ class Phase(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What phases are made of; times and forces are [blocks], those that are numbers alone."""
+    """What phases are made of; times, forces and parts are [blocks], those that are numbers alone."""
 
     cycles: Cycles | None
     t_s: Floats
     mean_N: Floats
+    part: npt.NDArray[np.int64]  # the stroke in whose steady part a block is; -1 in none
     motion: Motion | None  # None for measured data of another program
 
 
@@ -54,11 +61,13 @@ def phase(told: Told, from_s: float, to_s: float, without: Stretches) -> Phase |
     # the first ramp of a run starts from an unloaded spring: no part of the swing of what follows
     later = inside & (told.t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
     steady = later if later.any() else inside
+    swing_N, strokes = swing_of(told.mean_N[steady], told.part[steady])
     return Phase(
         seconds=seconds,
         slips=slips,
         slips_per_min=60.0 * slips / seconds,
-        swing_N=float(np.ptp(told.mean_N[steady])),
+        swing_N=swing_N,
+        strokes=strokes,
         mean_force_N=float(told.mean_N[steady].mean()),
         following=told.motion.following(counts) if told.motion is not None else None,
         vibration_dose_mm2_per_s=told.motion.dose_mm2_per_s(counts) if told.motion is not None else 0.0,
@@ -74,11 +83,13 @@ def alone(told: Told, gone: Stretches) -> Phase | None:
     seconds, slips = sum(one.seconds for one in there), sum(one.slips for one in there)
     mean_N = sum(one.mean_force_N * one.seconds for one in there) / seconds
     longest = max(there, key=lambda one: one.seconds)
+    widest = max(there, key=lambda one: one.swing_N)
     return Phase(
         seconds=seconds,
         slips=slips,
         slips_per_min=60.0 * slips / seconds,
-        swing_N=max(one.swing_N for one in there),
+        swing_N=widest.swing_N,
+        strokes=widest.strokes,
         mean_force_N=mean_N,
         following=longest.following,
         vibration_dose_mm2_per_s=sum(one.vibration_dose_mm2_per_s for one in there),

@@ -7,7 +7,6 @@ The force falls as well where a soft drive rings, and where the drive stops and 
 slide the two are told apart: a slide that slips is faster than its drive was, as `docs/method/bank.md` has it.
 """
 
-import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -16,15 +15,12 @@ import numpy.typing as npt
 
 from bridge.log.logfile import RunData, block_period_ns, sample_times_s
 from bridge.log.metadata import number_of, source_of_import, texts_of
-from cockpit.judge.machine_terms import noise_of
+from cockpit.judge.strokes import steady_parts, strokes_of
 from diagnosis.features.cycles import Cycles, find_cycles, smallest_drop_N
-from diagnosis.look.turns import turns
 
 Floats = npt.NDArray[np.floating[Any]]
 
 _BIN_S = 1e-3  # of means, as slips are found in
-_SHORTEST_STROKE = 1e-3  # of the drive's whole travel, which is some steps of its encoder
-_TURN_SIGMAS = 10.0  # of the noise of the drive's place, which a stroke is longer than
 _BESIDE_S = 0.02  # before and after a fall, in which the drive's velocity is looked at
 _STOPS = 0.5  # of the drive's velocity before the fall
 # Velocity of the slide over the drive's, mean from 10 to 90 % of a fall: that of a sine whose peak is the 1.5 v_d of a slip.
@@ -54,7 +50,7 @@ def cycles_of(run: RunData) -> Cycles | None:
     bins = math.gcd(force_N.shape[1], max(round(period_ns * 1e-9 / _BIN_S), 1))  # of a block
     drive_m, slide_m = (_place_m(run, sensors, name, bins) for name in ("drive_position_m", "mass_position_m"))
     found: list[Cycles] = []
-    for first, end, way in _strokes(drive_m[::bins]):
+    for first, end, way in strokes_of(drive_m[::bins]):
         along_N = way * force_N[first:end]
         cycles = find_cycles(sample_s[first:end].ravel(), along_N.ravel(), drop_N, slowest_fall_s)
         inside = slice(first * bins, end * bins)
@@ -62,6 +58,15 @@ def cycles_of(run: RunData) -> Cycles | None:
         stroke = _Stroke(t_s, _means(along_N, bins), way * drive_m[inside], way * slide_m[inside])
         found.append(_signed(_slips_among(cycles, stroke, period_ns * 1e-9 / bins), way))
     return Cycles(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def steady_parts_of(run: RunData) -> npt.NDArray[np.int64]:
+    """In the steady part of which stroke of the drive each block of a log is, as `steady_parts` has it. Raises Fault BAD_LOG."""
+    sensors = run.sensors
+    if not len(sensors):
+        return np.zeros(0, np.int64)
+    mean_N = sensors["drive_force_N"].mean(axis=1, dtype=np.float64)
+    return steady_parts(_place_m(run, sensors, "drive_position_m", 1), mean_N, block_period_ns(sensors) * 1e-9)
 
 
 def absent_channels(run: RunData) -> list[str]:
@@ -101,18 +106,6 @@ def _place_m(run: RunData, sensors: Any, name: str, bins: int) -> Floats:
     if name in absent_channels(run) or not len(known) or np.ptp(place_m[known]) == 0.0:
         return np.full(len(place_m), np.nan)
     return np.interp(np.arange(len(place_m)), known, place_m[known])
-
-
-def _strokes(drive_m: Floats) -> list[tuple[int, int, int]]:
-    """First block, block after the last, and direction of each stroke of the drive, from its place in each block."""
-    count = len(drive_m)
-    if np.isnan(drive_m).any():
-        return [(0, count, 1)]
-    shortest_m = max(_SHORTEST_STROKE * float(np.ptp(drive_m)), _TURN_SIGMAS * float(noise_of(drive_m)))
-    at = [0] * count
-    turned = turns(drive_m.tolist(), shortest_m, at)
-    limits = [0, *at[:turned], count]
-    return [(first, end, (-1) ** i) for i, (first, end) in enumerate(itertools.pairwise(limits)) if end > first]
 
 
 def _signed(cycles: Cycles, way: int) -> Cycles:

@@ -17,7 +17,7 @@ from cockpit.judge.log_faults import of_bytes, of_clock, of_events
 from cockpit.judge.machine_terms import motion_of
 from cockpit.judge.pauses import Pauses, pauses_in
 from cockpit.judge.phases import Phase, Told, alone, phase, slips_in
-from cockpit.judge.slips import cycles_of
+from cockpit.judge.slips import cycles_of, steady_parts_of
 
 _SETTLING_S = 1.0  # after the controller is enabled it has this long
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
@@ -99,7 +99,8 @@ def stretch_of(run: RunData, from_s: float, to_s: float) -> Phase | None:
     mean_N = run.sensors["drive_force_N"].astype(np.float64).mean(axis=1)
     finite = np.isfinite(mean_N)
     block_s = number_of(run.configuration("controller"), "block_s", run.path)
-    told_by = Told(cycles_of(run), run.sensors["t_ns"][finite] * 1e-9, mean_N[finite], motion_of(run, block_s))
+    t_s, part = run.sensors["t_ns"][finite] * 1e-9, steady_parts_of(run)[finite]
+    told_by = Told(cycles_of(run), t_s, mean_N[finite], part, motion_of(run, block_s))
     return phase(told_by, from_s, to_s, [])
 
 
@@ -153,7 +154,7 @@ def judge_run(run: RunData) -> RunVerdict:
     pauses, why_not = pauses_in(run, block_s * 1e9) if latency is not None else (None, "")
     # the controller has its second to settle after it was gone as well
     without = [*stops, *((from_s, until_s + _SETTLING_S) for from_s, until_s in gone)]
-    told_by = Told(cycles, t_s, mean_N, motion_of(run, block_s))
+    told_by = Told(cycles, t_s, mean_N, steady_parts_of(run)[finite], motion_of(run, block_s))
     after = phase(told_by, max(in_charge_s, began_s), seconds, without)
     gone_s = sum(until_s - from_s for from_s, until_s in gone)
     return RunVerdict(
@@ -208,6 +209,7 @@ def _judge_imported(run: RunData, source: str) -> RunVerdict:
     finite = np.isfinite(mean_N)
     seconds = float(t_s[-1]) if blocks else 0.0
     lost_blocks, all_losses_known = _lost_blocks(run)
+    told_by = Told(cycles_of(run), t_s[finite], mean_N[finite], steady_parts_of(run)[finite], None)
     return RunVerdict(
         log=str(run.path),
         seconds=seconds,
@@ -219,7 +221,7 @@ def _judge_imported(run: RunData, source: str) -> RunVerdict:
         stopped_s=0.0,
         charge=in_charge(run),
         alone=None,
-        before=phase(Told(cycles_of(run), t_s[finite], mean_N[finite], None), 0.0, seconds, []),
+        before=phase(told_by, 0.0, seconds, []),
         taking_over=None,
         after=None,
         stopped_slips=0,

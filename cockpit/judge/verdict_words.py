@@ -27,7 +27,7 @@ def in_words(verdict: RunVerdict, without: Phase | None = None) -> list[str]:
         rate = f"{v.before.slips_per_min:.0f} per minute{'' if v.imported else ' of this phase'}"
         lines.append(
             f"{'whole ' if v.imported else 'before'}   {counted(v.before.slips, 'slip')} in {v.before.seconds:.1f} s ({rate}), "
-            f"drive force swings by {v.before.swing_N:.2f} N"
+            f"{_swing(v.before)}"
         )
     if v.taking_over is not None and v.taking_over.slips:
         lines.append(
@@ -35,16 +35,13 @@ def in_words(verdict: RunVerdict, without: Phase | None = None) -> list[str]:
             "to take over, which are no part of before or after"
         )
     if v.after is not None:
-        lines.append(
-            f"after    {counted(v.after.slips, 'slip')} in {v.after.seconds:.1f} s, drive force swings by {v.after.swing_N:.2f} N"
-        )
+        lines.append(f"after    {counted(v.after.slips, 'slip')} in {v.after.seconds:.1f} s, {_swing(v.after)}")
     lines.extend(_machine_terms(v.before, v.after))
     if without is not None:
         lines.append(_without_in_words(without))
     if v.alone is not None:
         lines.append(
-            f"alone    {counted(v.alone.slips, 'slip')} in {v.alone.seconds:.2f} s with nobody in charge, drive force swings by "
-            f"{v.alone.swing_N:.2f} N"
+            f"alone    {counted(v.alone.slips, 'slip')} in {v.alone.seconds:.2f} s with nobody in charge, {_swing(v.alone)}"
         )
     if v.stopped_s > _FADE_S:
         slips = f"; {counted(v.stopped_slips, 'slip')} then" if v.stopped_slips else ""
@@ -111,7 +108,7 @@ def following_in_words(now: Following, other: Following | None, name: str) -> li
 
 
 def _without_in_words(without: Phase) -> str:
-    line = f"without  {counted(without.slips, 'slip')} in {without.seconds:.1f} s, drive force swings by {without.swing_N:.2f} N"
+    line = f"without  {counted(without.slips, 'slip')} in {without.seconds:.1f} s, {_swing(without)}"
     if (following := without.following) is not None:
         line += (
             f", following error {_um(following.error_rms_m)} um rms, {_um(following.error_peak_m)} um peak, "
@@ -120,6 +117,11 @@ def _without_in_words(without: Phase) -> str:
         if following.reversals:
             line += f", quadrant error {_worst_reversal(following)}"
     return f"{line}: the stretch after, simulated without the controller"
+
+
+def _swing(phase: Phase) -> str:
+    of = f" (median of {phase.strokes} strokes, without their turns)" if phase.strokes > 1 else ""
+    return f"drive force swings by {phase.swing_N:.2f} N{of}"
 
 
 def _worst_reversal(following: Following) -> str:
@@ -185,4 +187,4 @@ def _what_is_there(verdict: RunVerdict) -> str:
         if whole.slips
         else f"no slip in {whole.seconds:.1f} s"
     )
-    return f"{many}, drive force swings by {whole.swing_N:.2f} N"
+    return f"{many}, {_swing(whole)}"

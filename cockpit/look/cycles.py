@@ -1,28 +1,49 @@
 """The slips of a look as a table for a spreadsheet."""
 
 import math
+import zipfile
+import zlib
 from pathlib import Path
 
-from bridge.files import replacing
+from bridge.faults import Fault
+from bridge.files import not_ours, refuse_to_replace_text, replacing
 from bridge.provenance import provenance
 from diagnosis.look.look import Look
 from diagnosis.look.sticks import Cycle
 
-SHEETS = (".csv", ".xlsx")
+_FIRST_LINE = ",".join(Cycle._fields) + "\n"
+_AUTHOR = "stickslip look"
+
+
+def refuse_to_replace_sheet(out: Path, place: str) -> None:
+    """Raise Fault CONFIG where `out`, .csv or .xlsx, is there and was not written by `write_cycles`."""
+    if out.suffix.lower() == ".csv":
+        refuse_to_replace_text(out, _FIRST_LINE, place)
+    elif out.is_file() and out.stat().st_size and not _is_our_book(out):
+        raise Fault("CONFIG", not_ours(out, place))
+
+
+def _is_our_book(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as book, book.open("docProps/core.xml") as about:
+            return f"<dc:creator>{_AUTHOR}</dc:creator>".encode() in about.read(1 << 16)
+    except (OSError, zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError, zlib.error):
+        return False
 
 
 def write_cycles(seen: Look, out: Path, source: Path) -> None:
     """Write one row a slip, .csv or .xlsx. A value that the record does not show is empty."""
-    names = list(Cycle._fields)
+    names = Cycle._fields
     rows = [[None if not math.isfinite(value) else value for value in cycle] for cycle in seen.cycles]
     with replacing(out) as file:
         if out.suffix.lower() == ".csv":
-            text = [",".join(names), *(",".join("" if value is None else repr(value) for value in row) for row in rows)]
-            file.write(("\n".join(text) + "\n").encode())
+            text = [",".join("" if value is None else repr(value) for value in row) + "\n" for row in rows]
+            file.write("".join([_FIRST_LINE, *text]).encode())
             return
         import xlsxwriter
 
         with xlsxwriter.Workbook(file, {"in_memory": True}) as book:
+            book.set_properties({"author": _AUTHOR})
             sheet = book.add_worksheet("slips")
             sheet.write_row(0, 0, names)
             for i, row in enumerate(rows, 1):

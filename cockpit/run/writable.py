@@ -17,6 +17,7 @@ RIG = (".toml",)
 JSON = (".json",)
 TABLE = (".parquet", ".csv", ".mat")
 CSV = (".csv",)
+SHEETS = (".csv", ".xlsx")
 _NEVER_LOST: dict[tuple[str, ...], str] = {
     LOG: files.LOG,
     JSON: files.JSON,

@@ -18,7 +18,7 @@ from cockpit.cli import app
 from cockpit.judge.verdict import judge_run
 from cockpit.run.progress import progress_line
 from cockpit.run.run import keep_aside
-from tests.logs import doctored, empty_log, short_log
+from tests.logs import doctored, short_log
 
 PNG = b"\x89PNG"
 
@@ -32,13 +32,6 @@ def log(tmp_path: Path) -> Path:
 
 def call(*arguments: str):
     return CliRunner().invoke(app, list(arguments))
-
-
-def test_a_log_without_a_block_is_drawn(tmp_path: Path) -> None:
-    out = tmp_path / "run.png"
-    result = call("plot", str(empty_log(tmp_path)), "--out", str(out))
-    assert result.exit_code == 0, result.output
-    assert out.read_bytes().startswith(PNG)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from bridge.faults import FAULTS
 from bridge.log.logfile import read_run
 from bridge.log.runlog import RunLog
 from bridge.wire.messages import sensor_block
@@ -20,7 +21,7 @@ from cockpit.cli import app
 from cockpit.figures.grid import Grid, on_grid
 from cockpit.judge.verdict import judge, judge_run
 from cockpit.judge.verdict_words import headline, in_words
-from tests.logs import short_log
+from tests.logs import empty_log, short_log
 
 
 @pytest.fixture
@@ -86,8 +87,9 @@ def test_a_paper_has_its_width_and_its_metadata(log: Path) -> None:
 
 def test_the_numbers_of_the_curves_are_those_of_the_log(log: Path) -> None:
     out, data = log.with_name("x.pdf"), log.with_name("x.csv")
-    result = call("plot", log, "--vs", log, "--out", out, "--data", data, "--signals", "drive_force_N,drive_position_m")
-    assert result.exit_code == 0, result.output
+    for signals in ("drive_force_N", "drive_force_N,drive_position_m"):  # its own table it replaces
+        result = call("plot", log, "--vs", log, "--out", out, "--data", data, "--signals", signals)
+        assert result.exit_code == 0, result.output
     rows = list(csv.DictReader(data.read_text().splitlines()))
     force_N = read_run(log).sensors["drive_force_N"]
     mine = [float(row["largest"]) for row in rows if row["signal"] == "drive_force_N"]
@@ -99,7 +101,8 @@ def test_the_numbers_of_the_curves_are_those_of_the_log(log: Path) -> None:
     ("options", "told"),
     [
         (["--from", "3s", "--to", "2s"], "--from 3 --to 2: from must be before to; exchange them"),
-        (["--from", "3s"], "the log is from 0.001 to 0.4 s; choose times inside"),
+        (["--from", "3s"], "CONFIG: --from 3: the log is from 0.001 to 0.4 s; choose times inside"),
+        (["--to", "0s"], "CONFIG: --to 0: the log is from 0.001 to 0.4 s; choose times inside"),
         (["--signals", "force"], "--signals force: no signal of a log; known: drive_force_N, "),
         (["--style", "poster"], "--style poster: must be screen or paper"),
         (["--width", "2"], "--width 2: must be from 40 to 500 mm"),
@@ -114,6 +117,16 @@ def test_what_cannot_be_drawn_is_said_in_one_line(log: Path, options: list[str],
     assert told in result.stderr
     assert result.stderr.count("\n") == 1
     assert not log.with_name("run.png").exists()
+
+
+def test_a_log_without_a_block_is_not_drawn(tmp_path: Path) -> None:
+    empty = empty_log(tmp_path)
+    result = call("plot", empty)
+    assert result.exit_code == FAULTS["BAD_LOG"].exit_status
+    assert (
+        f"BAD_LOG: {empty}: holds no block of sensors that can be read, so there is nothing to draw; " in result.stderr
+    )
+    assert not empty.with_suffix(".png").exists()
 
 
 def test_measured_data_of_another_program_are_judged_and_drawn(tmp_path: Path) -> None:

@@ -17,9 +17,12 @@ RUN = ("run", "--in-process", "--set", "duration_s=0.05")
 
 @pytest.fixture
 def files(tmp_path: Path) -> dict[str, Path]:
-    made = {name: tmp_path / name for name in ("run.mcap", "log.json", "plant.py", "rig.toml", "mine.png", "mine.html")}
+    names = ("run.mcap", "log.json", "plant.py", "rig.toml", "mine.png", "mine.html", "mine.csv", "mine.xlsx")
+    made = {name: tmp_path / name for name in names}
     for name, path in made.items():
         path.write_bytes(short_log() if name in {"run.mcap", "log.json"} else b"mine = 1\n")
+    made["through.csv"] = tmp_path / "through.csv"
+    made["through.csv"].symlink_to("plant.py")
     return made
 
 
@@ -35,6 +38,11 @@ def files(tmp_path: Path) -> dict[str, Path]:
         (("plot", "run.mcap", "--out", "mine.png"), "mine.png"),
         (("review", "run.mcap", "--out", "mine.html"), "mine.html"),
         (("map", "--out", "mine.png"), "mine.png"),
+        (("plot", "run.mcap", "--data", "mine.csv"), "mine.csv"),
+        (("plot", "run.mcap", "--data", "through.csv"), "through.csv"),
+        (("look", "run.mcap", "--out", "mine.csv"), "mine.csv"),
+        (("look", "run.mcap", "--out", "mine.xlsx"), "mine.xlsx"),
+        (("look", "run.mcap", "--out", "rig.toml"), "rig.toml"),
     ],
 )
 def test_what_is_there_and_of_another_kind_stays(files, monkeypatch, words, victim):
@@ -66,6 +74,22 @@ def test_another_name_of_an_input_is_no_place_for_a_result(files, monkeypatch, w
     assert f"{name}: is " in result.output
     assert log.samefile(name)
     assert log.read_bytes() == short_log()
+
+
+@pytest.mark.parametrize("name", ["run.mcap", "./run.mcap", "hard.mcap", "soft.mcap"])
+def test_a_log_is_recovered_in_its_place_only_where_that_is_asked_for(files, monkeypatch, name):
+    log = files["run.mcap"]
+    monkeypatch.chdir(log.parent)
+    Path("hard.mcap").hardlink_to(log)
+    Path("soft.mcap").symlink_to(log)
+    cut = log.read_bytes()[:-100]
+    log.write_bytes(cut)
+    result = CliRunner().invoke(app, ["log", "recover", "run.mcap", "--out", name])
+    assert result.exit_code == FAULTS["CONFIG"].exit_status
+    assert "would be replaced; ask for it with --in-place, or choose another" in result.output
+    assert log.read_bytes() == cut
+    assert CliRunner().invoke(app, ["log", "recover", "run.mcap", "--in-place"]).exit_code == 0
+    assert log.read_bytes() != cut
 
 
 def test_a_log_is_not_replaced_by_the_result_of_its_run(tmp_path):

@@ -147,6 +147,7 @@ def test_the_answer_says_why_a_run_without_a_slip_is_not_good(tmp_path: Path) ->
         slips=0,
         slips_per_min=0.0,
         swing_N=0.0,
+        strokes=0,
         mean_force_N=0.0,
         following=None,
         vibration_dose_mm2_per_s=0.0,

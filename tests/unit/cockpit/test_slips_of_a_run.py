@@ -7,6 +7,8 @@ import pytest
 
 from bridge.log.logfile import RunData, read_run
 from cockpit.judge.slips import cycles_of
+from cockpit.judge.verdict import judge_run
+from cockpit.judge.verdict_words import in_words
 from tests.logs import Tables, doctored
 
 STIFFNESS_N_PER_M = 1e6
@@ -45,6 +47,20 @@ def test_slips_count_on_both_ways_and_a_turn_is_none(tmp_path: Path) -> None:
     assert cycles.slips == 10
     assert np.sign(cycles.breakaway_force_N).tolist() == [1.0] * 5 + [-1.0] * 5
     assert np.mod(cycles.breakaway_t_s, 0.04) == pytest.approx(0.036, abs=2e-3)
+
+
+def test_a_force_swings_inside_a_stroke_and_not_where_its_drive_turns_or_stands(tmp_path: Path) -> None:
+    at_s = np.mod(T_S, 0.16)  # 50 ms forwards, 30 ms of a stop, in which the spring lets go, and the same backwards
+    there_s, back_s = np.minimum(at_s, 0.05), np.clip(at_s - 0.08, 0.0, 0.05)
+    stands = np.mod(T_S, 0.08) > 0.05
+    way = np.where(at_s < 0.08, 1.0, -1.0)
+    behind_m = np.where(stands, 0.0, way * (2e-5 + 4e-6 * np.sin(2 * np.pi * T_S / 0.01)))
+    run = made_run(tmp_path, SPEED_MPS * (there_s - back_s), behind_m)
+    whole = judge_run(run).before
+    assert whole is not None
+    assert whole.swing_N == pytest.approx(8.0, rel=0.1)
+    assert whole.strokes == 2
+    assert "drive force swings by 7.87 N (median of 2 strokes, without their turns)" in in_words(judge_run(run))[0]
 
 
 @pytest.mark.parametrize("places", [True, False])

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from bridge.faults import Fault
+from bridge.tables.kinds import kind_of
 from diagnosis.evidence.import_table import import_file
 from tests.unit.diagnosis.evidence.foreign_tables import FORCE, KINDS, POSITION, Kind, T, write
 
@@ -68,6 +69,16 @@ def test_without_a_time_one_line_asks_for_it(tmp_path: Path) -> None:
         Fault, match=r"a.csv: no time: .*add under \[source\] sample_rate_Hz = 1000.0 \(columns here: F\)"
     ):
         import_file(tmp_path / "a.csv", channel_map(tmp_path, drive_force_N="F"), tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", ["x.npz", "x.npy", "x.csv"])
+def test_arrays_of_numpy_are_named_with_the_way_to_columns(tmp_path: Path, name: str) -> None:
+    with (tmp_path / name).open("wb") as file:
+        np.save(file, T) if name == "x.npy" else np.savez(file, t=T, force=T)
+    with pytest.raises(Fault) as caught:
+        kind_of(tmp_path / name)
+    assert f"{name}: holds arrays of NumPy, which do not say what is a time" in str(caught.value)
+    assert 'write them as columns of a text: numpy.savetxt("NAME.csv"' in str(caught.value)
 
 
 def test_a_packed_file_is_named_as_one(tmp_path: Path) -> None:
