@@ -53,7 +53,7 @@ def read_sheet(path: Path, given: Dialect) -> Table:
         columns,
         head.unit_of,
         {},
-        rate_Hz,
+        sample_rate_Hz=rate_Hz,
         decimal=form.decimal,
         thousands=form.thousands,
         findings=findings,
