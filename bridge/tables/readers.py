@@ -8,6 +8,7 @@ from bridge.files import check_file
 from bridge.tables.hdf5 import read_hdf5
 from bridge.tables.kinds import Kind, kind_of
 from bridge.tables.mat import read_mat
+from bridge.tables.own_times import with_own_times
 from bridge.tables.ros_log import read_ros_log
 from bridge.tables.sheet import read_sheet
 from bridge.tables.table import Table
@@ -43,7 +44,8 @@ def read_table(path: Path, dialect: Dialect | None = None, kind: Kind | None = N
         "mcap": lambda: read_ros_log(path),
     }
     try:
-        return readers[kind]()
+        table = readers[kind]()
+        return with_own_times(table) if kind in ("text", "sheet") else table
     except (Fault, ModuleNotFoundError):
         raise
     except Exception as error:

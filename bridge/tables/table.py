@@ -16,6 +16,7 @@ from bridge.tables.unit_words import bare_name, unit_in_name
 Floats = npt.NDArray[np.float64]
 
 _SECONDS = re.compile(r"(.*?)(?:secs?|seconds)")  # of a stamp, with one of these for what is over
+_AGAIN = re.compile(r"\.\d+$")  # what a reader adds to a name that is in the file already
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanosecs", "nanoseconds")
 
 
@@ -48,6 +49,9 @@ class Table:
     written: dict[str, Any] = field(
         default_factory=dict[str, Any]
     )  # how the file is written: keys of [source] of a map
+    own_times: dict[str, str] = field(
+        default_factory=dict[str, str]
+    )  # the columns of times that clocks come from, by channel
 
     def find(self, name: str | int) -> str:
         """The key of a column that a person names: its name, its number from 1 on, or its name without its unit.
@@ -103,7 +107,8 @@ class Table:
     def unit(self, name: str | int) -> str:
         """The unit of a column, from the file's own list or the column's name; empty where neither says one."""
         key = self.find(name)
-        return self.units.get(key) or unit_in_name(key)
+        first = _AGAIN.sub("", key)
+        return self.units.get(key) or unit_in_name(first if first in self.columns else key)
 
 
 def _bare(text: str) -> str:

@@ -70,7 +70,7 @@ def mapped(
     clocks = {name: table.clocks.get(table.find(channels[name].column)) for name in values}
     if sample_rate_Hz is None and values and all(clock is not None for clock in clocks.values()):
         sampled = {
-            name: Sampled(clock.times(len(values[name])), values[name])
+            name: _sampled(clock.times(len(values[name])), values[name])
             for name, clock in clocks.items()
             if clock is not None
         }
@@ -85,6 +85,12 @@ def mapped(
     rows = len(next(iter(values.values())))
     _same_length(table, channels, values, rows, "the first channel")
     return Mapped({"t_s": np.arange(rows) / rate_Hz} | values, table.findings + found)
+
+
+def _sampled(times_s: Floats, values: Floats) -> Sampled:
+    """A channel without the rows behind its last time, where another one of the file is longer."""
+    there = np.isfinite(times_s)
+    return Sampled(times_s[there], values[there])
 
 
 def has_time(table: Table, channels: dict[str, ChannelMap]) -> bool:

@@ -51,11 +51,11 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
 
     Raises Fault CONFIG with a line to copy where the force cannot be known.
     """
-    numeric = _numeric(table)
+    numeric = [name for name in _numeric(table) if name not in table.own_times.values()]
     found: dict[str, str] = {what: table.find(column) for what, column in given.items() if column}
     reasons: list[str] = []
     for what in ("coefficient", "time", "load", "force", "speed", "position"):
-        if what in found:
+        if what in found or (what == "time" and table.own_times):
             continue
         left = [name for name in (list(table.columns) if what == "time" else numeric) if name not in found.values()]
         column = _named(table, what, left)

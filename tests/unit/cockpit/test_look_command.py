@@ -136,6 +136,36 @@ def test_a_position_that_stands_still_in_the_sticks_is_the_slides(tmp_path: Path
     assert seen_in(path)["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(1e3 * stiffness_N_per_mm, rel=2e-3)
 
 
+@pytest.mark.parametrize("force_first", [True, False])
+@pytest.mark.parametrize("heads", [("Time (ms),{}", "Time (ms),{}"), ("t1 (ms),{}", "t2 (ms),{}")])
+def test_channels_with_times_of_their_own_are_merged_by_them(
+    tmp_path: Path, force_first: bool, heads: tuple[str, str]
+) -> None:
+    t_s, force_N, _ = saw_teeth()
+    other_s = np.arange(0, 8, 5e-3)
+    pairs = [("Force (N)", t_s, force_N), ("Drive position (mm)", other_s, 0.5 * other_s)]
+    pairs = pairs if force_first else pairs[::-1]
+    lines = [",".join(head.format(name) for head, (name, _, _) in zip(heads, pairs, strict=True))]
+    for row in range(len(t_s)):
+        cells = (f"{1e3 * at[row]:.6g},{values[row]:.6g}" if row < len(at) else "," for _, at, values in pairs)
+        lines.append(",".join(cells))
+    path, made = tmp_path / "a.csv", tmp_path / "a.toml"
+    path.write_text("\n".join(lines) + "\n")
+    table = seen_in(path, "--out", str(made))
+    assert table["slips"] == 5
+    assert table["numbers"]["stiffness_N_per_m"]["value"] == pytest.approx(1e3 * 3.0 / 1.46 / 0.5, rel=2e-3)
+    assert "is the time of 'Force (N)'" in said(table)
+    assert seen_in(path, "--map", str(made))["numbers"] == table["numbers"]
+
+
+def test_a_time_that_is_told_twice_is_one(tmp_path: Path) -> None:
+    t_s, force_N, drive_mm = saw_teeth()
+    path = tmp_path / "a.csv"
+    table_of(path, "t (s),Force (N),Time (s),Position (mm)", t_s, force_N, t_s + 1.7e9, drive_mm)
+    table = seen_in(path)
+    assert (table["slips"], "is the time of" in said(table)) == (5, False)
+
+
 def test_a_coefficient_is_a_force_only_with_a_load(tmp_path: Path) -> None:
     t_s, force_N, _ = saw_teeth()
     load_N = np.full(len(t_s), 50.0)
