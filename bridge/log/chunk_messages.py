@@ -57,9 +57,9 @@ class Messages(NamedTuple):
         """The channels that have messages."""
         return np.flatnonzero(np.bincount(self.channel)).tolist()
 
-    def of(self, channel: int) -> "Messages":
-        """The messages of one channel."""
-        mine = np.flatnonzero(self.channel == channel)
+    def of(self, channels: Sequence[int]) -> "Messages":
+        """The messages of some channels, in file order."""
+        mine = np.flatnonzero(self.channel == channels[0] if len(channels) == 1 else np.isin(self.channel, channels))
         return Messages(self.data, _as_bytes(self.heads)[mine].view(_HEAD), self.channel[mine], self.start[mine])
 
     def payload_bytes(self) -> Column:

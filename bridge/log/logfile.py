@@ -50,14 +50,15 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
     """
     layouts: dict[str, Layout] = dict(_LAYOUTS)
     for messages in reader.messages():
+        channels: dict[str, list[int]] = {}
         for channel_id in messages.channels():
             topic = reader.topic(channel_id)
-            if topic in DERIVED:
-                continue
-            mine = messages.of(channel_id)
             if topic is None:
-                reader.pass_over(channel_id, len(mine.start))
-                continue
+                reader.pass_over(channel_id, len(messages.of([channel_id]).start))
+            elif topic not in DERIVED:  # of one topic several may alternate: two publishers, or a log that was merged
+                channels.setdefault(topic, []).append(channel_id)
+        for topic, same in channels.items():
+            mine = messages.of(same)
             log_ns = mine.heads["log_ns"].astype(np.int64)
             if topic in STREAMING:
                 if topic not in layouts:

@@ -68,7 +68,7 @@ def test_a_message_does_not_go_on_in_the_next_chunk() -> None:
 
 
 def test_messages_of_one_channel_keep_their_order() -> None:
-    mine = messages_of([Chunked(DATA, INDEXES)] * 2).of(1)
+    mine = messages_of([Chunked(DATA, INDEXES)] * 2).of([1])
     assert mine.heads["sequence"].tolist() == [0, 2, 4] * 2
     assert mine.payloads(2) == [b"a" * 20, b"c" * 20]
     assert mine.stacked(20).tobytes() == 2 * (b"a" * 20 + b"c" * 20 + b"d" * 20)

@@ -35,9 +35,13 @@ def written_anew(
     extra: Callable[[Writer], None] = lambda _: None,
     first_id: int = 0,
     keep: Callable[[str], bool] = lambda _: True,
+    each: int = 1,
     **options: object,
 ) -> Path:
-    """The short log as the standard writer writes it; definitions lie in the chunks, where there are any."""
+    """The short log as the standard writer writes it; definitions lie in the chunks, where there are any.
+
+    Messages of a topic go to `each` channels of it in turn.
+    """
     source = short_log()
     with path.open("wb") as file:
         writer = Writer(file, **{"chunk_size": SMALL} | options)
@@ -48,17 +52,19 @@ def written_anew(
             if isinstance(record, Metadata):
                 writer.add_metadata(record.name, dict(record.metadata))
         schemas: dict[int, int] = {}
-        channels: dict[int, int] = {}
+        channels: dict[tuple[int, int], int] = {}
         for schema, channel, message in make_reader(BytesIO(source)).iter_messages(log_time_order=False):
             if not keep(channel.topic):
                 continue
             if schema.id not in schemas:
                 schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
-            if channel.id not in channels:
-                places = channel.topic, channel.message_encoding, schemas[schema.id], dict(channel.metadata)
-                channels[channel.id] = writer.register_channel(*places)
+            one = channel.id, message.sequence % each
+            if one not in channels:
+                about = dict(channel.metadata) | ({"publisher": str(one[1])} if each > 1 else {})
+                places = channel.topic, channel.message_encoding, schemas[schema.id], about
+                channels[one] = writer.register_channel(*places)
             times = message.log_time, message.data, message.publish_time, message.sequence
-            writer.add_message(channels[channel.id], *times)
+            writer.add_message(channels[one], *times)
         extra(writer)
         writer.finish()
     return path
@@ -109,6 +115,17 @@ def test_every_form_is_read_and_recovered_as_it_was(
         ]
     assert theirs[0] == theirs[1]
     assert recovered.messages == len(theirs[0])
+
+
+@pytest.mark.parametrize("chunks", [True, False])
+def test_channels_of_one_topic_that_alternate_are_one_topic(tmp_path: Path, chunks: bool) -> None:
+    path = written_anew(tmp_path / "anew.mcap", use_chunking=chunks, each=2)
+    run = read_run(path)
+    assert same(run, tmp_path / "source.mcap")
+    assert (judge(path).lost_blocks, judge(path).lost_messages) == (0, 0)
+    assert check_log(path).findings == []
+    recover(path, tmp_path / "recovered.mcap")
+    assert same(read_run(tmp_path / "recovered.mcap"), tmp_path / "source.mcap")
 
 
 @pytest.mark.parametrize("library", [LIBRARY, "mcap-cli/0.1.0", ""])
