@@ -133,7 +133,9 @@ class ControllerConfig(Strict):
         nyquist_Hz = 0.5 * self.samples_per_block / self.block_s
         if limits.frequency_max_Hz >= nyquist_Hz:
             raise ValueError(
-                f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be below half the sample rate, {nyquist_Hz:g} Hz"
+                f"limits.frequency_max_Hz = {limits.frequency_max_Hz}: must be below half the sample rate, {nyquist_Hz:g} Hz; "
+                f"lower it, or raise controller.samples_per_block and rig.solver.samples_per_block, both above "
+                f"{2.0 * limits.frequency_max_Hz * self.block_s:g}"
             )
         if limits.stale_after_s < _FEWEST_SILENT_BLOCKS * self.block_s:
             raise ValueError(

@@ -52,6 +52,9 @@ class Table:
     written: dict[str, Any] = field(
         default_factory=dict[str, Any]
     )  # how the file is written: keys of [source] of a map
+    own_times: dict[str, str] = field(
+        default_factory=dict[str, str]
+    )  # the columns of times that clocks come from, by channel
 
     def find(self, name: str | int) -> str:
         """The key of a column that a person names: its name, its number from 1 on, or its name without its unit.

@@ -7,6 +7,7 @@ connection dials. Receiving threads copy bytes into bounded queues and do nothin
 import contextlib
 import ctypes
 import os
+import re
 import socket
 import struct
 import threading
@@ -33,6 +34,7 @@ _WITHOUT_PASSWORD_S = 0.2
 _READS_S = 0.5  # in which a rig that runs has read the first bytes of a connection, on a busy machine too
 _NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # a length and as many bytes, as Zenoh frames them; in TLS no handshake
 _AT_ONCE = struct.pack("ii", 0, 0)  # SO_LINGER off
+_OWN_SOURCE = re.compile(r" at /\S+\.rs:\d+\.?")  # of Zenoh: a place in it, behind each of its errors
 _LIBC = ctypes.CDLL(None)
 _ROLES = frozenset({"plant", "controller", "recorder"})  # which have a token each
 _MOST_CLAIMS = 64  # of controllers that start at once; more are a flood, and one rival is enough to yield
@@ -318,5 +320,5 @@ def _header(reply: Any) -> wire.Header | None:
 
 
 def _brief(error: Exception) -> str:
-    text = str(error).splitlines()[0]
-    return text if len(text) < 90 else text[:87] + "..."
+    """What Zenoh says, without the places in its own source."""
+    return _OWN_SOURCE.sub("", str(error).splitlines()[0])

@@ -23,6 +23,8 @@ _NOTHING_M = 1e-12  # what is left of a ramp by rounding
 _KEPT_S = 0.1  # in which a rig says that it cannot keep a stop over its restart
 _REFUSED_S = 1.0  # for which a rig stays in FAULT after the word ARM
 _ARMS = (wire.Operator.ARM, wire.Operator.ACCEPT_GAIN)
+_QUIETENS = (wire.Operator.STOP, wire.Operator.DISARM)
+_START_ONE = "start one, or give its --endpoint"
 _BY_HAND = "take it that it goes on as before: stop the exciter's amplifier by hand, at its own interlock"
 
 
@@ -82,7 +84,8 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
             line = f"{where}: what listens there stands still (frozen or overloaded), and hears no {name}"
             raise Fault("NO_PEER", f"{line}: must run; {_BY_HAND}") from None
         line = f"{where}: no rig answers there within {_DIAL_S:g} s: --endpoint must be that of the run"
-        raise Fault("NO_PEER", f"{line}; if something vibrates, {_BY_HAND}") from None
+        by_hand = f"if something vibrates, {_BY_HAND}"
+        raise Fault("NO_PEER", f"{line}; {by_hand if action in _QUIETENS else _START_ONE}") from None
     with bus:
         exchange = _Exchange(name)
         bus.listen(APPLIED, exchange.inbox.push)
@@ -94,7 +97,7 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
     last = exchange.applied
     if last is None:
         line = f"{where}: no rig says what it applies: --prefix must be that of the run"
-        raise Fault("NO_PEER", f"{line}; {_BY_HAND}")
+        raise Fault("NO_PEER", f"{line}; {_BY_HAND if action in _QUIETENS else 'give the --prefix of the run'}")
     before = f"{wire.GuardState.Name(last.guard_state)} with {_vibration(last.amplitude_m)}"
     if exchange.silent_s > _SILENT_S:
         line = (

@@ -1,6 +1,7 @@
 """`stickslip run`: one scenario, one log, one verdict."""
 
 import contextlib
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -25,6 +26,12 @@ if TYPE_CHECKING:
     from cockpit.judge.margins import Margins
     from cockpit.judge.phases import Phase
     from cockpit.judge.verdict import RunVerdict
+
+
+# Free on the disk of a log below which a run without an end in one process is over: it writes some 2 GB a minute. Smaller: the
+# judging of the log, and whoever else writes there, meet a full disk.
+_LEAST_FREE_BYTES = 1 << 30
+_LOOK_S = 0.5  # between two looks at the disk, in which 20 MB are written
 
 
 def log_path(given: Path | None, name: str) -> Path:
@@ -126,6 +133,8 @@ def run_scenario(
         refuse_faults_that_take_time(scenario)
     if not in_process:
         rig_security(scenario.bus)  # here, where its warning is seen and its fault comes before anything starts
+    if endless and in_process:
+        _refuse_little_room(path)
     if endless:
         say(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
     interrupted = False
@@ -180,8 +189,38 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool) -> 
     return RunOutcome(verdict, scenario.rig.name, list(scenario.rig.effects), margins, alone)
 
 
+def _free_bytes(path: Path) -> int:
+    """What is free where a log is, or will be."""
+    return shutil.disk_usage(next(parent for parent in path.absolute().parents if parent.exists())).free
+
+
+def _refuse_little_room(path: Path) -> None:
+    """Raise Fault LOG_WRITE where a run without an end would be over at once."""
+    if (free := _free_bytes(path)) < _LEAST_FREE_BYTES:
+        line = f"{path}: {free / 1e6:.0f} MB are free there: a run without an end in one process, which writes some 2 GB a minute"
+        rule = f"needs {_LEAST_FREE_BYTES / 1e6:.0f} MB"
+        raise Fault(
+            "LOG_WRITE", f"{line}, {rule}; free space, choose another --log, or give it an end: --set duration_s=60"
+        )
+
+
+class _Room:
+    """Looks now and then whether the disk of a log has room for more."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._look_s = time.monotonic() + _LOOK_S
+        self.is_over = False
+
+    def __call__(self) -> bool:
+        if time.monotonic() >= self._look_s:
+            self._look_s = time.monotonic() + _LOOK_S
+            self.is_over = _free_bytes(self._path) < _LEAST_FREE_BYTES
+        return self.is_over
+
+
 def _in_process(scenario: Scenario, path: Path) -> None:
-    """Simulate, with a bar on a terminal, or the simulated time where there is no end."""
+    """Simulate, with a bar on a terminal; without an end show the simulated time, until a person or the disk ends it."""
     from rich.console import Console
     from rich.progress import Progress, TextColumn
 
@@ -197,6 +236,13 @@ def _in_process(scenario: Scenario, path: Path) -> None:
         stop = stop_event()
         about = about_run(scenario, lockstep=True)
         simulate = run_with_faults if scenario.fault else run_onboard
-        simulate(scenario, path, about, lambda t_s: bar.update(task, completed=t_s), stopped=stop.is_set)
+        no_room = _Room(path)
+
+        def stopped() -> bool:
+            return stop.is_set() or (scenario.duration_s == 0.0 and no_room())
+
+        simulate(scenario, path, about, lambda t_s: bar.update(task, completed=t_s), stopped=stopped)
     if stop.is_set():
         raise KeyboardInterrupt
+    if no_room.is_over:
+        say(f"ended    less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}")

@@ -147,6 +147,13 @@ def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
         (["bus.endpoint=tcp/127.0.0.1:99999"], ["bus.endpoint", "tcp/127.0.0.1:99999", "from 1 to 65535"]),
         (["bus.endpoint=tcp/127.0.0.1:0"], ["bus.endpoint", "from 1 to 65535"]),
         (["rig.drive.profile=[[1.0, 0.1], [0.5, 0.1]]"], ["profile", "must increase"]),
+        (
+            ["rig.solver.block_s=0.01", "controller.block_s=0.01"],
+            [
+                "limits.frequency_max_Hz = 5000.0: must be below half the sample rate, 1000 Hz; lower it, or raise",
+                "controller.samples_per_block and rig.solver.samples_per_block, both above 100",
+            ],
+        ),
     ],
 )
 def test_the_line_names_place_value_rule_and_remedy(settings: list[str], words: list[str]) -> None:

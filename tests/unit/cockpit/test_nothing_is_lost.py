@@ -9,7 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
+from bridge.log.logfile import read_run
 from cockpit.cli import app
+from cockpit.run import run
 from tests.logs import short_log
 
 RUN = ("run", "--in-process", "--set", "duration_s=0.05")
@@ -98,6 +100,22 @@ def test_a_log_is_not_replaced_by_the_result_of_its_run(tmp_path):
     result = CliRunner().invoke(app, [*RUN, "--log", str(log), "--json", str(other_name)])
     assert result.exit_code == FAULTS["CONFIG"].exit_status
     assert log.read_bytes().startswith(b"\x89MCAP")
+
+
+def test_a_run_without_an_end_leaves_room_on_the_disk_of_its_log(tmp_path, monkeypatch):
+    log = tmp_path / "endless.mcap"
+    words = ["run", "--in-process", "--set", "duration_s=0", "--log", str(log)]
+    monkeypatch.setattr(run, "_LOOK_S", 0.0)
+    free = [1 << 40, 1 << 40, 1 << 40, 5_000_000]
+    monkeypatch.setattr(run, "_free_bytes", lambda _: free.pop(0) if len(free) > 1 else free[0])
+    ended = CliRunner().invoke(app, words)
+    assert f"ended    less than 1074 MB are free for {log}" in ended.stderr
+    assert 0 < len(read_run(log).sensors) < 10_000
+    assert f"log      {log}" in ended.stdout
+    refused = CliRunner().invoke(app, words)
+    assert refused.exit_code == FAULTS["LOG_WRITE"].exit_status
+    assert "5 MB are free there" in refused.stderr
+    assert "or give it an end: --set duration_s=60" in refused.stderr
 
 
 @pytest.mark.parametrize(("where", "why"), [(">/dev/full", "No space left on device"), (">&-", "Bad file descriptor")])

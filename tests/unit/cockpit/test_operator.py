@@ -11,7 +11,8 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.inbox import Received
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT, Topic
-from bridge.wire.zenoh_link import BusConfig, stands_still
+from bridge.wire.words import words
+from bridge.wire.zenoh_link import Bus, BusConfig, stands_still
 from cockpit.run import operator
 from tests.system.ports import free_endpoint
 
@@ -131,6 +132,36 @@ def test_a_stop_that_does_not_stop_is_a_fault(
 
 def test_a_rig_that_rests_by_a_stop_is_stopped_whoever_said_it(say: Callable[[Rig, str], operator.Obeyed]) -> None:
     assert say(Rig([], lambda _word: [applied(FAULT, wire.STOP_BY_PERSON)]), "STOP").done
+
+
+@pytest.mark.parametrize(
+    ("word", "advice"), [("STOP", "by hand"), ("DISARM", "by hand"), ("ARM", "start one"), ("RESET", "start one")]
+)
+def test_where_no_rig_is_the_advice_is_that_of_the_word(
+    monkeypatch: pytest.MonkeyPatch, word: str, advice: str
+) -> None:
+    monkeypatch.setattr(operator, "_DIAL_S", 0.2)
+    with pytest.raises(Fault, match="no rig answers there") as raised:
+        operator.tell(BusConfig(endpoint=free_endpoint()), word)
+    assert ("by hand" in str(raised.value), "start one, or give its --endpoint" in str(raised.value)) == (
+        advice == "by hand",
+        advice == "start one",
+    )
+
+
+def test_a_rig_that_cannot_listen_tells_why() -> None:
+    config = BusConfig(endpoint=free_endpoint())
+    with (
+        socket.create_server(("127.0.0.1", config.port)),
+        pytest.raises(Fault, match=r"Address already in use \(os error 98\).*; end what holds it or choose") as raised,
+    ):
+        Bus(config, "plant", lockstep=True)
+    assert ("..." in str(raised.value), ".rs:" in str(raised.value)) == (False, False)
+
+
+def test_the_help_of_a_mode_does_not_name_a_reason_that_is_not_there() -> None:
+    (disabled,) = (one for one in words() if (one.column, one.word) == ("mode", "DISABLED"))
+    assert "the rig is not armed" in disabled.help
 
 
 def test_what_listens_and_does_not_read_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
