@@ -42,9 +42,6 @@ class Table:
     columns: dict[str, Any]
     units: dict[str, str] = field(default_factory=dict[str, str])  # by column, as the file writes them
     clocks: dict[str, Clock] = field(default_factory=dict[str, Clock])  # of the channels that have their own
-    own_times: dict[str, str] = field(
-        default_factory=dict[str, str]
-    )  # the columns of times that clocks come from, by channel
     sample_rate_Hz: float | None = None  # where the file states one rate for all
     decimal: str = "."  # of numbers that are stored as text
     thousands: str = ""
