@@ -20,7 +20,6 @@ from diagnosis.processes import each
 Floats = npt.NDArray[np.floating[Any]]
 EFFECT = "frictional-lag"
 _LATER = (1.0, 3.0, 10.0)  # times the longest lag that the library begins with: up to longer than a slip
-_BEST = 3  # fits that are gone on with
 _SPAN = (0.85, 1.15)  # times the dead time of the runs without vibration; three of them told it to within 7 %
 _PER_HALF_PERIOD = 2.5  # points: from one 33 us beside a tooth at 4.5 kHz a refit still came to it
 _TEETH = 2  # of every fit that get a refit
@@ -53,7 +52,9 @@ def late_starts(fitter: Fitter, trials: list[Trial], jobs: int = 1) -> list[Star
     unvibrated = fitter.of_runs(still)
     if not unvibrated.floor.compared.any():  # a climb without a slip, whose force alone is known
         return []
-    for fit in _refits(unvibrated, starts, jobs)[:_BEST]:
+    # the best of each form: fits of one form from several starts end in one valley, and chi2 of two forms may differ by rounding
+    best = {fit.hypothesis.forms[EFFECT]: fit for fit in reversed(_refits(unvibrated, starts, jobs))}
+    for fit in best.values():
         found += _teeth(fitter, fit, jobs) if _is_late_in_time(fit) else [(fit.hypothesis, fit.deviations, fit.w)]
     return found
 
