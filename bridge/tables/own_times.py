@@ -17,7 +17,7 @@ Floats = npt.NDArray[np.float64]
 _NAME = re.compile(r"(?:t|ts|time|zeit)(?:\d+|[ _.-].*)?", re.IGNORECASE)
 _FEWEST_ROWS = 8
 _SAME_STEPS = 1e-3  # of a step: two times that differ by less are one
-_SHARED = 0.5  # of the shorter record: two times that share less are one, told in two calendars
+_SHARED = 0.5  # of the longer record: two times that share less are not those of two loggers of one measurement
 
 
 class _Time(NamedTuple):
@@ -67,7 +67,7 @@ def _differ(one: _Time, other: _Time) -> bool:
     """Whether two times are those of two loggers, and not one that is told twice."""
     one_s, other_s = (time.times_s[np.isfinite(time.times_s)] for time in (one, other))
     shared_s = min(one_s[-1], other_s[-1]) - max(one_s[0], other_s[0])
-    if shared_s < _SHARED * min(np.ptp(one_s), np.ptp(other_s)):
+    if shared_s < _SHARED * max(np.ptp(one_s), np.ptp(other_s)):
         return False
     step_s = float(np.median(np.diff(one_s)))
     return len(one_s) != len(other_s) or float(np.abs(one_s - other_s).max()) > _SAME_STEPS * step_s

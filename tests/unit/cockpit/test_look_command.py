@@ -158,6 +158,14 @@ def test_channels_with_times_of_their_own_are_merged_by_them(
     assert seen_in(path, "--map", str(made))["numbers"] == table["numbers"]
 
 
+def test_a_time_that_only_counts_what_was_on_is_no_clock(tmp_path: Path) -> None:
+    t_s, force_N, drive_mm = saw_teeth()
+    path = tmp_path / "a.csv"
+    table_of(path, "t (s),Force (N),t_on (s),Position (mm)", t_s, force_N, 0.1 * t_s, drive_mm)
+    table = seen_in(path)
+    assert (table["slips"], "is the time of" in said(table)) == (5, False)
+
+
 def test_a_time_that_is_told_twice_is_one(tmp_path: Path) -> None:
     t_s, force_N, drive_mm = saw_teeth()
     path = tmp_path / "a.csv"
