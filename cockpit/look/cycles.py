@@ -27,6 +27,7 @@ def _is_our_book(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as book, book.open("docProps/core.xml") as about:
             return f"<dc:creator>{_AUTHOR}</dc:creator>".encode() in about.read(1 << 16)
+    # what `zipfile` raises of a file that is no archive, of a damaged, an encrypted one, or one packed in another way
     except (OSError, zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError, zlib.error):
         return False
 
