@@ -66,7 +66,7 @@ def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys)
     said = f"print('stickslip: {COMPILING}the plant, once', file=sys.stderr, flush=True)"
     over = f"print('stickslip: {COMPILED}the plant', file=sys.stderr, flush=True)"
     more = f"print('other', file=sys.stderr); print('stickslip: {LOADED}', file=sys.stderr)"
-    code = f"import sys, time; {said}; sys.stdin.readline(); {over}; {more}"
+    code = f"import sys; sys.stdin.readline(); {said}; sys.stdin.readline(); {over}; {more}"
     started = processes.subprocess.Popen
 
     def instead(_words: list[str], **how: Any) -> Any:
@@ -74,8 +74,10 @@ def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys)
 
     monkeypatch.setattr(processes.subprocess, "Popen", instead)
     child = processes.Child("plant", [])
-    until_s = time.monotonic() + 20.0
     assert child.still == processes.STARTS
+    child.process.stdin.write("\n")
+    child.process.stdin.flush()
+    until_s = time.monotonic() + 20.0
     while child.still != processes.COMPILES and time.monotonic() < until_s:
         time.sleep(0.01)
     assert child.still == processes.COMPILES
