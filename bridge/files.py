@@ -86,6 +86,19 @@ def refuse_to_replace_text(path: Path, begins: str, place: str) -> None:
         raise Fault("CONFIG", not_ours(path, place))
 
 
+def refuse_to_replace_corrected(path: Path, text: str, place: str) -> None:
+    """Raise Fault CONFIG where `path` is a file with another text than `text`: somebody may have corrected it."""
+    try:
+        same = not path.is_file() or path.stat().st_size == 0 or path.read_bytes() == text.encode()
+    except OSError:  # who writes it says why it cannot
+        return
+    if not same:
+        raise Fault(
+            "CONFIG",
+            f"{place}: {path.name} is there and says otherwise, it would be lost; give it to --map, or remove it",
+        )
+
+
 def not_ours(path: Path, place: str) -> str:
     """The line of a Fault for a file that a command would replace and did not write."""
     return f"{place}: {path.name} is there and is none that this command wrote, it would be lost; choose another file"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from bridge.faults import FAULTS, Fault
-from bridge.files import write_json
+from bridge.files import refuse_to_replace_text, write_json
 from bridge.plain import plain, say
 from cockpit.commands.as_json.option import STDOUT, Json, carry_out, tell
 from cockpit.commands.options import Certs
@@ -117,6 +117,7 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolde
             "CONFIG", f"--apply {wishes.apply}: takes one evidence folder; a rig file has the effects of one rig"
         )
     from diagnosis.evidence.manifest import MANIFEST, RUN_SUFFIXES
+    from diagnosis.report.rig_file import RIG_BEGINS
 
     seen: dict[Path, str] = {}
     asked = (("--json", wishes.json_file, JSON), ("--report", wishes.report, PAGE), ("--apply", wishes.apply, RIG))
@@ -129,6 +130,8 @@ def _check_destinations(wishes: _Wishes, one: bool, sources: list["EvidenceFolde
             check_output_folder(option, path)
         else:
             check_output(option, path, kinds)
+        if kinds == RIG:
+            refuse_to_replace_text(path, RIG_BEGINS, f"{option} {path}")
         whole = path.resolve()
         if whole in seen:
             raise Fault("CONFIG", f"{option} {path}: is where {seen[whole]} goes; choose another")

@@ -146,35 +146,35 @@ def log_import(
     """Turn measured data of another program into evidence for `stickslip diagnose`, or into a run log."""
 
     def work() -> None:
-        from bridge.files import write_whole
         from diagnosis.evidence.import_table import import_file
 
         if out.suffix == ".mcap":
             check_output("--out", out, LOG)
         else:
             check_output_folder("--out", out)
+        kept = None
         if channel_map is not None:
-            done, made = import_file(path, channel_map, out), None
+            done = import_file(path, channel_map, out)
         else:
-            done, made = _import_as_seen(path, out, speed, mass)
+            beside = out.with_suffix("") if out.suffix == ".mcap" else out / path.stem
+            kept = beside.with_name(beside.name + ".map.toml")
+            done = _import_as_seen(path, out, kept, speed, mass)
         place = done.out if done.out.suffix == ".mcap" else done.out / done.file
         words = [f"{place}: {counted(done.rows, 'sample')} of {', '.join(done.columns)}"]
         words += [finding.in_words() for finding in done.findings]
-        if made is not None:
-            beside = out.with_suffix("") if out.suffix == ".mcap" else out / path.stem
-            kept = beside.with_name(beside.name + ".map.toml")
-            write_whole(kept, made)
+        if kept is not None:
             words.append(f"map        {kept}: what was assumed; correct it, and import again with --map")
         tell(as_json, done, words)
 
     carry_out(work, as_json)
 
 
-def _import_as_seen(path: Path, out: Path, speed: str, mass: str) -> "tuple[Imported, str]":
-    """Import without a map: columns by their names, numbers of the rig from the record; and the map that says so."""
+def _import_as_seen(path: Path, out: Path, kept: Path, speed: str, mass: str) -> "Imported":
+    """Import without a map: columns by their names, numbers of the rig from the record; the map that says so goes to `kept`."""
     from tempfile import TemporaryDirectory
 
     from bridge.faults import Fault
+    from bridge.files import refuse_to_replace_corrected, write_whole
     from cockpit.look.evidence import full_map
     from cockpit.look.quantity import quantity
     from cockpit.look.source import Asked, read_record
@@ -190,11 +190,13 @@ def _import_as_seen(path: Path, out: Path, speed: str, mass: str) -> "tuple[Impo
         if seen is None:
             raise Fault("BAD_TABLE", f"{path.name}: fewer than 16 samples of a force with a time; give a longer record")
         made = full_map(record, seen)
+    refuse_to_replace_corrected(kept, made, str(kept))
     with TemporaryDirectory(prefix="stickslip-") as folder:
         channel_map = Path(folder) / f"{path.stem}.map.toml"
         channel_map.write_text(made, encoding="utf-8")
         done = import_file(path, channel_map, out)
-        return done._replace(findings=list(dict.fromkeys([*record.findings, *done.findings]))), made
+    write_whole(kept, made)
+    return done._replace(findings=list(dict.fromkeys([*record.findings, *done.findings])))
 
 
 @log_app.command("check")

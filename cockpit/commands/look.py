@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from bridge.faults import Fault
-from bridge.files import check_file, refuse_to_lose, refuse_to_replace_text
+from bridge.files import check_file, refuse_to_lose, refuse_to_replace_corrected
 from cockpit.commands.as_json.option import Json, carry_out, tell
 from cockpit.look.quantity import quantity, turns
 from cockpit.run.writable import PAGE, PICTURE, RIG, SHEETS, check_output, writing
@@ -39,7 +39,7 @@ def look(
 
     def work() -> None:
         from cockpit.look.cycles import refuse_to_replace_sheet
-        from cockpit.look.source import MAP_BEGINS, Asked, read_record
+        from cockpit.look.source import Asked, read_record
         from diagnosis.look.look import look as look_at
         from diagnosis.look.words import headline, sentences
 
@@ -49,8 +49,6 @@ def look(
             refuse_to_lose([path], "the measured file", "--out", one)
             if one.suffix.lower() in SHEETS:
                 refuse_to_replace_sheet(one, f"--out {one}")
-            elif one.suffix.lower() in RIG:
-                refuse_to_replace_text(one, MAP_BEGINS, f"--out {one}")
         asked = Asked(
             quantity("--speed", speed, "velocity"),
             quantity("--load", load, "force"),
@@ -62,6 +60,10 @@ def look(
             turns(speed) if speed else None,
         )
         record = read_record(path, asked)
+        for one in (one for one in out if one.suffix.lower() in RIG):
+            if not record.map_text:
+                raise Fault("CONFIG", f"--out {one}: there is no map to write: one was given, or the file is a run log")
+            refuse_to_replace_corrected(one, record.map_text, f"--out {one}")
         seen = look_at(record.t_s, record.force_N, record.position_m, record.known)
         if seen is None:
             raise Fault("BAD_TABLE", f"{path.name}: fewer than 16 samples of a force with a time; give a longer record")
@@ -107,8 +109,6 @@ def _write(one: Path, seen: Any, record: Any, findings: list[Any]) -> bool:
         elif suffix in RIG:
             from bridge.files import write_whole
 
-            if not record.map_text:
-                raise Fault("CONFIG", f"--out {one}: there is no map to write: one was given, or the file is a run log")
             write_whole(one, record.map_text)
         else:
             from cockpit.look.cycles import write_cycles

@@ -193,16 +193,13 @@ def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
     ]
 
 
-MAP_BEGINS = "# how "  # the first line of a map that was written here
-
-
 def _is_time(table: Table, channel: ChannelMap) -> bool:
     return table.seconds(channel.column)[1]
 
 
 def map_text(table: Table, channels: dict[str, ChannelMap], asked: Asked) -> str:
     """The map that reads the file as it was read: to be corrected, and given to `--map`."""
-    lines = [f"{MAP_BEGINS}{table.path.name} was read; correct what is wrong and give this file to --map"]
+    lines = [f"# how {table.path.name} was read; correct what is wrong and give this file to --map"]
     source: dict[str, Any] = dict(table.written)
     source.pop("columns", None)
     if "t_s" not in channels and (rate_Hz := asked.rate_Hz or table.sample_rate_Hz):

@@ -137,10 +137,10 @@ def run_scenario(
         _refuse_little_room(path)
     if endless:
         say(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
-    interrupted = False
+    interrupted, told = False, []
     try:
         if in_process:
-            _in_process(scenario, path)
+            told = _in_process(scenario, path)
         else:
             from cockpit.run.processes import run_processes
             from cockpit.run.progress import follower
@@ -156,11 +156,14 @@ def run_scenario(
     left = f"{closed} and not judged; `stickslip log info {path}` judges it"
     line = f"judging the log; Ctrl-C {'again ' if interrupted else ''}to leave it unjudged"
     with left_on_ctrl_c(line, left, again=interrupted):
-        return _judged(scenario, path, closed if interrupted else "", without)
+        return _judged(scenario, path, closed if interrupted else "", without, told)
 
 
-def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool) -> RunOutcome:
-    """What came of a run. Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end."""
+def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, told: list[str]) -> RunOutcome:
+    """What came of a run; `told` is what its log does not say.
+
+    Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end.
+    """
     from bridge.log.logfile import read_run
     from bridge.log.storage.afterwards import note_afterwards
     from cockpit.judge.verdict import judge, judge_run, settled_from_s
@@ -179,6 +182,7 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool) -> 
 
         margins = loop_margins(run)
     verdict = judge_run(run)
+    verdict = verdict._replace(told=[*verdict.told, *told])
     alone = None
     if without and verdict.after is not None:
         from cockpit.run.without import without_controller
@@ -219,8 +223,11 @@ class _Room:
         return self.is_over
 
 
-def _in_process(scenario: Scenario, path: Path) -> None:
-    """Simulate, with a bar on a terminal; without an end show the simulated time, until a person or the disk ends it."""
+def _in_process(scenario: Scenario, path: Path) -> list[str]:
+    """Simulate, with a bar on a terminal; without an end show the simulated time, until a person or the disk ends it.
+
+    Returns a line that says so where the disk did.
+    """
     from rich.console import Console
     from rich.progress import Progress, TextColumn
 
@@ -244,5 +251,8 @@ def _in_process(scenario: Scenario, path: Path) -> None:
         simulate(scenario, path, about, lambda t_s: bar.update(task, completed=t_s), stopped=stopped)
     if stop.is_set():
         raise KeyboardInterrupt
-    if no_room.is_over:
-        say(f"ended    less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}")
+    return (
+        [f"LOG_WRITE: ended, as less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}"]
+        if no_room.is_over
+        else []
+    )

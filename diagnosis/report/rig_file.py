@@ -27,6 +27,7 @@ _PLACES: Final = {
     "stribeck_tail": ("contact", "stribeck_tail"),
 }
 _DIGITS = 7
+RIG_BEGINS = "# Written by `stickslip diagnose` "
 
 
 def write_rig(diagnosis: Diagnosis, evidence: Evidence, path: Path) -> None:
@@ -77,7 +78,7 @@ def rig_table(diagnosis: Diagnosis, evidence: Evidence) -> dict[str, Any]:
 
 
 def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
-    lines = [f"Written by `stickslip diagnose` from the evidence {_word(evidence.folder.name)}."]
+    lines = []
     if diagnosis.effects:
         lines.append(f"Verdict: {headline(diagnosis)}.")
     else:
@@ -89,7 +90,8 @@ def _comment(diagnosis: Diagnosis, evidence: Evidence) -> str:
         )
     lines += [f"The runs cannot tell apart: {', '.join(group)}." for group in diagnosis.not_distinguishable]
     lines.append("What is left out is the paper's rig: piezo, sensors and drive profile.")
-    return "".join(f"# {line}\n" for line in lines)
+    first = f"{RIG_BEGINS}from the evidence {_word(evidence.folder.name)}.\n"
+    return first + "".join(f"# {line}\n" for line in lines)
 
 
 def _toml(table: dict[str, Any]) -> str:

@@ -97,6 +97,29 @@ def test_an_import_without_a_map_writes_the_one_it_assumed(tmp_path: Path) -> No
     assert "mass_kg = " in (out / "Prüfung.map.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("name", ["evidence", "run.mcap", ""])
+def test_a_map_that_was_corrected_stays(tmp_path: Path, name: str) -> None:
+    source, out = tribometer(tmp_path), tmp_path / name
+    kept = {"evidence": out / "Prüfung.map.toml", "run.mcap": tmp_path / "run.map.toml"}.get(
+        name, tmp_path / "map.toml"
+    )
+    words = ["log", "import", str(source), "--out", str(out)] if name else ["look", str(source), "--out", str(kept)]
+    for _ in range(2):  # what it wrote it replaces
+        assert CliRunner().invoke(app, [*words, "--speed", "0.5mm/s"]).exit_code == 0
+        for path in tmp_path.rglob("*"):
+            if path.is_file() and path not in (source, kept):
+                path.unlink()
+    corrected = kept.read_text(encoding="utf-8") + "# corrected\n"
+    kept.write_text(corrected, encoding="utf-8")
+    refused = CliRunner().invoke(app, [*words, "--speed", "0.5mm/s"])
+    assert refused.exit_code == 2
+    assert (
+        f"{kept.name} is there and says otherwise, it would be lost; give it to --map, or remove it" in refused.output
+    )
+    assert kept.read_text(encoding="utf-8") == corrected
+    assert {path for path in tmp_path.rglob("*") if path.is_file()} == {source, kept}
+
+
 def seen_in(path: Path, *words: str) -> dict[str, Any]:
     result = CliRunner().invoke(app, ["look", str(path), *words, "--json"])
     assert result.exit_code == 0, result.output

@@ -1,5 +1,6 @@
 """A file that a command would replace, and that is of another kind, stays; and a full disk is one line."""
 
+import json
 import os
 import subprocess
 import sys
@@ -44,7 +45,6 @@ def files(tmp_path: Path) -> dict[str, Path]:
         (("plot", "run.mcap", "--data", "through.csv"), "through.csv"),
         (("look", "run.mcap", "--out", "mine.csv"), "mine.csv"),
         (("look", "run.mcap", "--out", "mine.xlsx"), "mine.xlsx"),
-        (("look", "run.mcap", "--out", "rig.toml"), "rig.toml"),
     ],
 )
 def test_what_is_there_and_of_another_kind_stays(files, monkeypatch, words, victim):
@@ -108,10 +108,13 @@ def test_a_run_without_an_end_leaves_room_on_the_disk_of_its_log(tmp_path, monke
     monkeypatch.setattr(run, "_LOOK_S", 0.0)
     free = [1 << 40, 1 << 40, 1 << 40, 5_000_000]
     monkeypatch.setattr(run, "_free_bytes", lambda _: free.pop(0) if len(free) > 1 else free[0])
-    ended = CliRunner().invoke(app, words)
-    assert f"ended    less than 1074 MB are free for {log}" in ended.stderr
-    assert 0 < len(read_run(log).sensors) < 10_000
-    assert f"log      {log}" in ended.stdout
+    ended = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "verdict.json")])
+    line = f"LOG_WRITE: ended, as less than 1074 MB are free for {log}"
+    assert f"warning  {line}" in ended.stdout
+    assert line in json.loads((tmp_path / "verdict.json").read_text())["told"]
+    run_log = read_run(log)
+    assert 0 < len(run_log.sensors) < 10_000
+    assert line in json.loads(run_log.headers["verdict"]["figures"])["told"]
     refused = CliRunner().invoke(app, words)
     assert refused.exit_code == FAULTS["LOG_WRITE"].exit_status
     assert "5 MB are free there" in refused.stderr
