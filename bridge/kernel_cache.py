@@ -75,6 +75,15 @@ class SourcesLocator(UserProvidedCacheLocator):
         return sources_digest(Path(self._py_file).resolve()).encode()
 
 
+def mark_of(what: str, path: Path, root: Path = ROOT) -> str:
+    """The name of the file that says that the kernels of `what` are kept, which hang on the source file `path`.
+
+    Numba keeps those of two copies of this project apart, so each copy below its own `root` has marks of its own.
+    """
+    place = hashlib.sha256(str(root).encode()).hexdigest()[:8]
+    return f"{what}-{place}-{sources_digest(path, root)}"
+
+
 def compile_once(what: str, compiling: Callable[[], object]) -> None:
     """Call `compiling`, which calls kernels for the first time. Of several processes one compiles, and the others wait.
 
@@ -84,7 +93,7 @@ def compile_once(what: str, compiling: Callable[[], object]) -> None:
 
     """
     folder = Path(os.environ[FOLDER])
-    done = folder / f"{what}-{sources_digest(Path(sys.modules[compiling.__module__].__file__ or ''))}"
+    done = folder / mark_of(what, Path(sys.modules[compiling.__module__].__file__ or ""))
     if done.exists():
         compiling()
         return
@@ -99,7 +108,7 @@ def compile_once(what: str, compiling: Callable[[], object]) -> None:
         if not done.exists():
             _say(f"{COMPILING}{what} (first start of this version, about a minute)")
         compiling()
-        for old in folder.glob(f"{what}-*"):
+        for old in folder.glob(f"{done.name.rpartition('-')[0]}-*"):
             old.unlink(missing_ok=True)
         done.touch()
     _say(f"{COMPILED}{what}")

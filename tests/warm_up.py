@@ -7,10 +7,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bridge.kernel_cache import sources_digest, usable_folder
+from bridge.kernel_cache import mark_of, usable_folder
 from tests.made_evidence import forget_old
 
-DONE = usable_folder() / f"tests-{sources_digest(Path(__file__))}"
+DONE = usable_folder() / mark_of("tests", Path(__file__))
 
 
 def control(folder: Path) -> None:

@@ -1,6 +1,7 @@
 """A compiled kernel is renewed with every source that it can hang on, and with no other."""
 
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bridge import kernel_cache
-from bridge.kernel_cache import ROOT, compile_once, sources_digest
+from bridge.kernel_cache import ROOT, compile_once, mark_of, sources_digest
 
 
 def digest(root: Path) -> str:
@@ -64,6 +65,13 @@ def test_the_kernels_of_the_plant_hang_on_no_command_and_no_diagnosis() -> None:
     files = kernel_cache._closure(ROOT / "plant" / "step.py", ROOT)
     assert {ROOT / "plant/contact.py", ROOT / "plant/effects/friction.py", ROOT / "bridge/kernel.py"} <= files
     assert not [path for path in files if path.parts[len(ROOT.parts)] in {"cockpit", "diagnosis", "controller"}]
+
+
+def test_two_copies_of_the_project_have_marks_of_their_own(project: Path) -> None:
+    copy = shutil.copytree(project, project.with_name("copy"))
+    own, other = mark_of("x", project / "plant/core.py", project), mark_of("x", copy / "plant/core.py", copy)
+    assert own != other
+    assert own.rpartition("-")[2] == other.rpartition("-")[2]  # of the same sources
 
 
 def test_one_process_compiles_and_the_others_wait_and_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
