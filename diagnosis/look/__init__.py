@@ -4,6 +4,7 @@ guess        which column is time, force, load, position
 record       an even record, its noise, its parts of one direction
 slips        breakaways and re-sticks, on the record's own scale of time
 breakaway    the mean force at breakaway from all tops laid over each other
+slip_times   how long a slip and a stick last, from all falls laid over each other
 slip_shape   sliding friction and the swing's frequency from all falls laid over each other
 numbers      numbers with intervals of 90 %
 speeds       friction over speed, and over the dwell before a slip

@@ -11,6 +11,7 @@ from diagnosis.look.breakaway import breakaway_of
 from diagnosis.look.numbers import Number, groups_of, jackknifed, mean_of
 from diagnosis.look.record import Part, noise_of, parts_of
 from diagnosis.look.slip_shape import LESS, Falls, Shape, falls_of, fit_from_rest, fit_shape
+from diagnosis.look.slip_times import with_slip_times
 from diagnosis.look.slips import Slips, find_slips
 from diagnosis.look.speeds import AtSpeed, over_dwell, over_speed
 from diagnosis.look.sticks import Cycle, cycles_of
@@ -178,7 +179,7 @@ def _of_cycles(found: list[Slips], cycles: list[Cycle], step_s: float) -> dict[s
     } | _stiffness(stuck)
     if numbers["static_force_N"] is not None:
         numbers["static_force_N"] = breakaway_of(found, numbers["static_force_N"])
-    return {name: number for name, number in numbers.items() if number is not None}
+    return with_slip_times({name: number for name, number in numbers.items() if number is not None}, found)
 
 
 def _stiffness(stuck: list[Cycle]) -> dict[str, Number | None]:

@@ -32,11 +32,15 @@ class Drawn(NamedTuple):
     def truth(self, made: Simulation) -> dict[str, float]:
         """What `look` is to find. F_s is the force at breakaway, without noise: that of the friction law depends on the climb."""
         contact = self.rig.contact
+        fast = np.diff((made.velocity_mps > self.speed_mps).astype(int), prepend=0, append=0)
+        long_s = (np.flatnonzero(fast == -1) - np.flatnonzero(fast == 1)) * (made.t_s[1] - made.t_s[0])
         return {
             "static_force_N": eight_lines(made.t_s, made.drive_force_N, self.speed_mps).static_force_N,
             "kinetic_force_N": contact.coulomb_force_N,
             "stiffness_N_per_m": self.rig.drive.stiffness_N_per_m,
             "mass_kg": self.rig.slide.mass_kg,
+            # the force climbs while the drive is faster than the slide; what is much shorter is the ring after a re-stick
+            "slip_s": float(np.median(long_s[long_s > 0.5 * np.quantile(long_s, 0.9)])),
         }
 
 

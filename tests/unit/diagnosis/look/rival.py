@@ -14,6 +14,7 @@ class Rival(NamedTuple):
     kinetic_force_N: float
     stiffness_N_per_m: float
     period_s: float
+    slip_s: float
 
 
 def eight_lines(t_s: Any, force_N: Any, speed_mps: float) -> Rival:
@@ -25,4 +26,7 @@ def eight_lines(t_s: Any, force_N: Any, speed_mps: float) -> Rival:
     after = peaks[peaks > troughs[0]][0]
     slope = np.polyfit(t_s[troughs[0] : after], force_N[troughs[0] : after], 1)[0]
     period = np.diff(t_s[peaks]).mean()
-    return Rival(len(peaks), float(top), float(0.5 * (top + bottom)), float(slope / speed_mps), float(period))
+    slip = (troughs[np.searchsorted(troughs, peaks[:-1])] - peaks[:-1]).mean() * (t_s[1] - t_s[0])
+    return Rival(
+        len(peaks), float(top), float(0.5 * (top + bottom)), float(slope / speed_mps), float(period), float(slip)
+    )

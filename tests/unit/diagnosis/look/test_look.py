@@ -45,6 +45,22 @@ def test_slips_that_last_longer_than_their_sticks_are_counted(
     assert numbers["stiffness_N_per_m"].value == pytest.approx(stiffness, rel=0.01)
 
 
+def test_times_of_slips_and_sticks_are_no_longer_in_noise():
+    held = []
+    for fall_s in (0.01, 0.02, 0.05):
+        for noise in (0.0, 0.004, 0.02):
+            for seed in range(3):
+                random = np.random.default_rng(seed)
+                t_s, force_N, period_s = saw(1e4, fall_s, 10.0)
+                t_s += random.uniform(0.0, 1e-4)
+                seen = look(t_s, force_N + noise * 10.0 * random.standard_normal(len(t_s)), None, Known(1.1e-3))
+                assert seen is not None
+                slip, dwell = seen.numbers["slip_s"], seen.numbers["dwell_s"]
+                assert slip.value == pytest.approx(fall_s, rel=0.12 if noise < 0.02 else 0.6)
+                held += [slip.low <= fall_s <= slip.high, dwell.low <= period_s - fall_s <= dwell.high]
+    assert np.mean(held) > 0.8
+
+
 @pytest.mark.parametrize("pair", ["C45-C45 @ 0.063", "C45-GGG40 @ 0.063"])
 @pytest.mark.parametrize(("every", "noise_N"), [(10, 0.0), (20, 0.02), (20, 0.2)])
 def test_the_numbers_of_a_tribometer_are_within_a_percent(pair: str, every: int, noise_N: float) -> None:

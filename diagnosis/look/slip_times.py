@@ -1,0 +1,114 @@
+"""How long a slip and a stick last, from all falls of a part laid over each other.
+
+The largest of noisy samples lies somewhere on the end of the flat climb, so slips that are timed one by one are too long. The
+mean course of many falls has little noise, so parabolas through few of its samples find its top and its bottom.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.look.numbers import Number, groups_of, jackknifed
+from diagnosis.look.record import noise_of
+from diagnosis.look.slip_shape import half_done
+from diagnosis.look.slips import Slips
+
+Floats = npt.NDArray[np.float64]
+_FEWEST_SLIPS, _FEWEST_SAMPLES = 3, 5  # of a fall
+_BINS = 100  # in a fall
+_REACH = 0.9  # of a fall, before and after its middle, in which top and bottom are looked for
+# Half of what a parabola spans, in falls, at least and at most; between them as much as leaves this share of the fall as noise.
+_LEAST, _MOST, _NOISE = 0.06, 0.2, 0.002
+_RIDGE = 1e-9  # where all slips have their samples at the same instants, fewer than three are in some spans
+
+
+def with_slip_times(numbers: dict[str, Number], found: list[Slips]) -> dict[str, Number]:
+    """Numbers with `slip_s` and `dwell_s` from the mean fall of the part with most slips, if it has slips and samples enough."""
+    seen = [falls for falls in map(_falls_of, found) if falls is not None]
+    if not seen or "slip_s" not in numbers:
+        return numbers
+    slip = max(seen, key=lambda falls: falls.slips).slip_time()
+    result = numbers | {"slip_s": slip}
+    if "dwell_s" in numbers:  # a stick begins and ends where slips end and begin
+        dwell = numbers["dwell_s"]
+        more_s = numbers["slip_s"].value - slip.value
+        longer = Number(dwell.value + more_s, dwell.low + more_s, dwell.high + more_s, "s")
+        result["dwell_s"] = longer.wider(slip.high - slip.value)
+    return result
+
+
+class _Falls(NamedTuple):
+    """Samples of all falls by the time since their middle: how many, and the sum of their forces, [groups of slips, bins]."""
+
+    counts: Floats
+    sums: Floats
+    slips: int
+    half_bins: int  # of a parabola
+    bin_s: float
+    step_s: float
+
+    def slip_time(self) -> Number:
+        """From the top of the mean course to its bottom; no instant is known better than to half of what a parabola spans."""
+        counts, sums = self.counts.sum(axis=0), self.sums.sum(axis=0)
+        whole = self._long_s(counts, sums)
+        without = [self._long_s(counts - c, sums - s) for c, s in zip(self.counts, self.sums, strict=True)]
+        sampled_s = 1.645 * self.step_s / math.sqrt(6.0)  # each end lies between two samples
+        return jackknifed(whole, without, "s").wider(math.hypot(sampled_s, self.half_bins * self.bin_s))
+
+    def _long_s(self, counts: Floats, sums: Floats) -> float:
+        course = _smooth(counts, sums, self.half_bins)
+        middle = len(course) // 2
+        reach = int(_REACH * _BINS)
+        before, after = course[middle - reach : middle + 1], course[middle : middle + reach + 1]
+        return self.bin_s * float(reach - np.nanargmax(before) + np.nanargmin(after))
+
+
+def _falls_of(slips: Slips) -> _Falls | None:
+    """The falls of a part; None for too few slips or samples."""
+    part = slips.part
+    whole = min(len(slips.tops), len(slips.bottoms))
+    tops, bottoms = slips.tops[:whole], slips.bottoms[:whole]
+    if whole < _FEWEST_SLIPS or float(np.median(bottoms - tops)) < _FEWEST_SAMPLES:
+        return None
+    usual = float(np.median(bottoms - tops))
+    middles = np.array(
+        [half_done(part.force_N, int(a), int(b), slips.width) for a, b in zip(tops, bottoms, strict=True)]
+    )
+    reach = int((_REACH + _MOST) * usual) + 2
+    at = np.round(middles).astype(np.int64)[:, None] + np.arange(-reach, reach + 1)
+    inside = (at[:, 0] >= 0) & (at[:, -1] < len(part.force_N))
+    at, middles = at[inside], middles[inside]
+    if len(at) < _FEWEST_SLIPS:
+        return None
+    drop_N = float((part.force_N[tops] - part.force_N[bottoms]).mean())
+    needed = (noise_of(part.force_N) / (_NOISE * max(drop_N, 1e-300))) ** 2
+    half = max(_LEAST * usual, 1.5, min(needed / (2.0 * len(at)), _MOST * usual))
+    each_side = math.ceil((reach + 1) * _BINS / usual)
+    number = np.round((at - middles[:, None]) * _BINS / usual).astype(np.int64) + each_side
+    groups = groups_of(len(at))
+    counts, sums = np.zeros((2, len(groups), 2 * each_side + 1))
+    for row, group in enumerate(groups):
+        np.add.at(counts[row], number[group], 1.0)
+        np.add.at(sums[row], number[group], part.force_N[at[group]])
+    step_s = part.step_s
+    return _Falls(counts, sums, len(at), math.ceil(half * _BINS / usual), usual / _BINS * step_s, step_s)
+
+
+def _smooth(counts: Floats, sums: Floats, half_bins: int) -> Floats:
+    """The value in each bin of a parabola through the samples around it, [bins]; NaN where none is near.
+
+    Weights fall to nothing at the ends of the span (W. Cleveland, Robust locally weighted regression, 1979).
+    """
+    x = np.arange(-half_bins, half_bins + 1) / (half_bins + 1)
+    weight = (1.0 - x**2) ** 2
+    moments = np.array([np.convolve(counts, (weight * x**k)[::-1], "same") for k in range(5)])
+    sides = np.array([np.convolve(sums, (weight * x**k)[::-1], "same") for k in range(3)])
+    i, k = np.indices((3, 3))
+    matrices = moments[i + k].transpose(2, 0, 1)
+    near = moments[0] > 0.0
+    matrices[near] += _RIDGE * moments[0][near][:, None, None] * np.eye(3)
+    course = np.full(len(counts), np.nan)
+    course[near] = np.linalg.solve(matrices[near], sides.T[near][:, :, None])[:, 0, 0]
+    return course
