@@ -7,6 +7,7 @@ the catalogue of effects are improved.
 """
 
 import ast
+import functools
 import hashlib
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
@@ -20,8 +21,12 @@ NOT_JUDGED = ("diagnosis/blind", "diagnosis/report", "diagnosis/pictures", "plan
 _NOT_JUDGED_KEYWORDS = {"words", "shown_by", "shown_twice"}
 
 
+@functools.cache
 def tool_version(*further: str) -> str:
-    """Version of the package with a hash over all that makes a diagnosis, and over `further` folders below the root."""
+    """Version of the package with a hash over all that makes a diagnosis, and over `further` folders below the root.
+
+    It is that of the sources as they are at the first call: what a process runs it has read by then.
+    """
     try:
         number = version("stickslip")
     except PackageNotFoundError:

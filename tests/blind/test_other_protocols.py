@@ -15,7 +15,7 @@ from diagnosis.gap.problem import Problem
 from tests.blind.generator import Case, make, runs
 from tests.blind.generator.runs import PROTOCOL, Plan
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 HELD_OUT = Plan(drive=((0.0, 0.8e-3),), holdout=True, duration_s=5.0)
 PROTOCOLS = {
@@ -40,8 +40,6 @@ PROTOCOLS = {
     ),
 }
 
-IN_EVERY_RUN = "slips under half a period"  # the others are of `make nightly`
-
 
 def assert_no_gap(folder: Path, protocol: tuple[Plan, ...]) -> None:
     make(folder, Case(effects=(), backbone="lugre", tolerances=1.0, leave_out=(), roughness=1.0), 14, protocol)
@@ -51,14 +49,11 @@ def assert_no_gap(folder: Path, protocol: tuple[Plan, ...]) -> None:
     assert retuned.fit.chi2 < NEVER_WITHOUT_GAP * retuned.expected_chi2
 
 
-@pytest.mark.parametrize(
-    "name", [name if name == IN_EVERY_RUN else pytest.param(name, marks=pytest.mark.nightly) for name in PROTOCOLS]
-)
+@pytest.mark.parametrize("name", PROTOCOLS)
 def test_a_rig_inside_its_tolerances_is_no_gap(name: str, tmp_path: Path) -> None:
     assert_no_gap(tmp_path, PROTOCOLS[name])
 
 
-@pytest.mark.nightly
 def test_a_drive_that_takes_its_time_is_no_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The drive takes 0.3 s from one speed to the next, where a model with steps of speed would see a gap."""
     monkeypatch.setattr(runs, "DRIVE_RAMP_S", 0.3)

@@ -7,7 +7,7 @@ from tests.blind.generator import Case, draw_effect, make
 from tests.blind.sizing import Bench
 from tests.blind.small_set import RUNS
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 SEED = 7101
 

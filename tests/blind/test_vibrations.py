@@ -11,6 +11,7 @@ from tests.blind.small_set import RUNS
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_cross_talk_is_unexplained_and_told_with_where_and_what_next(tmp_path):
     source = Independent(RUNS)
     cross_talk = source.draw(np.random.default_rng(1), "piezo-cross-talk")

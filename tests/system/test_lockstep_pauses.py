@@ -13,7 +13,7 @@ from tests.system.run_under_way import Run
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("victim", ["plant", "controller", "recorder"])
+@pytest.mark.parametrize("victim", ["plant", "controller", pytest.param("recorder", marks=pytest.mark.nightly)])
 def test_in_lockstep_a_pause_costs_nothing(tmp_path: Path, runs: list[Run], victim: str) -> None:
     """A busy machine pauses processes for longer than the lease of real time, which would break the link and lose messages."""
     # in charge from the start: a run of which nothing was tested has another status

@@ -104,6 +104,7 @@ def test_a_process_that_dies_once_costs_nothing(tmp_path):
     assert all(outcome.diagnosis for outcome in outcomes.values())
 
 
+@pytest.mark.nightly
 def test_a_killed_dask_worker_costs_nothing(tmp_path):
     (tmp_path / "dask").mkdir()
     with cluster(tmp_path / "dask", workers=2) as address:
@@ -114,6 +115,7 @@ def test_a_killed_dask_worker_costs_nothing(tmp_path):
     assert outcomes["refused"].fault == ("BAD_EVIDENCE", "run-01.csv: too short")
 
 
+@pytest.mark.nightly
 def test_a_cluster_with_tls(tmp_path):
     (tmp_path / "dask").mkdir()
     make_certificates(tmp_path / "certs", [])

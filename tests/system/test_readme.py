@@ -14,6 +14,7 @@ README = Path(__file__).parents[2] / "README.md"
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_the_example_is_diagnosed_as_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = README.read_text(encoding="utf-8")
     commands = re.search(r"^ +(stickslip example .*?)(?: +#.*)?$", text, re.MULTILINE)

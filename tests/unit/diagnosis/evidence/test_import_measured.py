@@ -49,11 +49,11 @@ stribeck_velocity_mps = 0.002
 @pytest.mark.parametrize(
     ("name", "stiffness_N_per_m", "speed_mps", "rows"),
     [
-        ("k168Nm_v42", 168.0, 42e-6, 751_281),
+        pytest.param("k168Nm_v42", 168.0, 42e-6, 751_281, marks=pytest.mark.nightly),
         ("k168Nm_v1100", 168.0, 1100e-6, 28_721),
         ("k168Nm_v4300", 168.0, 4300e-6, 7_521),
         ("k1002Nm_v1100", 1002.0, 1100e-6, 28_641),
-        ("k2254Nm_v42", 2254.0, 42e-6, 751_201),
+        pytest.param("k2254Nm_v42", 2254.0, 42e-6, 751_201, marks=pytest.mark.nightly),
     ],
 )
 def test_a_slider_on_paper(tmp_path: Path, name: str, stiffness_N_per_m: float, speed_mps: float, rows: int) -> None:
