@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.look.numbers import Number, mean_of
-from diagnosis.look.record import noise_of, smoothed
+from diagnosis.look.record import smoothed
 from diagnosis.look.slip_shape import half_done
 from diagnosis.look.slips import Slips
 
@@ -46,7 +46,7 @@ def breakaway_of(found: list[Slips], each: Number) -> Number:
     laid = mean_of(np.concatenate([one.force_N for one in tops]), each.unit, cut_N)
     if laid is None:
         return each
-    noise_N = _OF_LARGEST * max(noise_of(slips.part.force_N) for slips in found)
+    noise_N = _OF_LARGEST * max(slips.part.noise_N for slips in found)
     return each if each.low - laid.high > noise_N else laid
 
 

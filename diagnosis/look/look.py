@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from diagnosis.look.breakaway import breakaway_of
 from diagnosis.look.numbers import Number, groups_of, jackknifed, mean_of
-from diagnosis.look.record import Part, noise_of, parts_of
+from diagnosis.look.record import Part, parts_of
 from diagnosis.look.slip_shape import LESS, Falls, Shape, falls_of, fit_from_rest, fit_shape
 from diagnosis.look.slip_times import with_slip_times
 from diagnosis.look.slips import Slips, find_slips
@@ -137,7 +137,7 @@ def look(t_s: Floats, force_N: Floats, position_m: Floats | None = None, known: 
     return Look(
         seconds,
         1.0 / step_s,
-        float(np.median([noise_of(part.force_N) for part in parts])),
+        float(np.median([part.noise_N for part in parts])),
         cycles,
         sticks,
         numbers,

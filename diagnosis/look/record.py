@@ -22,6 +22,7 @@ class Part(NamedTuple):
     force_N: Floats
     position_m: Floats | None  # of the drive, positive along the motion
     sign: float  # of the force as measured
+    noise_N: float  # standard deviation of the force from sample to sample
 
     @property
     def step_s(self) -> float:
@@ -75,7 +76,7 @@ def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) 
     if np.abs(t_s - even_s).max() > _UNEVEN * step_s:
         force_N = np.interp(even_s, t_s, force_N)
         position_m = None if position_m is None else np.interp(even_s, t_s, position_m)
-    return Part(even_s, force_N, position_m, sign)
+    return Part(even_s, force_N, position_m, sign, noise_of(force_N))
 
 
 def noise_of(force_N: Floats) -> float:

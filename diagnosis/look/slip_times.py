@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.look.numbers import Number, groups_of, jackknifed
-from diagnosis.look.record import noise_of
 from diagnosis.look.slip_shape import half_done
 from diagnosis.look.slips import Slips
 
@@ -83,7 +82,7 @@ def _falls_of(slips: Slips) -> _Falls | None:
     if len(at) < _FEWEST_SLIPS:
         return None
     drop_N = float((part.force_N[tops] - part.force_N[bottoms]).mean())
-    needed = (noise_of(part.force_N) / (_NOISE * max(drop_N, 1e-300))) ** 2
+    needed = (part.noise_N / (_NOISE * max(drop_N, 1e-300))) ** 2
     half = max(_LEAST * usual, 1.5, min(needed / (2.0 * len(at)), _MOST * usual))
     each_side = math.ceil((reach + 1) * _BINS / usual)
     number = np.round((at - middles[:, None]) * _BINS / usual).astype(np.int64) + each_side

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.look.record import Part, noise_of, smoothed
+from diagnosis.look.record import Part, smoothed
 from diagnosis.look.turns import long_turns
 
 Floats = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ def find_slips(part: Part) -> Slips | None:
     width = 1
     widest = max(1, int(_WIDEST * len(part.force_N)))
     found: tuple[Indices, Indices] | None = None
-    noise_N = noise_of(part.force_N)
+    noise_N = part.noise_N
     while width <= widest:
         tops, bottoms = _turning(part.force_N, width, noise_N)
         if len(tops):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.look.record import Part, noise_of, smoothed
+from diagnosis.look.record import Part, smoothed
 from diagnosis.look.slips import Slips
 
 Floats = npt.NDArray[np.float64]
@@ -78,9 +78,9 @@ def _peaks(slips: Slips) -> tuple[Floats, Floats]:
 
     The largest of several noisy samples is too large. So one half of the samples finds the peak, and the other half measures it.
     """
-    force_N, width = slips.part.force_N, slips.width | 1
-    if width < _HALVES or noise_of(force_N) == 0.0:
-        smooth = smoothed(force_N, min(width, 3) if noise_of(force_N) > 0.0 else 1)
+    force_N, noise_N, width = slips.part.force_N, slips.part.noise_N, slips.width | 1
+    if width < _HALVES or noise_N == 0.0:
+        smooth = smoothed(force_N, min(width, 3) if noise_N > 0.0 else 1)
         reach = max(width // 2, 1)
         return _extremes(smooth, slips.tops, reach, 1.0), _extremes(smooth, slips.bottoms, reach, -1.0)
     halves = force_N[: len(force_N) // 2 * 2].reshape(-1, 2)

@@ -33,8 +33,9 @@ _SHOWN = 60  # characters of a line in a finding
 def read_text(path: Path, given: Dialect) -> Table:
     """Read a text table; what `given` leaves open is found and said. Raises Fault BAD_TABLE."""
     text, encoding = decoded(path.read_bytes(), given.encoding, path.name)
-    if '"' in text[:_HEAD_CHARACTERS]:
-        text = _NAME_OF_LINES.sub(lambda name: re.sub(r"\s+", " ", name[0]), text)
+    top = text[:_HEAD_CHARACTERS]
+    if '"' in top:
+        text = _NAME_OF_LINES.sub(lambda name: re.sub(r"\s+", " ", name[0]), top) + text[_HEAD_CHARACTERS:]
     head_lines = text[:_HEAD_CHARACTERS].splitlines()
     if not any(line.strip() for line in head_lines):
         raise Fault("BAD_TABLE", f"{path.name}: is empty; give a file with rows")
