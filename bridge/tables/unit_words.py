@@ -48,9 +48,9 @@ _WORDS = {
     "newtons": "newton",
     "Umin": "U/min",
 }
-# a unit behind a name: `Force [N]`, `Force (N)`, `Force / N`, `Force, N`, `Force in N`, `Force_N`
+# a unit behind a name: `Force [N]`, `Force (N)`, `Force / N`, `Force/N`, `Force, N`, `Force in N`, `Force_N`
 _BEHIND = re.compile(
-    r"^(?P<name>.*?\S)\s*(?:\[(?P<a>[^\][]*)\]|\((?P<b>[^()]*)\)|\s/\s*(?P<c>\S+)|,\s*(?P<d>\S+)|\s+in\s+(?P<e>\S+)|_(?P<f>[^\W_]+))\s*$"
+    r"^(?P<name>.*?\S)\s*(?:\[(?P<a>[^\][]*)\]|\((?P<b>[^()]*)\)|\s/\s*(?P<c>\S+)|/(?P<g>[^\s/]+(?:/[^\s/]+)?)|,\s*(?P<d>\S+)|\s+in\s+(?P<e>\S+)|_(?P<f>[^\W_]+))\s*$"
 )
 
 # that a name may end in after a low line: `x_t` and `force_p` have no unit
@@ -75,6 +75,8 @@ _AFTER_LINE = {
     "g",
     "rpm",
 }
+_ALSO_SYMBOLS = {"s", "t", "h", "m", "U"}  # that a quantity has as well: way, time, height, mass, voltage
+_OF_TIME = re.compile(r"t|.*(?:time|zeit).*", re.IGNORECASE)
 _INDEX = re.compile(r".*\S\[\d+\]")  # `data[1]` is an element of an array; a unit of 1 stands apart, as in `mu [1]`
 _LONGEST_UNIT = 8  # characters of a unit that is not known here
 
@@ -115,10 +117,19 @@ def unit_in_name(name: str) -> str:
     found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
     if found is None:
         return ""
-    unit = next((text for key in "abcdef" if (text := found[key]) is not None), "").strip()
+    unit = next((text for key in "abcdefg" if (text := found[key]) is not None), "").strip()
     if found["f"] is not None and unit not in _AFTER_LINE:
         return ""
+    if found["g"] is not None and not _is_stroke_before_unit(name, found["name"], unit):
+        return ""
     return unit if known_unit(unit) else ""
+
+
+def _is_stroke_before_unit(name: str, before: str, unit: str) -> bool:
+    """Whether it is a quantity over its unit, as `Kraft/N`, and no path, unit or rate: `log/t`, `N/mm`, `kN/s`."""
+    if "/" in before or known_unit(name) or unit in ("t", "U") or (known_unit(before) and before not in _ALSO_SYMBOLS):
+        return False
+    return (known_unit(unit) or ("",))[0] != "time" or _OF_TIME.fullmatch(before) is not None
 
 
 def bare_name(name: str) -> str:

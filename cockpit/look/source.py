@@ -18,7 +18,7 @@ from cockpit.look.tare import tare_of
 from cockpit.look.told import of_time
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import ChannelMap
-from diagnosis.evidence.mapped import has_time, mapped
+from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess
 from diagnosis.look.look import Known
@@ -194,7 +194,8 @@ def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
 
 
 def _is_time(table: Table, channel: ChannelMap) -> bool:
-    return table.seconds(channel.column)[1]
+    times_s, counted_already = table.seconds(channel.column)
+    return counted_already or calendar_unit_s(times_s) is not None
 
 
 def map_text(table: Table, channels: dict[str, ChannelMap], asked: Asked) -> str:

@@ -34,6 +34,10 @@ _MEASURES = {
 }
 # Seconds from which a column of times without a unit is no time of a run but of a calendar, by the unit that it is then in
 _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
+# Days from 2000 to 2100 as spreadsheets and MATLAB's datenum count them. As seconds they are known by their steps: shorter ones
+# would be rates above 50 kHz, longer ones are less than 0.6 rows a second.
+_DAYS = ((36526.0, 73051.0), (730486.0, 767011.0))
+_DAY_S, _LONGEST_STEP = 86400.0, 2e-5
 
 
 class Mapped(NamedTuple):
@@ -150,15 +154,20 @@ def _time(table: Table, channel: ChannelMap, found: list[Finding]) -> Floats:
         return times_s + channel.offset
     if channel.scale is not None or channel.unit or table.unit(channel.column):
         return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
-    finite = np.flatnonzero(np.isfinite(times_s))
-    if len(finite):
-        first = float(times_s[finite[0]])
-        for least, factor in _SINCE_1970:
-            if first > least:
-                found.append(
-                    Finding(
-                        "time", where, f"is a time of the calendar in steps of {factor:g} s: counted from the first row"
-                    )
-                )
-                return (times_s - first) * factor + channel.offset
-    return times_s + channel.offset
+    unit_s = calendar_unit_s(times_s)
+    if unit_s is None:
+        return times_s + channel.offset
+    found.append(
+        Finding("time", where, f"is a time of the calendar in steps of {unit_s:g} s: counted from the first row")
+    )
+    return (times_s - times_s[np.isfinite(times_s)][0]) * unit_s + channel.offset
+
+
+def calendar_unit_s(times_s: Floats) -> float | None:
+    """The unit in which a column without a unit counts the calendar's time [s]; None where it counts that of a run."""
+    finite = times_s[np.isfinite(times_s)]
+    if not len(finite):
+        return None
+    if np.ptp(finite) < _LONGEST_STEP * len(finite) and any(least <= finite[0] < most for least, most in _DAYS):
+        return _DAY_S
+    return next((unit_s for least, unit_s in _SINCE_1970 if finite[0] > least), None)

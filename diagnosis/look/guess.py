@@ -18,8 +18,8 @@ _NAMES = {
     "force": r"friction|reib|tangent|drag|(^|[^a-z])(ff|fx|f_x|f_t|ft|f_d|f)([^a-z]|$)|force|kraft|last?zelle|load ?cell"
     r"|torque|moment|effort",
     "speed": r"speed|veloc|geschw|(^|[^a-z])(v|v_d)([^a-z]|$)",
-    "position": r"drive.*pos|stroke|hub|verfahrweg|stage|(^|[^a-z])(s_d|x_d)([^a-z]|$)|position|displacement|weg|travel|distance"
-    r"|angle|winkel|(^|[^a-z])(x|s|phi|theta)([^a-z]|$)",
+    "position": r"drive.*pos|(^|[^a-z])pos([^a-z]|$)|crosshead|extension|stroke|hub|verfahrweg|stage|position"
+    r"|(^|[^a-z])(s_d|x_d)([^a-z]|$)|displacement|weg|travel|distance|angle|winkel|(^|[^a-z])(x|s|phi|theta)([^a-z]|$)",
 }  # fmt: skip
 _QUANTITIES = {
     "time": ("time",),
@@ -73,6 +73,12 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
             reasons.append(f"time = {dated!r}, which holds times")
     if "time" not in found and not table.clocks:
         left = [name for name in numeric if name not in found.values()]
+        by_unit = next((name for name in left if _in(table, name, "time") and _rises(table, name)), "")
+        if by_unit:
+            found["time"] = by_unit
+            reasons.append(f"time = {by_unit!r}, which rises in even steps of a unit of time")
+    if "time" not in found and not table.clocks:
+        left = [name for name in numeric if name not in found.values()]
         rising = next((name for name in left if _is_clock(table, name)), "")
         # beside a column that numbers the rows it may be the way of an even drive
         if rising and not any(_numbers_rows(table, name) for name in left):
@@ -80,7 +86,7 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
             reasons.append(f"time = {rising!r}, which rises in even steps")
     left = [name for name in numeric if name not in found.values()]
     if "force" not in found and "coefficient" not in found:
-        by_unit = [name for name in left if (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES["force"]]
+        by_unit = [name for name in left if _in(table, name, "force")]
         only = by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _rises(table, one))]
         if len(only) != 1:
             raise Fault("CONFIG", _ask(table, numeric))
@@ -92,6 +98,11 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
     kinds = ("time", "force", "load", "position", "speed", "coefficient")
     time, force, load, position, speed, coefficient = (found.get(what, "") for what in kinds)
     return Guess(time, force, load, position, speed, coefficient, reasons)
+
+
+def _in(table: Table, name: str, what: str) -> bool:
+    """Whether a column states a unit of what is wanted."""
+    return (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES[what]
 
 
 def _ask(table: Table, numeric: list[str]) -> str:
