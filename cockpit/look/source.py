@@ -22,6 +22,7 @@ from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess
 from diagnosis.look.look import Known
+from diagnosis.look.record import FEWEST
 from diagnosis.look.whose_way import is_of_slide
 
 Floats = npt.NDArray[np.float64]
@@ -141,6 +142,12 @@ def _record(
 ) -> Record:
     if "drive_force_N" not in columns:
         raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map one in [channels]")
+    there, rows = int(np.count_nonzero(np.isfinite(columns["t_s"] + columns["drive_force_N"]))), len(columns["t_s"])
+    if there < min(FEWEST, rows):
+        text = f"{path.name}: {there} of {rows} rows have a time and a force: must be {FEWEST} at least"
+        raise Fault(
+            "BAD_TABLE", f"{text}; name other columns, or let a spreadsheet program calculate and save its formulas"
+        )
     position = columns.get("drive_position_m")
     if position is not None and (
         not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0

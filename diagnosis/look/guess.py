@@ -87,6 +87,11 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
     left = [name for name in numeric if name not in found.values()]
     if "force" not in found and "coefficient" not in found:
         by_unit = [name for name in left if _in(table, name, "force")]
+        if len(by_unit) != 1 and (empty := _empty_force(table, numeric)):
+            text = f"{table.path.name}: column {empty!r} holds no number: must hold the force, by its name"
+            raise Fault(
+                "CONFIG", f'{text}; let a spreadsheet program calculate and save its formulas, or add --force "NAME"'
+            )
         only = by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _rises(table, one))]
         if len(only) != 1:
             raise Fault("CONFIG", _ask(table, numeric))
@@ -103,6 +108,21 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
 def _in(table: Table, name: str, what: str) -> bool:
     """Whether a column states a unit of what is wanted."""
     return (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES[what]
+
+
+def _empty_force(table: Table, numeric: list[str]) -> str:
+    """A column that is named as a force and has no cell with a value; empty where there is none."""
+    named = (
+        name for name in table.columns if name not in numeric and re.search(_NAMES["force"], bare_name(name), re.I)
+    )
+    return next((name for name in named if _is_empty(table, name)), "")
+
+
+def _is_empty(table: Table, name: str) -> bool:
+    try:
+        return not np.isfinite(table.column(name)).any()
+    except Fault:
+        return False
 
 
 def _ask(table: Table, numeric: list[str]) -> str:
