@@ -9,7 +9,7 @@ from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_rows
 from bridge.tables.table import Table
-from bridge.tables.unit_words import known_unit, si_unit, weight_unit
+from bridge.tables.unit_words import in_brackets, known_unit, si_unit, weight_unit
 from bridge.units import counted
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
 from diagnosis.evidence.sentinels import SMOOTH, without_sentinels
@@ -128,6 +128,13 @@ def _factor(table: Table, name: str, channel: ChannelMap, found: list[Finding], 
     unit = channel.unit or table.unit(channel.column)
     known = None if not unit else weight_unit(unit) if _MEASURES[name][0] == "force" else known_unit(unit)
     if known is None:
+        column = table.find(channel.column)
+        stated = in_brackets(column)
+        if stated and not unit:  # an unknown one of a line of units is told where that line is read
+            text = (
+                f"column {column}: {stated!r} is no unit that is known here: taken as it is; a map may say scale = ..."
+            )
+            found.append(Finding("units", f"{table.path.name}: {name}", text))
         return 1.0
     what, factor = known
     if rotary is False and what == _MEASURES[name][1] != _MEASURES[name][0]:
@@ -156,7 +163,7 @@ def _time(table: Table, channel: ChannelMap, found: list[Finding]) -> Floats:
         return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
     unit_s = calendar_unit_s(times_s)
     if unit_s is None:
-        return times_s + channel.offset
+        return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
     found.append(
         Finding("time", where, f"is a time of the calendar in steps of {unit_s:g} s: counted from the first row")
     )

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import xlsxwriter
 from python_calamine import load_workbook
 from typer.testing import CliRunner
 
@@ -357,24 +356,3 @@ def test_a_way_without_a_unit_is_no_time(tmp_path: Path, name: str) -> None:
     path.write_text(f"{name};force\n" + "".join(f"{x:.6f};{f:.5f}\n" for f, x in zip(force_N, drive_mm, strict=True)))
     refused = CliRunner().invoke(app, ["look", str(path), "--json"])
     assert "no time: which column is it" in json.loads(refused.stdout)["line"]
-
-
-@pytest.mark.parametrize(
-    ("formula", "told"),
-    [("Force [N]", "column 'Force [N]' holds no number"), ("Time [s]", "1 of 100 rows have a time and a force")],
-)
-def test_formulas_that_nobody_calculated_are_named(tmp_path: Path, formula: str, told: str) -> None:
-    """As a script writes them: without the values that a spreadsheet program saves beside."""
-    path = tmp_path / "book.xlsx"
-    names = ["Time [s]", "Raw [V]", "Force [N]"]
-    with xlsxwriter.Workbook(path) as book:
-        sheet = book.add_worksheet()
-        sheet.write_row(0, 0, names)
-        for row in range(1, 101):
-            for column, name in enumerate(names):
-                if name == formula and row > (name == "Time [s]"):
-                    sheet.write_formula(row, column, "=B1", value="")
-                else:
-                    sheet.write_number(row, column, row * 1e-3)
-    refused = CliRunner().invoke(app, ["look", str(path), "--json"])
-    assert told in json.loads(refused.stdout)["line"]
