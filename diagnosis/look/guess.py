@@ -33,6 +33,9 @@ _FEWEST_STEPS = 8
 # what none of these is, whatever else its name says
 _OTHER = re.compile(r"acc|beschl|temp|humid|feucht|count|zyklus|cycle|voltage|current", re.IGNORECASE)
 
+# a force that is asked for, beside the one that is there; a position that is asked for is as good as one that is reached
+_WANTED = re.compile(r"soll|set.?p(oin)?t|target|demand|command|nominal", re.IGNORECASE)
+
 
 class Guess(NamedTuple):
     """Columns by what they are; empty where there is none. `reasons` say why, in words."""
@@ -127,7 +130,8 @@ def _is_empty(table: Table, name: str) -> bool:
 
 def _ask(table: Table, numeric: list[str]) -> str:
     columns = ", ".join(f'"{name}"' for name in numeric) or "none of numbers"
-    return f'{table.path.name}: which column is the force? add --force "NAME"; columns here: {columns}'
+    sheet = f" (sheet {table.written['sheet']!r}; a map reads another one)" if "sheet" in table.written else ""
+    return f'{table.path.name}: which column is the force? add --force "NAME"; columns here{sheet}: {columns}'
 
 
 def _numeric(table: Table) -> list[str]:
@@ -158,6 +162,8 @@ def _named(table: Table, what: str, names: list[str]) -> str:
     pattern = re.compile(_NAMES[what], re.IGNORECASE)
     for name in names:
         if what not in ("time", "coefficient") and _OTHER.search(name):
+            continue
+        if what == "force" and _WANTED.search(name):
             continue
         if what in ("force", "position") and _flat(table, name):
             continue

@@ -68,3 +68,15 @@ def test_formulas_that_nobody_calculated_are_named(tmp_path: Path, formula: str,
                     sheet.write_number(row, column, row * 1e-3)
     refused = CliRunner().invoke(app, ["look", str(path), "--json"])
     assert told in json.loads(refused.stdout)["line"]
+
+
+def test_where_no_column_is_the_force_the_sheet_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "book.xlsx"
+    with xlsxwriter.Workbook(path) as book:
+        for name, column, rows in (("Run", "Force [N]", 50), ("Climate", "Temp [°C]", 100)):
+            sheet = book.add_worksheet(name)
+            sheet.write_row(0, 0, ["Time [s]", column])
+            for row in range(1, rows):
+                sheet.write_row(row, 0, [row, 20.0 + row % 3])
+    refused = CliRunner().invoke(app, ["look", str(path), "--json"])
+    assert "columns here (sheet 'Climate'; a map reads another one): " in json.loads(refused.stdout)["line"]
