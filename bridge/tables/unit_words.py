@@ -4,13 +4,16 @@ import re
 
 # what a column holds, its SI unit, and the factors of units without a prefix
 _DEGREE, _TURN = 0.017453292519943295, 6.283185307179586  # rad
-_POUND_N = 4.4482216152605
+_POUND_kg, _POUND_N = 0.45359237, 4.4482216152605
 _UNITS: dict[str, tuple[str, dict[str, float]]] = {
     "time": (
         "s",
         dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sekunden"), 1.0) | {"min": 60.0, "h": 3600.0},
     ),
-    "force": ("N", {"N": 1.0, "newton": 1.0, "lbf": _POUND_N, "kgf": 9.80665, "kp": 9.80665, "gf": 9.80665e-3}),
+    "force": (
+        "N",
+        {"N": 1.0, "newton": 1.0, "daN": 10.0, "lbf": _POUND_N, "kgf": 9.80665, "kp": 9.80665, "gf": 9.80665e-3},
+    ),
     "length": (
         "m",
         {"m": 1.0, "meter": 1.0, "metre": 1.0, "in": 0.0254, "inch": 0.0254, "mil": 2.54e-5, "micron": 1e-6},
@@ -18,8 +21,8 @@ _UNITS: dict[str, tuple[str, dict[str, float]]] = {
     "velocity": ("m/s", {"m/s": 1.0, "mm/min": 1e-3 / 60.0, "m/min": 1.0 / 60.0, "in/s": 0.0254}),
     "acceleration": ("m/s²", {"m/s2": 1.0, "g": 9.80665, "gn": 9.80665, "Gal": 0.01}),
     "frequency": ("Hz", {"Hz": 1.0, "1/s": 1.0}),
-    "mass": ("kg", {"kg": 1.0, "lb": 0.45359237, "lbs": 0.45359237, "t": 1000.0}),
-    "torque": ("N m", {"Nm": 1.0, "N.m": 1.0, "inlb": 0.0254 * _POUND_N}),
+    "mass": ("kg", {"kg": 1.0, "lb": _POUND_kg, "lbs": _POUND_kg, "t": 1000.0}),
+    "torque": ("N m", {"Nm": 1.0, "N.m": 1.0, "Nmm": 1e-3, "N.mm": 1e-3, "Ncm": 1e-2, "inlb": 0.0254 * _POUND_N}),
     "angle": ("rad", {"rad": 1.0, "deg": _DEGREE, "°": _DEGREE, "rev": _TURN, "U": _TURN}),
     "angular velocity": (
         "rad/s",
@@ -47,10 +50,12 @@ _WORDS = {
     "ms-1": "m/s",
     "newtons": "newton",
     "Umin": "U/min",
+    "KN": "kN",  # of programs that write capitals alone
+    "MM": "mm",
 }
-# a unit behind a name: `Force [N]`, `Force (N)`, `Force / N`, `Force, N`, `Force in N`, `Force_N`
+# a unit behind a name: `Force [N]`, `Force (N)`, `Force / N`, `Force/N`, `Force, N`, `Force in N`, `Force_N`
 _BEHIND = re.compile(
-    r"^(?P<name>.*?\S)\s*(?:\[(?P<a>[^\][]*)\]|\((?P<b>[^()]*)\)|\s/\s*(?P<c>\S+)|,\s*(?P<d>\S+)|\s+in\s+(?P<e>\S+)|_(?P<f>[^\W_]+))\s*$"
+    r"^(?P<name>.*?\S)\s*(?:\[(?P<a>[^\][]*)\]|\((?P<b>[^()]*)\)|\s/\s*(?P<c>\S+)|/(?P<g>[^\s/]+(?:/[^\s/]+)?)|,\s*(?P<d>\S+)|\s+in\s+(?P<e>\S+)|_(?P<f>[^\W_]+))\s*$"
 )
 
 # that a name may end in after a low line: `x_t` and `force_p` have no unit
@@ -67,6 +72,10 @@ _AFTER_LINE = {
     "um",
     "µm",
     "nm",
+    "cm",
+    "micron",
+    "daN",
+    "Nmm",
     "Hz",
     "kHz",
     "Nm",
@@ -75,6 +84,8 @@ _AFTER_LINE = {
     "g",
     "rpm",
 }
+_ALSO_SYMBOLS = {"s", "t", "h", "m", "U"}  # that a quantity has as well: way, time, height, mass, voltage
+_OF_TIME = re.compile(r"t|.*(?:time|zeit).*", re.IGNORECASE)
 _INDEX = re.compile(r".*\S\[\d+\]")  # `data[1]` is an element of an array; a unit of 1 stands apart, as in `mu [1]`
 _LONGEST_UNIT = 8  # characters of a unit that is not known here
 
@@ -98,10 +109,10 @@ def known_unit(text: str) -> tuple[str, float] | None:
 
 
 def weight_unit(text: str) -> tuple[str, float] | None:
-    """As `known_unit`, of a column of forces: gram and kilogram are weights there, as load cells show them."""
+    """As `known_unit`, of a column of forces: gram, kilogram and pound are weights there, as load cells show them."""
     known = known_unit(text)
     word = text.strip().strip("[](){}").translate(_SAME)
-    grams = {"g": 1e-3, "kg": 1.0, "mg": 1e-6, "t": 1e3}.get(word)
+    grams = {"g": 1e-3, "kg": 1.0, "mg": 1e-6, "t": 1e3, "lb": _POUND_kg, "lbs": _POUND_kg}.get(word)
     return ("force", _UNITS["force"][1]["kgf"] * grams) if grams is not None else known
 
 
@@ -115,10 +126,25 @@ def unit_in_name(name: str) -> str:
     found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
     if found is None:
         return ""
-    unit = next((text for key in "abcdef" if (text := found[key]) is not None), "").strip()
+    unit = next((text for key in "abcdefg" if (text := found[key]) is not None), "").strip()
     if found["f"] is not None and unit not in _AFTER_LINE:
         return ""
+    if found["g"] is not None and not _is_stroke_before_unit(name, found["name"], unit):
+        return ""
     return unit if known_unit(unit) else ""
+
+
+def in_brackets(name: str) -> str:
+    """What is in the brackets at the end of a column's name, where a unit stands; empty where there are none."""
+    found = None if _INDEX.fullmatch(name) else _BEHIND.match(name)
+    return (found["a"] or found["b"] or "").strip() if found is not None else ""
+
+
+def _is_stroke_before_unit(name: str, before: str, unit: str) -> bool:
+    """Whether it is a quantity over its unit, as `Kraft/N`, and no path, unit or rate: `log/t`, `N/mm`, `kN/s`."""
+    if "/" in before or known_unit(name) or unit in ("t", "U") or (known_unit(before) and before not in _ALSO_SYMBOLS):
+        return False
+    return (known_unit(unit) or ("",))[0] != "time" or _OF_TIME.fullmatch(before) is not None
 
 
 def bare_name(name: str) -> str:

@@ -40,6 +40,11 @@ class BusConfig(Strict):
         """Whether the endpoint is one of TLS."""
         return self.endpoint.startswith("tls/")
 
+    @property
+    def must_be(self) -> str:
+        """What must be right for a rig to answer, in words: one that knows another authority closes the door without a word."""
+        return "--endpoint and the authority of --certs must be those" if self.encrypted else "--endpoint must be that"
+
     @field_validator("endpoint")
     @classmethod
     def _port_exists(cls, endpoint: str) -> str:

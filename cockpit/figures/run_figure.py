@@ -124,7 +124,7 @@ def _figure(
         for number, (axes, panel, drawn) in enumerate(zip(every, panels, curves, strict=True)):
             _panel(axes, shown, panel, drawn, window_s)
             if len(shown) == 1:
-                _shade(axes, shown[0], named=number == 0)
+                _shade(axes, shown[0], window_s, named=number == 0)
             _legend(axes, request)
         every[-1].set_xlabel("time [s]")
         every[-1].set_xlim(*window_s) if window_s[1] > window_s[0] else None
@@ -239,10 +239,20 @@ def _mark_slips(axes: Any, shown: _Shown, window_s: tuple[float, float], second:
     )
 
 
-def _shade(axes: Any, shown: _Shown, named: bool) -> None:
-    """Colour the background by mode and mark where the controller's time begins; with labels for the legend where `named`."""
+def _shade(axes: Any, shown: _Shown, window_s: tuple[float, float], named: bool) -> None:
+    """Colour the background by mode and mark where the controller's time begins, as far as it is in the picture.
+
+    With labels for the legend where `named`.
+    """
     t_s, mode = shown.run.trace["t_ns"] * 1e-9, shown.run.trace["mode"]
-    if shown.verdict.enabled_from_s > 0.0 and not shown.verdict.imported:
+    from_s, to_s = window_s
+    inside = (t_s >= from_s) & (t_s <= to_s)
+    t_s, mode = t_s[inside], mode[inside]
+    if (
+        from_s <= shown.verdict.enabled_from_s <= to_s
+        and shown.verdict.enabled_from_s > 0.0
+        and not shown.verdict.imported
+    ):
         label = "in charge from here" if named else None
         axes.axvline(shown.verdict.enabled_from_s, color=_INK, linewidth=0.6, linestyle=":", label=label)
     if not len(mode):

@@ -60,7 +60,7 @@ class Words:
             return _answer(wish.word, False, ["another word is under way; say this one after it"])
         self._busy = True
         try:
-            if not secrets.compare_digest(wish.token.encode(), self._token.encode()):
+            if not secrets.compare_digest(wish.token.encode(errors="surrogatepass"), self._token.encode()):
                 await asyncio.sleep(_WRONG_S)
                 return _answer(wish.word, False, ["not the token that `stickslip serve` printed when it began"])
             return await self._told(wish.word)

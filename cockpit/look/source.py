@@ -13,15 +13,16 @@ from bridge.log.finding import Finding
 from bridge.tables.kinds import kind_of
 from bridge.tables.readers import read_table
 from bridge.tables.table import Table
-from bridge.tables.unit_words import known_unit
+from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
 from cockpit.look.tare import tare_of
 from cockpit.look.told import of_time
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import ChannelMap
-from diagnosis.evidence.mapped import has_time, mapped
+from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
 from diagnosis.look.guess import Guess, guess
 from diagnosis.look.look import Known
+from diagnosis.look.record import FEWEST
 from diagnosis.look.whose_way import is_of_slide
 
 Floats = npt.NDArray[np.float64]
@@ -89,7 +90,7 @@ def read_record(path: Path, asked: Asked) -> Record:
         findings.append(Finding("assumed", path.name, text))
     load_N, of_load = asked.load_N, not found.force and bool(found.coefficient)
     if load_N is None and found.load and not torsion:
-        load_N = _mean_load(table, found.load)
+        load_N = float(np.nanmean(np.abs(_si(table, found.load, "N", findings))))
         findings.append(Finding("assumed", path.name, f"load = mean of {found.load!r}, {load_N:.6g} N"))
     if of_load:
         factor = load_N or 1.0
@@ -120,7 +121,9 @@ def read_record(path: Path, asked: Asked) -> Record:
         and asked.speed_mps is None
         and len(table.columns[found.speed]) == len(columns["t_s"])
     ):
-        columns["drive_position_m"] = _way(columns["t_s"], _si(table, found.speed))
+        columns["drive_position_m"] = _way(
+            columns["t_s"], _si(table, found.speed, "rad/s" if torsion else "m/s", findings)
+        )
     known = Known(asked.speed_mps, load_N, asked.mass_kg, of_load and load_N is None, torsion)
     return _record(path, columns, known, findings, map_text(table, channels, asked), of_load)
 
@@ -141,6 +144,12 @@ def _record(
 ) -> Record:
     if "drive_force_N" not in columns:
         raise Fault("BAD_TABLE", f"{path.name}: has no drive_force_N: a force is needed; map one in [channels]")
+    there, rows = int(np.count_nonzero(np.isfinite(columns["t_s"] + columns["drive_force_N"]))), len(columns["t_s"])
+    if there < min(FEWEST, rows):
+        text = f"{path.name}: {there} of {rows} rows have a time and a force: must be {FEWEST} at least"
+        raise Fault(
+            "BAD_TABLE", f"{text}; name other columns, or let a spreadsheet program calculate and save its formulas"
+        )
     position = columns.get("drive_position_m")
     if position is not None and (
         not np.isfinite(position).any() or float(np.nanmax(position) - np.nanmin(position)) == 0.0
@@ -163,14 +172,14 @@ def _channels(table: Table, found: Guess) -> dict[str, ChannelMap]:
     return channels
 
 
-def _si(table: Table, column: str) -> Floats:
-    known = known_unit(table.unit(column))
+def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats:
+    """A load or a speed in its SI unit, which it is taken to have where it states none; a finding then."""
+    known = (weight_unit if unit == "N" else known_unit)(table.unit(column))
+    if known is None:
+        add = "--load 94.5N" if unit == "N" else "--speed 0.5mm/s"
+        text = f"states no unit that is known here: taken as {unit}; add {add} if it is not"
+        findings.append(Finding("assumed", f"{table.path.name}: {column}", text))
     return table.column(column) * (known[1] if known else 1.0)
-
-
-def _mean_load(table: Table, column: str) -> float:
-    values = np.abs(_si(table, column))
-    return float(np.nanmean(values))
 
 
 def _way(t_s: Floats, speed_mps: Floats) -> Floats:
@@ -189,12 +198,15 @@ def _unitless(table: Table, channels: dict[str, ChannelMap]) -> list[Finding]:
             f"states no unit: taken as {taken[name]}; a map may say unit = ...",
         )
         for name, channel in channels.items()
-        if channel.scale is None and not table.unit(channel.column) and not (name == "t_s" and _is_time(table, channel))
+        if channel.scale is None
+        and not (table.unit(channel.column) or in_brackets(channel.column))
+        and not (name == "t_s" and _is_time(table, channel))
     ]
 
 
 def _is_time(table: Table, channel: ChannelMap) -> bool:
-    return table.seconds(channel.column)[1]
+    times_s, counted_already = table.seconds(channel.column)
+    return counted_already or calendar_unit_s(times_s) is not None
 
 
 def map_text(table: Table, channels: dict[str, ChannelMap], asked: Asked) -> str:

@@ -83,7 +83,7 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         if stands_still(bus_config):
             line = f"{where}: what listens there stands still (frozen or overloaded), and hears no {name}"
             raise Fault("NO_PEER", f"{line}: must run; {_BY_HAND}") from None
-        line = f"{where}: no rig answers there within {_DIAL_S:g} s: --endpoint must be that of the run"
+        line = f"{where}: no rig answers there within {_DIAL_S:g} s: {bus_config.must_be} of the run"
         by_hand = f"if something vibrates, {_BY_HAND}"
         raise Fault("NO_PEER", f"{line}; {by_hand if action in _QUIETENS else _START_ONE}") from None
     with bus:

@@ -170,7 +170,7 @@ def look(bus_config: BusConfig) -> Status:
             raise Fault(
                 "NO_PEER", f"{line}; look at the rig's process, and take it that it vibrates as before"
             ) from None
-        line = f"{where}: no rig answers there within {_DIAL_S:g} s: --endpoint must be that of a run under way"
+        line = f"{where}: no rig answers there within {_DIAL_S:g} s: {bus_config.must_be} of a run under way"
         raise Fault("NO_PEER", f"{line}; start one, or give its --endpoint") from None
     with bus:
         newest = _Newest()

@@ -9,7 +9,7 @@ from bridge.faults import Fault
 from bridge.log.finding import Finding
 from bridge.tables.one_clock import Sampled, on_one_clock, own_rows, with_own_rows
 from bridge.tables.table import Table
-from bridge.tables.unit_words import known_unit, si_unit, weight_unit
+from bridge.tables.unit_words import in_brackets, known_unit, si_unit, weight_unit
 from bridge.units import counted
 from diagnosis.evidence.manifest_keys import STANDARD, ChannelMap
 from diagnosis.evidence.sentinels import SMOOTH, without_sentinels
@@ -34,6 +34,10 @@ _MEASURES = {
 }
 # Seconds from which a column of times without a unit is no time of a run but of a calendar, by the unit that it is then in
 _SINCE_1970 = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
+# Days from 2000 to 2100 as spreadsheets and MATLAB's datenum count them. As seconds they are known by their steps: shorter ones
+# would be rates above 50 kHz, longer ones are less than 0.6 rows a second.
+_DAYS = ((36526.0, 73051.0), (730486.0, 767011.0))
+_DAY_S, _LONGEST_STEP = 86400.0, 2e-5
 
 
 class Mapped(NamedTuple):
@@ -124,6 +128,13 @@ def _factor(table: Table, name: str, channel: ChannelMap, found: list[Finding], 
     unit = channel.unit or table.unit(channel.column)
     known = None if not unit else weight_unit(unit) if _MEASURES[name][0] == "force" else known_unit(unit)
     if known is None:
+        column = table.find(channel.column)
+        stated = in_brackets(column)
+        if stated and not unit:  # an unknown one of a line of units is told where that line is read
+            text = (
+                f"column {column}: {stated!r} is no unit that is known here: taken as it is; a map may say scale = ..."
+            )
+            found.append(Finding("units", f"{table.path.name}: {name}", text))
         return 1.0
     what, factor = known
     if rotary is False and what == _MEASURES[name][1] != _MEASURES[name][0]:
@@ -150,15 +161,20 @@ def _time(table: Table, channel: ChannelMap, found: list[Finding]) -> Floats:
         return times_s + channel.offset
     if channel.scale is not None or channel.unit or table.unit(channel.column):
         return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
-    finite = np.flatnonzero(np.isfinite(times_s))
-    if len(finite):
-        first = float(times_s[finite[0]])
-        for least, factor in _SINCE_1970:
-            if first > least:
-                found.append(
-                    Finding(
-                        "time", where, f"is a time of the calendar in steps of {factor:g} s: counted from the first row"
-                    )
-                )
-                return (times_s - first) * factor + channel.offset
-    return times_s + channel.offset
+    unit_s = calendar_unit_s(times_s)
+    if unit_s is None:
+        return times_s * _factor(table, "t_s", channel, found, None) + channel.offset
+    found.append(
+        Finding("time", where, f"is a time of the calendar in steps of {unit_s:g} s: counted from the first row")
+    )
+    return (times_s - times_s[np.isfinite(times_s)][0]) * unit_s + channel.offset
+
+
+def calendar_unit_s(times_s: Floats) -> float | None:
+    """The unit in which a column without a unit counts the calendar's time [s]; None where it counts that of a run."""
+    finite = times_s[np.isfinite(times_s)]
+    if not len(finite):
+        return None
+    if np.ptp(finite) < _LONGEST_STEP * len(finite) and any(least <= finite[0] < most for least, most in _DAYS):
+        return _DAY_S
+    return next((unit_s for least, unit_s in _SINCE_1970 if finite[0] > least), None)

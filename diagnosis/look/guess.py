@@ -18,8 +18,8 @@ _NAMES = {
     "force": r"friction|reib|tangent|drag|(^|[^a-z])(ff|fx|f_x|f_t|ft|f_d|f)([^a-z]|$)|force|kraft|last?zelle|load ?cell"
     r"|torque|moment|effort",
     "speed": r"speed|veloc|geschw|(^|[^a-z])(v|v_d)([^a-z]|$)",
-    "position": r"drive.*pos|stroke|hub|verfahrweg|stage|(^|[^a-z])(s_d|x_d)([^a-z]|$)|position|displacement|weg|travel|distance"
-    r"|angle|winkel|(^|[^a-z])(x|s|phi|theta)([^a-z]|$)",
+    "position": r"drive.*pos|(^|[^a-z])pos([^a-z]|$)|crosshead|extension|stroke|hub|verfahrweg|stage|position"
+    r"|(^|[^a-z])(s_d|x_d)([^a-z]|$)|displacement|weg|travel|distance|angle|winkel|(^|[^a-z])(x|s|phi|theta)([^a-z]|$)",
 }  # fmt: skip
 _QUANTITIES = {
     "time": ("time",),
@@ -32,6 +32,9 @@ _QUANTITIES = {
 _FEWEST_STEPS = 8
 # what none of these is, whatever else its name says
 _OTHER = re.compile(r"acc|beschl|temp|humid|feucht|count|zyklus|cycle|voltage|current", re.IGNORECASE)
+
+# a force that is asked for, beside the one that is there; a position that is asked for is as good as one that is reached
+_WANTED = re.compile(r"soll|set.?p(oin)?t|target|demand|command|nominal", re.IGNORECASE)
 
 
 class Guess(NamedTuple):
@@ -73,6 +76,12 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
             reasons.append(f"time = {dated!r}, which holds times")
     if "time" not in found and not table.clocks:
         left = [name for name in numeric if name not in found.values()]
+        by_unit = next((name for name in left if _in(table, name, "time") and _rises(table, name)), "")
+        if by_unit:
+            found["time"] = by_unit
+            reasons.append(f"time = {by_unit!r}, which rises in even steps of a unit of time")
+    if "time" not in found and not table.clocks:
+        left = [name for name in numeric if name not in found.values()]
         rising = next((name for name in left if _is_clock(table, name)), "")
         # beside a column that numbers the rows it may be the way of an even drive
         if rising and not any(_numbers_rows(table, name) for name in left):
@@ -80,7 +89,12 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
             reasons.append(f"time = {rising!r}, which rises in even steps")
     left = [name for name in numeric if name not in found.values()]
     if "force" not in found and "coefficient" not in found:
-        by_unit = [name for name in left if (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES["force"]]
+        by_unit = [name for name in left if _in(table, name, "force")]
+        if len(by_unit) != 1 and (empty := _empty_force(table, numeric)):
+            text = f"{table.path.name}: column {empty!r} holds no number: must hold the force, by its name"
+            raise Fault(
+                "CONFIG", f'{text}; let a spreadsheet program calculate and save its formulas, or add --force "NAME"'
+            )
         only = by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _rises(table, one))]
         if len(only) != 1:
             raise Fault("CONFIG", _ask(table, numeric))
@@ -94,9 +108,30 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
     return Guess(time, force, load, position, speed, coefficient, reasons)
 
 
+def _in(table: Table, name: str, what: str) -> bool:
+    """Whether a column states a unit of what is wanted."""
+    return (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES[what]
+
+
+def _empty_force(table: Table, numeric: list[str]) -> str:
+    """A column that is named as a force and has no cell with a value; empty where there is none."""
+    named = (
+        name for name in table.columns if name not in numeric and re.search(_NAMES["force"], bare_name(name), re.I)
+    )
+    return next((name for name in named if _is_empty(table, name)), "")
+
+
+def _is_empty(table: Table, name: str) -> bool:
+    try:
+        return not np.isfinite(table.column(name)).any()
+    except Fault:
+        return False
+
+
 def _ask(table: Table, numeric: list[str]) -> str:
     columns = ", ".join(f'"{name}"' for name in numeric) or "none of numbers"
-    return f'{table.path.name}: which column is the force? add --force "NAME"; columns here: {columns}'
+    sheet = f" (sheet {table.written['sheet']!r}; a map reads another one)" if "sheet" in table.written else ""
+    return f'{table.path.name}: which column is the force? add --force "NAME"; columns here{sheet}: {columns}'
 
 
 def _numeric(table: Table) -> list[str]:
@@ -127,6 +162,8 @@ def _named(table: Table, what: str, names: list[str]) -> str:
     pattern = re.compile(_NAMES[what], re.IGNORECASE)
     for name in names:
         if what not in ("time", "coefficient") and _OTHER.search(name):
+            continue
+        if what == "force" and _WANTED.search(name):
             continue
         if what in ("force", "position") and _flat(table, name):
             continue

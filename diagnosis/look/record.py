@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 
 Floats = npt.NDArray[np.float64]
 _GAP_STEPS = 10.0  # usual steps, beyond which the record is cut: nobody knows what happened
-_FEWEST = 16  # samples of a part
+FEWEST = 16  # samples of a part
 _UNEVEN = 0.01  # of a step; beyond it the record is interpolated to an even clock
 _BOTH_WAYS = 0.3  # share of the force's largest size that it reaches with either sign on a rig that goes both ways
 _TURN = 0.1  # of that size: a force that changes sign by less has not turned
@@ -40,7 +40,7 @@ def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> 
     forward = np.concatenate([[True], t_s[1:] > np.maximum.accumulate(t_s)[:-1]]) if len(t_s) else np.zeros(0, np.bool_)
     t_s, force_N = t_s[forward], force_N[forward]
     position_m = None if position_m is None else position_m[forward]
-    if len(t_s) < _FEWEST:
+    if len(t_s) < FEWEST:
         return []
     step_s = float(np.median(np.diff(t_s)))
     gaps = np.flatnonzero(np.diff(t_s) > _GAP_STEPS * step_s) + 1
@@ -48,7 +48,7 @@ def parts_of(t_s: Floats, force_N: Floats, position_m: Floats | None = None) -> 
     edges = np.unique(np.concatenate([edges, _turns(force_N)]))
     parts: list[Part] = []
     for first, last in pairwise(edges.tolist()):
-        if last - first < _FEWEST:
+        if last - first < FEWEST:
             continue
         own = slice(first, last)
         sign = -1.0 if float(np.median(force_N[own])) < 0.0 else 1.0
@@ -81,7 +81,7 @@ def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) 
 
 def noise_of(force_N: Floats) -> float:
     """Standard deviation of the noise from sample to sample: second differences remove climbs, their median the slips."""
-    if len(force_N) < _FEWEST:
+    if len(force_N) < FEWEST:
         return 0.0
     return 1.4826 * float(np.median(np.abs(np.diff(force_N, 2)))) / 6.0**0.5
 

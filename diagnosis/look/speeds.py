@@ -6,18 +6,20 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.look.numbers import Number, mean_of, slope_of
-from diagnosis.look.record import Part, smoothed
+from diagnosis.look.record import Part, noise_of, smoothed
 from diagnosis.look.sticks import Cycle
 
 Floats = npt.NDArray[np.float64]
 VARIES = 1.3  # largest speed over smallest, from which friction is told over speed
 _BINS_A_DECADE = 8.0
 _WINDOWS = 200  # of a record without slips, in which speed and force are averaged
+_STANDS = 4.0  # standard deviations of a speed by the position's noise alone, within which the drive stands
 _FEWEST_IN_BIN = 3
 _FEWEST_DWELLS = 5
 _MOST_INFLATED = 10.0  # Marquardt's bound: an estimate has ten times the variance that it has alone
 _ENOUGH = 0.1  # share of the dwell's variation; a rate that varies less makes at most a tenth of a slope over the dwell
 _DWELLS = 1.25  # largest dwell over smallest (of nine in ten slips), from which breakaway is told over dwell
+_ASIDE = 0.05  # share of the dwells at each end that is not looked at for that, one slip at least
 
 
 class AtSpeed(NamedTuple):
@@ -66,10 +68,12 @@ def _windows(part: Part, cycles: list[Cycle]) -> tuple[Floats, Floats]:
     windows = len(part.t_s) // width
     edges_s = part.t_s[: windows * width : width]
     length_s = width * part.step_s
-    place = smoothed(part.position_m, max(width // 4, 1))[: windows * width].reshape(-1, width)
+    over = max(width // 4, 1)
+    place = smoothed(part.position_m, over)[: windows * width].reshape(-1, width)
     speed = (place[:, -1] - place[:, 0]) / (length_s - part.step_s)
+    of_noise = noise_of(part.position_m) * (2.0 / over) ** 0.5 / (length_s - part.step_s)
     mean = part.force_N[: windows * width].reshape(-1, width).mean(axis=1)
-    free = np.ones(windows, np.bool_)
+    free = speed > _STANDS * of_noise
     for cycle in cycles:
         dwell = cycle.dwell_s if np.isfinite(cycle.dwell_s) else cycle.breakaway_t_s - part.t_s[0]
         end = cycle.restick_t_s if np.isfinite(cycle.restick_t_s) else part.t_s[-1]
@@ -113,5 +117,6 @@ def _dwells(cycles: list[Cycle]) -> Floats | None:
     ).reshape(-1, 3)
     if len(rows) < _FEWEST_DWELLS:
         return None
-    low, high = np.quantile(rows[:, 0], (0.05, 0.95))
-    return None if high < _DWELLS * low else rows
+    dwells = np.sort(rows[:, 0])
+    aside = max(round(_ASIDE * len(dwells)), 1)  # one slip alone shows no dependence
+    return None if dwells[-1 - aside] < _DWELLS * dwells[aside] else rows

@@ -21,6 +21,8 @@ from cockpit.cli import app
 from cockpit.figures.grid import Grid, on_grid
 from cockpit.judge.verdict import judge, judge_run
 from cockpit.judge.verdict_words import headline, in_words
+from cockpit.run.in_process import run_onboard
+from cockpit.run.scenario import load_scenario
 from tests.logs import empty_log, short_log
 
 
@@ -83,6 +85,16 @@ def test_a_paper_has_its_width_and_its_metadata(log: Path) -> None:
         assert picture.width == 500
     assert re.match(r"stickslip \d", text["Software"])
     assert "--style paper" in text["Description"]
+
+
+@pytest.mark.parametrize(("to", "named"), [("0.1s", False), ("0.4s", True)])
+def test_a_legend_names_what_is_in_the_picture_alone(tmp_path: Path, to: str, named: bool) -> None:
+    path, out = tmp_path / "run.mcap", tmp_path / "x.svg"
+    scenario = load_scenario("paper-c45-c45", ["duration_s=0.4", "controller.policy.enabled_from_s=0.2"])
+    run_onboard(scenario, path, {"scenario": scenario.name})
+    assert call("plot", path, "--out", out, "--to", to).exit_code == 0
+    for words in ("in charge from here", "vibrating"):
+        assert (f"<!-- {words} -->" in out.read_text()) == named, words
 
 
 def test_the_numbers_of_the_curves_are_those_of_the_log(log: Path) -> None:

@@ -313,6 +313,9 @@ LVM = (
         ),
         ("klipper.csv", "#time,force_g\n", "{t:.4f},{g:.4f}\n", "is in g: times 0.00980665 to be in N"),
         ("labels.lvm", LVM + "X_Value\tFriction\tComment\n", "\t{kN:.8f}\t\n", "line 4 is of units: kN"),
+        ("asked.csv", "t [s],F_soll [N],F_ist [N]\n", "{t:.4f},{ms:.0f},{N:.6f}\n", "force = 'F_ist [N]' by its name"),
+        ("datenum.csv", "time,F\n", "{day:.10f},{N:.6f}\n", "is a time of the calendar in steps of 86400 s"),
+        ("french.csv", "Temps [ms];Effort [N]\n", "{ms:.0f};{N:.6f}\n", "rises in even steps of a unit of time"),
         ("traction.tsv", "Test Time (s)\tTraction Coeff (-)\n", "{t:.4f}\t{N:.6f}\n", "is told as a coefficient"),
     ],
 )
@@ -320,13 +323,17 @@ def test_what_a_machine_calls_its_columns_is_understood(
     tmp_path: Path, file: str, head: str, row: str, told: str
 ) -> None:
     t_s, force_N, _ = saw_teeth()
-    rows = (row.format(t=t, N=f, kN=1e-3 * f, g=f / 9.80665e-3) for t, f in zip(t_s, force_N, strict=True))
+    rows = (
+        row.format(t=t, N=f, kN=1e-3 * f, g=f / 9.80665e-3, ms=1e3 * t, day=739316.5 + t / 86400)
+        for t, f in zip(t_s, force_N, strict=True)
+    )
     (tmp_path / file).write_text(head + "".join(rows))
     seen = seen_in(tmp_path / file)
     static = seen["numbers"].get("static_force_N") or seen["numbers"]["mu_s"]
     assert static["value"] == pytest.approx(16.0, abs=0.1)
     assert seen["rate_Hz"] == pytest.approx(500.0, rel=1e-3)
     assert told in said(seen)
+    assert file != "datenum.csv" or "taken as s" not in said(seen)
 
 
 def test_beside_the_number_of_the_row_an_even_way_is_no_time(tmp_path: Path) -> None:
@@ -341,3 +348,12 @@ def test_beside_the_number_of_the_row_an_even_way_is_no_time(tmp_path: Path) -> 
     assert seen_in(path, "--force", "2", "--rate", "500Hz")["numbers"]["static_force_N"]["value"] == pytest.approx(
         16.0, abs=0.1
     )
+
+
+@pytest.mark.parametrize("name", ["joint.0.motor-pos-fb", "Extension", "Crosshead"])
+def test_a_way_without_a_unit_is_no_time(tmp_path: Path, name: str) -> None:
+    _, force_N, drive_mm = saw_teeth()
+    path = tmp_path / "halscope.txt"
+    path.write_text(f"{name};force\n" + "".join(f"{x:.6f};{f:.5f}\n" for f, x in zip(force_N, drive_mm, strict=True)))
+    refused = CliRunner().invoke(app, ["look", str(path), "--json"])
+    assert "no time: which column is it" in json.loads(refused.stdout)["line"]

@@ -2,6 +2,7 @@
 
 import socket
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Self
 
 import pytest
@@ -13,7 +14,8 @@ from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT, Topic
 from bridge.wire.words import words
 from bridge.wire.zenoh_link import Bus, BusConfig, stands_still
-from cockpit.run import operator
+from cockpit.run import operator, status
+from cockpit.run.authority import make_certificates
 from tests.system.ports import free_endpoint
 
 READY, ARMED, DISARMED, FAULT = wire.READY, wire.ARMED, wire.DISARMED, wire.FAULT
@@ -147,6 +149,17 @@ def test_where_no_rig_is_the_advice_is_that_of_the_word(
         advice == "by hand",
         advice == "start one",
     )
+
+
+def test_where_no_rig_answers_a_certificate_the_authority_is_asked_about(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(operator, "_DIAL_S", 0.2)
+    make_certificates(tmp_path, [])
+    config = BusConfig(endpoint=free_endpoint().replace("tcp/", "tls/"), certificates=str(tmp_path))
+    for ask in (lambda: operator.tell(config, "ARM"), lambda: status.look(config)):
+        with pytest.raises(Fault, match=r"no rig answers there .*the authority of --certs must be those"):
+            ask()
 
 
 def test_a_rig_that_cannot_listen_tells_why() -> None:

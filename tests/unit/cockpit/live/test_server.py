@@ -211,8 +211,9 @@ def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.Mo
 
     async def look() -> None:
         words = person.Words(BusConfig(), TOKEN)
-        wrong = await words.say(person.Wish("ARM", "guess"))
-        assert not wrong["done"]
+        for token in ("guess", "", "\ud800"):  # the last is half of a pair, as JSON may hold it
+            wrong = await words.say(person.Wish("ARM", token))
+            assert "not the token" in wrong["lines"][0]
         assert said == []
         arming = asyncio.create_task(words.say(person.Wish("ARM", TOKEN)))
         await asyncio.sleep(0.05)

@@ -148,6 +148,8 @@ KINDS = (
     Kind("units-row.csv", "Time,Force,Position\ns,N,m\n" + rows(T, FORCE, POSITION, form="{:.8f}"), ("Time", "Force", "Position")),
     Kind("kilo-row.csv", "Time;Force\n[ms];[kN]\n" + rows(1e3 * T, 1e-3 * FORCE, sep=";", form="{:.8f}"), ("Time", "Force", ""), says="is in kN: times 1000"),
     Kind("units-in-names.dat", "Zeit / ms\tKraft (mN)\tWeg [mm]\n" + rows(1e3 * T, 1e3 * FORCE, 1e3 * POSITION, sep="\t"), ("Zeit", "Kraft", "Weg")),
+    Kind("stroke.dat", "Zeit/ms\tKraft/mN\ts/mm\n" + german(rows(1e3 * T, 1e3 * FORCE, 1e3 * POSITION, sep="\t")), ("Zeit", "Kraft", "s")),
+    Kind("days.csv", "Timestamp,F\n" + "".join(f"{46082.75 + s / 86400:.11f},{f:.5f}\n" for s, f in zip(T, FORCE, strict=True)), ("Timestamp", "F", ""), says="calendar in steps of 86400 s"),
     Kind("names-twice.csv", "Time,Force,Time,Position\n" + rows(T, FORCE, T, POSITION), ("Time", "Force", "")),
     Kind("iso-time.csv", "timestamp,F\n" + rows(_STAMPS, FORCE), ("timestamp", "F", ""), says="counted in seconds from the first row"),
     Kind("clock.csv", "Zeit;F\n" + german(rows([s[11:] for s in _STAMPS], FORCE, sep=";")), ("Zeit", "F", "")),

@@ -9,6 +9,7 @@ import pytest
 
 from bridge.faults import Fault
 from bridge.tables.kinds import kind_of
+from bridge.tables.unit_words import known_unit, unit_in_name
 from diagnosis.evidence.import_table import import_file
 from tests.unit.diagnosis.evidence.foreign_tables import FORCE, KINDS, POSITION, Kind, T, write
 
@@ -85,3 +86,28 @@ def test_a_packed_file_is_named_as_one(tmp_path: Path) -> None:
     (tmp_path / "a.csv.gz").write_bytes(gzip.compress(b"t,F\n0,1\n"))
     with pytest.raises(Fault, match=r"a.csv.gz: is packed by gzip; unpack it, and give the file that is in it"):
         import_file(tmp_path / "a.csv.gz", channel_map(tmp_path, t_s="t", drive_force_N="F"), tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        *(("Kraft/kN", "kN"), ("Weg/µm", "µm"), ("t/s", "s"), ("s/mm", "mm"), ("v/mm/s", "mm/s"), ("Zeit/min", "min")),
+        *((name, "") for name in ("U/min", "kN/s", "N/mm", "counts/s", "log/t", "/imu/g", "plant/axis/s", "Kraft/Weg")),
+    ],
+)  # fmt: skip
+def test_a_unit_behind_a_stroke_is_no_path_and_no_rate(name: str, unit: str) -> None:
+    assert unit_in_name(name) == unit
+
+
+@pytest.mark.parametrize(
+    ("unit", "known"),
+    [
+        ("daN", ("force", 10.0)),
+        ("KN", ("force", 1e3)),
+        ("MM", ("length", 1e-3)),
+        ("N·mm", ("torque", 1e-3)),
+        ("Ncm", ("torque", 1e-2)),
+    ],
+)
+def test_units_of_machine_builders_are_known(unit: str, known: tuple[str, float]) -> None:
+    assert known_unit(unit) == known

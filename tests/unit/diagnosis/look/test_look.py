@@ -163,6 +163,27 @@ def test_friction_over_speed_and_over_stick_time() -> None:
     assert halted.numbers["stiffness_N_per_m"].value == pytest.approx(1e4, rel=0.1)
 
 
+def test_one_stick_that_is_cut_short_shows_no_dependence_on_its_time() -> None:
+    """Seven sticks to 16 N, and an eighth that a knock ends at 13 N."""
+    tops = [*[16.0] * 7, 13.0, 12.0]
+    force_N = np.concatenate([np.linspace(10.0, top, round(800 * (top - 10.0) / 6.0)) for top in tops])
+    seen = look(1e-3 * np.arange(len(force_N)), force_N, None, Known(1e-3))
+    assert seen is not None
+    assert len(seen.cycles) == 8
+    assert "dwell_N_per_decade" not in seen.numbers
+    assert any("all sticks last alike" in line for line in cannot_tell(seen))
+
+
+def test_a_drive_that_stands_has_no_speed() -> None:
+    """1 and 0.2 mm/s, then a rest; the noise of the position is no third speed."""
+    t_s = np.arange(0, 30, 1e-3)
+    rng = np.random.default_rng(4)
+    way_m = np.cumsum(np.where(t_s < 10.0, 1e-3, np.where(t_s < 20.0, 2e-4, 0.0))) * 1e-3
+    seen = look(t_s, 10.0 + 0.05 * rng.standard_normal(len(t_s)), way_m + 1e-6 * rng.standard_normal(len(t_s)), Known())
+    assert seen is not None
+    assert [round(1e3 * one.speed_mps, 1) for one in seen.at_speeds] == [0.2, 1.0]
+
+
 def test_a_triangle_and_a_reversal_are_no_slips() -> None:
     t_s = np.arange(0, 20, 1e-3)
     noise_N = 0.05 * np.random.default_rng(3).standard_normal(len(t_s))
