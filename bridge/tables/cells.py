@@ -2,6 +2,7 @@
 
 import datetime as dt
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ APOSTROPHES = ("'", "\u2019")
 # hours, minutes and seconds; with a fraction behind the second number, minutes and seconds
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?)|([.,]\d+))?\s*([AaPp][Mm])?")
 _DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
+_ORDERS = ("mdy", "dmy", "ymd")  # of a date's numbers: with strokes as in the United States, if nothing tells otherwise
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
 _DAY_S, _HOUR_S = 86400.0, 3600.0
 
@@ -139,11 +141,14 @@ def _as_text(cell: Any) -> str:
 
 
 def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[Finding]]:
-    filled = [text for text in texts if text.strip()]
-    if not filled or _time_in(filled[0]) is None:
+    filled = next((text for text in texts if text.strip()), "")
+    if not is_time(filled):
         return None, []
-    stamps = [_time_in(text) for text in texts]
-    began = next(day for day, _ in filter(None, stamps))  # a calendar in seconds would cost microseconds of its digits
+    order = _order_of(texts)
+    stamps = [_time_in(text, order) for text in texts]
+    began = next(
+        (day for day, _ in filter(None, stamps)), 0
+    )  # a calendar in seconds would cost microseconds of its digits
     times = [None if one is None else (one[0] - began) * _DAY_S + one[1] for one in stamps]
     if sum(time is None for time in times) > _MOST_BAD * len(texts):
         return None, []
@@ -160,7 +165,33 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
     return counted_on - first, found
 
 
-def _time_in(text: str) -> tuple[int, float] | None:
+def _order_of(texts: list[str]) -> str:
+    """The order of day, month and year in a column: what most of its dates can have, and puts them nearest to each other."""
+    dates = {(date[2], *_numbers_of(date)) for text in texts if (date := _DATE.search(text)) is not None}
+    stroke = any(mark == "/" for mark, *_ in dates)
+
+    def unlikely(order: str) -> tuple[int, int, bool]:
+        days = [_day(parts, order) for _, *parts in dates]
+        there = [day for day in days if day is not None]
+        return len(days) - len(there), max(there, default=0) - min(there, default=0), not stroke and order == "mdy"
+
+    return min(_ORDERS, key=unlikely)
+
+
+def _numbers_of(date: re.Match[str]) -> tuple[int, int, int]:
+    return int(date[1]), int(date[3]), int(date[4])
+
+
+def _day(parts: Sequence[int], order: str) -> int | None:
+    """The day of a date in the calendar; None where there is no such date."""
+    year, month, day = (parts[order.index(part)] for part in "ymd")
+    try:
+        return dt.date(year + (2000 if year < 100 else 0), month, day).toordinal()
+    except ValueError:
+        return None
+
+
+def _time_in(text: str, order: str) -> tuple[int, float] | None:
     """Day (0 without a date) and second of a date, a clock time or both; None where there is none."""
     word = _ZONE.sub("", text.strip())
     clock = _CLOCK.search(word)
@@ -171,17 +202,9 @@ def _time_in(text: str) -> tuple[int, float] | None:
             rest = rest.replace(found[0], "", 1)
     if (clock is None and date is None) or rest.strip(" T,;\t"):
         return None
-    day = 0
-    if date is not None:
-        first, mark, second, third = int(date[1]), date[2], int(date[3]), int(date[4])
-        year, month, of_month = (first, second, third) if first > 31 else (third, second, first)
-        if mark == "/" and first <= 12:
-            month, of_month = first, second
-        year += 2000 if year < 100 else 0
-        try:
-            day = dt.date(year, month, of_month).toordinal()
-        except ValueError:
-            return None
+    day = 0 if date is None else _day(_numbers_of(date), order)
+    if day is None:
+        return None
     if clock is None:
         return day, 0.0
     if clock[4]:
@@ -194,7 +217,7 @@ def _time_in(text: str) -> tuple[int, float] | None:
 
 def is_time(text: str) -> bool:
     """Whether a cell holds a date or a clock time."""
-    return _time_in(text) is not None
+    return any(_time_in(text, order) is not None for order in _ORDERS)
 
 
 def _of_day(time: Any) -> float:
