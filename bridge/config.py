@@ -185,6 +185,8 @@ def _line(model: type[Strict], source: str, problem: Any) -> str:
         return f"{source}: {key} = {in_short(problem['input'])}: must be a table; write {name} = {{ {inside} }}"
     if kind == "list_type" and isinstance(problem["input"], dict):
         return f"{source}: {key}: is one table: must be a list of them; write [[{key}]] above each"
+    if kind == "string_pattern_mismatch" and (like := _fields(_model_at(model, path[:-1]))[path[-1]].default):
+        return f"{source}: {key} = {in_short(problem['input'])}: must have the form of {like!r}; change the value"
     rule = message[:1].lower() + message[1:]
     rule = rule.replace("input should be", "must be")
     return f"{source}: {key} = {in_short(problem['input'])}: {rule}; change the value"

@@ -206,6 +206,13 @@ def test_an_error_in_a_rig_file_names_it(tmp_path: Path) -> None:
         load_scenario("paper-c45-c45", [rig_setting(str(rig))])
 
 
+def test_a_text_of_another_form_is_told_with_one_of_the_right_form() -> None:
+    with pytest.raises(
+        Fault, match=r"bus.endpoint = 'foo': must have the form of 'tcp/127.0.0.1:7447'; change the value"
+    ):
+        load_scenario("paper-c45-c45", ["bus.endpoint=foo"])
+
+
 def test_a_setting_is_blamed_for_what_is_its_own_and_a_file_for_the_rest(tmp_path: Path) -> None:
     with pytest.raises(Fault) as caught:
         load_scenario("paper-c45-c45", ["rig.slide.mass_kg=-1.0", "duration_s=soon", "seed=3"])
