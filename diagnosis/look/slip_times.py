@@ -24,18 +24,27 @@ _RIDGE = 1e-9  # where all slips have their samples at the same instants, fewer 
 
 
 def with_slip_times(numbers: dict[str, Number], found: list[Slips]) -> dict[str, Number]:
-    """Numbers with `slip_s` and `dwell_s` from the mean fall of the part with most slips, if it has slips and samples enough."""
-    seen = [falls for falls in map(_falls_of, found) if falls is not None]
-    if not seen or "slip_s" not in numbers:
+    """Numbers with `slip_s` and `dwell_s` from the mean fall of the part with most slips, if it has slips and samples enough.
+
+    Of a fall of few samples it is only known that it lies between the sample before and the sample after it.
+    """
+    if "slip_s" not in numbers:
         return numbers
-    slip = max(seen, key=lambda falls: falls.slips).slip_time()
-    result = numbers | {"slip_s": slip}
-    if "dwell_s" in numbers:  # a stick begins and ends where slips end and begin
-        dwell = numbers["dwell_s"]
-        more_s = numbers["slip_s"].value - slip.value
-        longer = Number(dwell.value + more_s, dwell.low + more_s, dwell.high + more_s, "s")
-        result["dwell_s"] = longer.wider(slip.high - slip.value)
-    return result
+    slip, dwell = numbers["slip_s"], numbers.get("dwell_s")
+    seen = [falls for falls in map(_falls_of, found) if falls is not None]
+    if seen:
+        mean = max(seen, key=lambda falls: falls.slips).slip_time()
+        if dwell is not None:  # a stick begins and ends where slips end and begin
+            more_s = slip.value - mean.value
+            dwell = Number(dwell.value + more_s, dwell.low + more_s, dwell.high + more_s, "s")
+            dwell = dwell.wider(mean.high - mean.value)
+        slip = mean
+    else:
+        steps_s = 2.0 * max(slips.part.step_s for slips in found)
+        slip = slip._replace(low=max(min(slip.low, slip.value - steps_s), 0.0))
+        if dwell is not None:
+            dwell = dwell._replace(high=max(dwell.high, dwell.value + steps_s))
+    return numbers | {"slip_s": slip} | ({"dwell_s": dwell} if dwell is not None else {})
 
 
 class _Falls(NamedTuple):

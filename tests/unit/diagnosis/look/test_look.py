@@ -61,6 +61,16 @@ def test_times_of_slips_and_sticks_are_no_longer_in_noise():
     assert np.mean(held) > 0.8
 
 
+@pytest.mark.parametrize("fall_s", [2e-5, 1e-4, 3e-4, 6e-4])
+def test_a_slip_between_two_samples_may_be_as_short_as_nothing(fall_s: float):
+    t_s, force_N, period_s = saw(1e4, fall_s, 10.0)
+    seen = look(t_s, force_N, None, Known(1.1e-3))
+    assert seen is not None
+    slip, dwell = seen.numbers["slip_s"], seen.numbers["dwell_s"]
+    assert slip.low <= fall_s <= slip.high
+    assert dwell.low <= period_s - fall_s <= dwell.high
+
+
 @pytest.mark.parametrize("pair", ["C45-C45 @ 0.063", "C45-GGG40 @ 0.063"])
 @pytest.mark.parametrize(("every", "noise_N"), [(10, 0.0), (20, 0.02), (20, 0.2)])
 def test_the_numbers_of_a_tribometer_are_within_a_percent(pair: str, every: int, noise_N: float) -> None:
