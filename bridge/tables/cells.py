@@ -146,9 +146,8 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
         return None, []
     order = _order_of(texts)
     stamps = [_time_in(text, order) for text in texts]
-    began = next(
-        (day for day, _ in filter(None, stamps)), 0
-    )  # a calendar in seconds would cost microseconds of its digits
+    # a calendar in seconds would cost microseconds of its digits
+    began = next((day for day, _ in filter(None, stamps)), 0)
     times = [None if one is None else (one[0] - began) * _DAY_S + one[1] for one in stamps]
     if sum(time is None for time in times) > _MOST_BAD * len(texts):
         return None, []

@@ -20,6 +20,7 @@ _BINS = 100  # in a fall
 _REACH = 0.9  # of a fall, before and after its middle, in which top and bottom are looked for
 # Half of what a parabola spans, in falls, at least and at most; between them as much as leaves this share of the fall as noise.
 _LEAST, _MOST, _NOISE = 0.06, 0.2, 0.002
+_LEAST_SAMPLES = 1.5  # of that half: three samples of each slip are in the whole
 _RIDGE = 1e-9  # where all slips have their samples at the same instants, fewer than three are in some spans
 
 
@@ -92,7 +93,7 @@ def _falls_of(slips: Slips) -> _Falls | None:
         return None
     drop_N = float((part.force_N[tops] - part.force_N[bottoms]).mean())
     needed = (part.noise_N / (_NOISE * max(drop_N, 1e-300))) ** 2
-    half = max(_LEAST * usual, 1.5, min(needed / (2.0 * len(at)), _MOST * usual))
+    half = max(_LEAST * usual, _LEAST_SAMPLES, min(needed / (2.0 * len(at)), _MOST * usual))
     each_side = math.ceil((reach + 1) * _BINS / usual)
     number = np.round((at - middles[:, None]) * _BINS / usual).astype(np.int64) + each_side
     groups = groups_of(len(at))
