@@ -4,7 +4,7 @@ import ipaddress
 import socket
 from typing import Annotated
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from bridge.config import Strict
 
@@ -51,6 +51,15 @@ class BusConfig(Strict):
         if not 1 <= int(endpoint.rpartition(":")[2]) <= 65535:
             raise ValueError(f"{endpoint!r}: the port must be from 1 to 65535; choose another, for example 7447")
         return endpoint
+
+    @model_validator(mode="after")
+    def _certificates_are_used(self) -> "BusConfig":
+        if self.certificates and not self.encrypted:
+            raise ValueError(
+                f"certificates = {self.certificates!r}: nobody would use them at {self.endpoint!r}: the endpoint must be a tls/ "
+                "one; use --endpoint tls/HOST:PORT, or leave --certs out"
+            )
+        return self
 
 
 def address(endpoint: str) -> str:
