@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 COMMAND = [sys.executable, "-m", "cockpit"]
@@ -68,7 +69,7 @@ class Run:
 
     def wait_until_recording(self) -> None:
         """Until two chunks are in the log."""
-        until_s = time.monotonic() + 60
+        until_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < until_s and self.process.poll() is None:
             if self.log.exists() and self.log.stat().st_size > 200_000:
                 self.children = {role(pid): pid for pid in children_of(self.process.pid)}
@@ -79,18 +80,18 @@ class Run:
 
     def wait_until_started(self) -> None:
         """Until its children are there, which have recorded nothing yet."""
-        until_s = time.monotonic() + 30
+        until_s = time.monotonic() + PATIENCE_S
         roles = {"plant", "controller", "recorder"}
         while set(self.children) != roles and time.monotonic() < until_s:
             self.children = {role(pid): pid for pid in children_of(self.process.pid)}
         assert set(self.children) == roles
 
-    def end(self) -> tuple[int, str, str]:
+    def end(self, within_s: float = 30.0) -> tuple[int, str, str]:
         """Status, stdout and stderr; nobody may be left."""
-        out, err = self.process.communicate(timeout=30)
+        out, err = self.process.communicate(timeout=within_s)
         assert all(gone(pid) for pid in self.children.values())
         return self.process.returncode, out, err
 
 
-def call(*arguments: str, timeout_s: float = 60.0) -> subprocess.CompletedProcess[str]:
+def call(*arguments: str, timeout_s: float = PATIENCE_S) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout_s, check=False)

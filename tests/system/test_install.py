@@ -13,6 +13,7 @@ import pytest
 from bridge.faults import FAULTS
 from cockpit.run.child_process import EXTRA_MODULES
 from tests import made_up
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 pytestmark = pytest.mark.slow
@@ -40,7 +41,7 @@ def call(folder: Path, *arguments: str, status: int = 0, search: Path | None = N
     """
     env = os.environ | ({} if search is None else {"PYTHONPATH": str(search)})
     done = subprocess.run(
-        [STICKSLIP, *arguments], cwd=folder, env=env, capture_output=True, text=True, timeout=120, check=False
+        [STICKSLIP, *arguments], cwd=folder, env=env, capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
     assert done.returncode == status, done.stderr
     return done.stdout
@@ -100,7 +101,7 @@ def test_what_a_plain_installation_does_needs_no_extra(tmp_path: Path, plain: Pa
     ]
     done = subprocess.run(
         [sys.executable, "-P", "-c", BASE, *lines], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(plain)},
-        capture_output=True, text=True, timeout=120, check=False,
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "run.png").exists()
@@ -121,7 +122,7 @@ def test_a_command_names_the_extra_that_is_missing(tmp_path: Path, plain: Path, 
     kind = FAULTS["MISSING_EXTRA"]
     env = os.environ | {"PYTHONPATH": str(plain)}
     done = subprocess.run(
-        [STICKSLIP, *arguments], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60, check=False
+        [STICKSLIP, *arguments], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
     assert done.returncode == kind.exit_status
     assert re.fullmatch(

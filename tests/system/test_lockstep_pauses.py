@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridge.log.logfile import read_run
+from tests.patience import PATIENCE_S
 from tests.system.run_under_way import Run
 
 pytestmark = pytest.mark.slow
@@ -23,7 +24,7 @@ def test_in_lockstep_a_pause_costs_nothing(tmp_path: Path, runs: list[Run], vict
     os.kill(run.children[victim], signal.SIGSTOP)
     time.sleep(0.5)
     os.kill(run.children[victim], signal.SIGCONT)
-    status, _, err = run.end()
+    status, _, err = run.end(PATIENCE_S)
     assert (status, err) == (0, "")
     data = read_run(run.log)
     assert len(data.sensors) == len(data.command) == 5_000

@@ -10,6 +10,7 @@ import pytest
 from bridge.faults import FAULTS, Fault
 from bridge.wire.zenoh_link import Bus, BusConfig
 from cockpit.faults.injection import inject
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 from tests.system.told import told
 
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.slow
 @pytest.mark.nightly
 def test_a_command_without_a_plant_says_so_in_one_line() -> None:
     command = [sys.executable, "-m", "cockpit", "controller", "--endpoint", free_endpoint()]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert result.returncode == FAULTS["NO_PEER"].exit_status
     assert "no plant answers" in result.stderr
     assert len(told(result.stderr)) == 1
@@ -28,7 +29,7 @@ def test_a_command_without_a_plant_says_so_in_one_line() -> None:
 def test_a_stop_without_a_rig_says_at_once_what_to_do() -> None:
     began_s = time.monotonic()
     command = [sys.executable, "-m", "cockpit", "stop", "--endpoint", free_endpoint()]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert result.returncode == FAULTS["NO_PEER"].exit_status
     assert "no rig answers there within 2 s" in result.stderr
     assert "stop the exciter's amplifier by hand" in result.stderr

@@ -5,11 +5,13 @@ import resource
 import subprocess
 import sys
 from pathlib import Path
+from statistics import median
 
 import pytest
 
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 _HEAVY = {"numba", "scipy", "matplotlib", "pyarrow", "rich"}
@@ -39,23 +41,21 @@ def _commands(tmp_path: Path) -> dict[str, list[str]]:
 )
 def test_a_quick_command_imports_nothing_heavy(tmp_path: Path, name: str, not_needed: set[str]) -> None:
     command = [sys.executable, "-P", "-c", _TELL, *_commands(tmp_path)[name]]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert not not_needed & set(json.loads(done.stderr.splitlines()[-1])), done.stderr
 
 
 def _cpu_s(command: list[str]) -> float:
-    """Processor time of a command, the least of three times."""
-    taken_s: list[float] = []
-    for _ in range(3):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(command, capture_output=True, timeout=60, check=False)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        taken_s.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    return min(taken_s)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, capture_output=True, timeout=PATIENCE_S, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["log info", "stop", "status"])
 def test_a_quick_command_takes_little_processor_time(tmp_path: Path, name: str) -> None:
-    numpy_s = _cpu_s([sys.executable, "-P", "-c", "import numpy"])
-    command_s = _cpu_s([sys.executable, "-P", "-m", "cockpit", *_commands(tmp_path)[name]])
-    assert command_s < _NUMPIES * numpy_s
+    """Each pair one after the other, as a shared core is now fast and now slow; what is imported is tested above."""
+    numpy = [sys.executable, "-P", "-c", "import numpy"]
+    command = [sys.executable, "-P", "-m", "cockpit", *_commands(tmp_path)[name]]
+    assert median(_cpu_s(command) / _cpu_s(numpy) for _ in range(3)) < _NUMPIES

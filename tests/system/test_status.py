@@ -15,6 +15,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, OPERATOR, STATE
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
 from cockpit.run.status import look
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 CLI = [sys.executable, "-m", "cockpit"]
@@ -67,7 +68,7 @@ def test_a_rig_and_its_controller_are_told(config: BusConfig) -> None:
         plant.listen(OPERATOR, said.keep)
         plant.announce()
         controller.announce()
-        assert not plant.wait_for(["plant", "controller"], 10.0)
+        assert not plant.wait_for(["plant", "controller"], PATIENCE_S)
         with publishing(plant, controller, SENT):
             seen = look(config)
         assert said.get_nowait() is None
@@ -101,7 +102,7 @@ def test_what_is_wrong_is_a_warning(config: BusConfig, messages: dict, warning: 
     with Bus(config, "plant", lockstep=False) as plant, Bus(config, "controller", lockstep=False) as controller:
         plant.announce()
         controller.announce()
-        assert not plant.wait_for(["plant", "controller"], 10.0)
+        assert not plant.wait_for(["plant", "controller"], PATIENCE_S)
         with publishing(plant, controller, messages):
             seen = look(config)
     assert seen.rig is None
@@ -112,7 +113,7 @@ def test_a_rig_alone_ends_with_status_1(config: BusConfig) -> None:
     with Bus(config, "plant", lockstep=False) as plant:
         plant.announce()
         command = [*CLI, "status", "--endpoint", config.endpoint, "--json"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 1, done.stderr
     table = json.loads(done.stdout)
     assert (table["roles"], table["mode"]) == (["plant"], None)
@@ -123,7 +124,7 @@ def test_nobody_is_told_soon(config: BusConfig) -> None:
     with pytest.raises(Fault, match=r"no rig answers there within 0\.4 s") as raised:
         look(config)
     assert raised.value.kind is FAULTS["NO_PEER"]
-    assert time.monotonic() - began_s < 5.0  # 0.4 s, on a busy machine
+    assert time.monotonic() - began_s < 15.0  # others wait half a minute for a rig
 
 
 def test_another_prefix_is_told(config: BusConfig) -> None:

@@ -4,6 +4,7 @@ import os
 import socket
 
 from bridge.wire.zenoh_link import Bus, BusConfig
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 
@@ -26,7 +27,7 @@ def test_no_link_of_a_rig_or_its_viewer_waits_for_the_other_side_when_it_is_clos
     config = BusConfig(endpoint=free_endpoint())
     with Bus(config, "plant", lockstep=False) as plant, Bus(config, "viewer", lockstep=False) as viewer:
         plant.announce()
-        assert not viewer.wait_for(["plant"], 5.0)
+        assert not viewer.wait_for(["plant"], PATIENCE_S)
         for _ in range(100):
             if not lingering():
                 break

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
 from bridge.wire.pauses import NO_PRIORITY, Pause, PauseWatch, settled, shared
 from bridge.wire.topics import APPLIED
 from bridge.wire.zenoh_link import Received
+from tests.patience import PATIENCE_S
 from tests.system.run_under_way import gone
 
 MS = 1_000_000
@@ -143,12 +145,24 @@ def _hold(timers: list["subprocess.Popen[bytes]"], seconds: float) -> None:
         timer.send_signal(signal.SIGCONT)
 
 
+def _wait_until_they_watch(timers: Iterable[int]) -> None:
+    """Until each has its priority, as it has its handlers of signals by then and begins to look."""
+    until_s = time.monotonic() + PATIENCE_S  # of normal priority until then: seconds on a busy machine
+    waiting = list(timers)
+    while waiting and time.monotonic() < until_s:
+        time.sleep(0.01)
+        waiting = [pid for pid in waiting if os.sched_getscheduler(pid) != os.SCHED_FIFO]
+    assert not waiting, "timers that never began to watch"
+    time.sleep(0.05)  # its priority is the last that a timer takes before it looks
+
+
+@pytest.mark.realtime
 @needs_priority
 def test_timers_that_stand_still_together_tell_of_a_pause_and_one_alone_does_not() -> None:
     watch = PauseWatch()
     try:
         assert watch.refused == ""
-        time.sleep(0.5)  # they start
+        _wait_until_they_watch(timer.pid for timer in watch._timers)
         _hold(watch._timers[:1], 0.2)
         time.sleep(0.2)
         if len(watch.cores) > 1:  # the machine itself may pause in this time, but not for as long
@@ -172,6 +186,7 @@ def test_timers_that_stand_still_together_tell_of_a_pause_and_one_alone_does_not
     assert all(gone(pid) for pid in timers)
 
 
+@pytest.mark.realtime
 @needs_priority
 def test_timers_end_with_a_process_that_is_killed() -> None:
     code = (
@@ -182,15 +197,14 @@ def test_timers_end_with_a_process_that_is_killed() -> None:
     assert parent.stdout is not None
     with parent.stdout:
         timers = [int(word) for word in parent.stdout.readline().split()]
-    time.sleep(0.3)
     assert timers
-    assert not any(gone(pid) for pid in timers)
+    _wait_until_they_watch(timers)
     os.kill(timers[0], signal.SIGINT)  # Ctrl-C is for the recorder
     time.sleep(0.1)
     assert not gone(timers[0])
     parent.kill()
     parent.wait()
-    until_s = time.monotonic() + 5
+    until_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < until_s and not all(gone(pid) for pid in timers):
         time.sleep(0.02)
     assert all(gone(pid) for pid in timers)

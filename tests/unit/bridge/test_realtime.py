@@ -9,6 +9,7 @@ import pytest
 from bridge.wire import realtime
 from bridge.wire.topics import SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Received
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 
@@ -21,7 +22,7 @@ def test_pinning_keeps_every_thread_on_the_core() -> None:
     go_on, found = threading.Event(), list[set[int]]()
 
     def look() -> None:
-        go_on.wait(10)
+        go_on.wait(PATIENCE_S)
         found.append(os.sched_getaffinity(0))
 
     cores, other = os.sched_getaffinity(0), threading.Thread(target=look)
@@ -59,10 +60,10 @@ def test_a_thread_of_the_bus_keeps_its_state_from_message_to_message() -> None:
     with Bus(config, "plant", lockstep=True) as plant, Bus(config, "controller", lockstep=True) as controller:
         controller.listen(SENSORS, receive)
         controller.announce()
-        assert not plant.wait_for({"controller"}, 10.0)
+        assert not plant.wait_for({"controller"}, PATIENCE_S)
         send = plant.publisher(SENSORS)
         for _ in range(200):
             send(b"message")
         for _ in range(200):
-            assert came.acquire(timeout=10)
+            assert came.acquire(timeout=PATIENCE_S)
     assert len(states) == len(set(states))  # one state a thread, not one a message

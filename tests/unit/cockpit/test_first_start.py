@@ -10,6 +10,7 @@ import pytest
 from bridge.faults import Fault
 from bridge.plain import COMPILED, COMPILING, LOADED
 from cockpit.run import processes
+from tests.patience import PATIENCE_S
 
 
 class Child:
@@ -77,14 +78,14 @@ def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys)
     assert child.still == processes.STARTS
     child.process.stdin.write("\n")
     child.process.stdin.flush()
-    until_s = time.monotonic() + 20.0
+    until_s = time.monotonic() + PATIENCE_S
     while child.still != processes.COMPILES and time.monotonic() < until_s:
         time.sleep(0.01)
     assert child.still == processes.COMPILES
     child.process.stdin.write("\n")
     child.process.stdin.close()
-    assert child.process.wait(20) == 0
-    child._reader.join(5.0)
+    assert child.process.wait(PATIENCE_S) == 0
+    child._reader.join(PATIENCE_S)
     assert child.still == processes.READY
     told = capsys.readouterr().err
     assert f"{COMPILING}the plant" in told

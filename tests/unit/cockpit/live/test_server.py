@@ -19,6 +19,7 @@ from cockpit.live.page import Page
 from cockpit.live.server import Server, listening
 from cockpit.live.token import kept_token
 from cockpit.run.operator import Obeyed
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 from tests.unit.cockpit.live.made import table_of_frame
 
@@ -72,10 +73,10 @@ def port() -> Generator[int]:
         made = Server(BusConfig(endpoint=free_endpoint()), TOKEN, at)
         thread = threading.Thread(target=made.run, args=(sock, stop, ready.set))
         thread.start()
-        assert ready.wait(10.0)
+        assert ready.wait(PATIENCE_S)
         yield at
         stop.set()
-        thread.join(10.0)
+        thread.join(PATIENCE_S)
         assert not thread.is_alive()
 
 
@@ -83,7 +84,7 @@ def page_of(port: int) -> Any:
     return connect(f"ws://127.0.0.1:{port}/stream", origin=f"http://127.0.0.1:{port}", max_size=None)  # type: ignore[arg-type]
 
 
-def raw(port: int, request: bytes, timeout_s: float = 10.0) -> bytes:
+def raw(port: int, request: bytes, timeout_s: float = PATIENCE_S) -> bytes:
     """What the server sends until it closes."""
     with socket.create_connection(("127.0.0.1", port), timeout=timeout_s) as sock:
         sock.sendall(request)
@@ -95,7 +96,7 @@ def raw(port: int, request: bytes, timeout_s: float = 10.0) -> bytes:
 
 async def next_of(socket: Any, kind: str) -> dict[str, Any]:
     while True:
-        table, _ = table_of_frame(await asyncio.wait_for(socket.recv(), 10.0))
+        table, _ = table_of_frame(await asyncio.wait_for(socket.recv(), PATIENCE_S))
         if table["kind"] == kind:
             return table
 

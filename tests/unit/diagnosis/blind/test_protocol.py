@@ -21,6 +21,7 @@ from tests.blind import making, strata
 from tests.blind.__main__ import app as making_app
 from tests.blind.sizes import read_sizes
 from tests.blind.stand_ins import StandIn, StandInBench
+from tests.patience import PATIENCE_S
 
 CASES = 8
 
@@ -247,7 +248,7 @@ def test_a_killed_run_keeps_what_is_done(made):
         assert child.poll() is None
         time.sleep(0.05)
     child.send_signal(signal.SIGTERM)
-    assert child.wait(timeout=20) == FAULTS["INTERRUPTED"].exit_status
+    assert child.wait(timeout=PATIENCE_S) == FAULTS["INTERRUPTED"].exit_status
     there = list(results.iterdir())
     assert 0 < len(there) < CASES
     assert all(json.loads(path.read_text())["verdict"] == "effect" for path in there)

@@ -11,6 +11,7 @@ from bridge.faults import Fault
 from bridge.tables.readers import Dialect, read_table
 from diagnosis.evidence.folder import load_evidence
 from diagnosis.evidence.import_table import import_file
+from tests.patience import PATIENCE_S
 from tests.unit.diagnosis.evidence.measured_tables import CSV, GERMAN, MAP, SOURCE, raw, setup, write_raw
 
 
@@ -98,7 +99,7 @@ def test_no_signal_is_lost_while_a_csv_file_is_read(tmp_path):
             while sender.is_alive():
                 read_table(tmp_path / "run.csv")
             sender.join()
-            assert got.wait(5.0), f"signal {sent} was lost"
+            assert got.wait(PATIENCE_S), f"signal {sent} was lost"
             sent += 1
     finally:
         signal.signal(signal.SIGTERM, before)
