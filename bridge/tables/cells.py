@@ -1,5 +1,6 @@
 """Cells of a stored column as numbers or as times: what is neither is NaN, and a finding says where."""
 
+import calendar
 import datetime as dt
 import re
 from collections.abc import Sequence
@@ -19,9 +20,12 @@ _MOST_BAD = 0.5  # share of cells that are neither empty nor numbers, from which
 # blanks and apostrophes that part thousands, all of which are written as one in a dialect
 BLANKS = (" ", "\xa0", "\u202f", "\u2009")
 APOSTROPHES = ("'", "\u2019")
-# hours, minutes and seconds; with a fraction behind the second number, minutes and seconds
-_CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+)?)|([.,]\d+))?\s*([AaPp][Mm])?")
+# hours, minutes, seconds and milliseconds behind a third colon; with a fraction behind the second number, minutes and seconds
+_CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+|:\d{3})?)|([.,]\d+))?\s*([AaPp][Mm])?")
 _DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
+# a month by its English name or its first letters, as MATLAB writes it: `05-Mar-2024`
+_BY_NAME = re.compile(r"(\d{1,2})[- ./]([A-Za-z]{3,9})[- ./](\d{4}|\d{2})(?!\d)")
+_MONTHS = {name.lower(): at for names in (calendar.month_abbr, calendar.month_name) for at, name in enumerate(names)}
 _ORDERS = ("mdy", "dmy", "ymd")  # of a date's numbers: with strokes as in the United States, if nothing tells otherwise
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
 _DAY_S, _HOUR_S = 86400.0, 3600.0
@@ -144,6 +148,7 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
     filled = next((text for text in texts if text.strip()), "")
     if not is_time(filled):
         return None, []
+    texts = [_with_numbers(text) for text in texts] if _BY_NAME.search(filled) else texts
     order = _order_of(texts)
     stamps = [_time_in(text, order) for text in texts]
     # a calendar in seconds would cost microseconds of its digits
@@ -177,6 +182,16 @@ def _order_of(texts: list[str]) -> str:
     return min(_ORDERS, key=unlikely)
 
 
+def _with_numbers(text: str) -> str:
+    """A date as ISO writes it where its month has a name; other texts as they are."""
+    date = _BY_NAME.search(text)
+    month = _MONTHS.get(date[2].lower()) if date else None
+    if date is None or month is None:
+        return text
+    year = date[3] if len(date[3]) == 4 else f"20{date[3]}"
+    return text.replace(date[0], f"{year}-{month:02d}-{date[1]}", 1)
+
+
 def _numbers_of(date: re.Match[str]) -> tuple[int, int, int]:
     return int(date[1]), int(date[3]), int(date[4])
 
@@ -208,7 +223,7 @@ def _time_in(text: str, order: str) -> tuple[int, float] | None:
         return day, 0.0
     if clock[4]:
         return day, 60.0 * int(clock[1]) + float((clock[2] + clock[4]).replace(",", "."))
-    hours, minutes, secs = int(clock[1]), int(clock[2]), float((clock[3] or "0").replace(",", "."))
+    hours, minutes, secs = int(clock[1]), int(clock[2]), float((clock[3] or "0").replace(",", ".").replace(":", "."))
     if clock[5]:
         hours = hours % 12 + (12 if clock[5].lower() == "pm" else 0)
     return day, 3600.0 * hours + 60.0 * minutes + secs
@@ -216,7 +231,7 @@ def _time_in(text: str, order: str) -> tuple[int, float] | None:
 
 def is_time(text: str) -> bool:
     """Whether a cell holds a date or a clock time."""
-    return any(_time_in(text, order) is not None for order in _ORDERS)
+    return any(_time_in(_with_numbers(text), order) is not None for order in _ORDERS)
 
 
 def _of_day(time: Any) -> float:

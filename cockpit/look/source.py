@@ -15,7 +15,7 @@ from bridge.tables.readers import read_table
 from bridge.tables.table import Table
 from bridge.tables.unit_words import in_brackets, known_unit, weight_unit
 from cockpit.look.tare import tare_of
-from cockpit.look.told import of_time
+from cockpit.look.told import of_time, of_values
 from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import ChannelMap
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
@@ -65,7 +65,10 @@ def read_record(path: Path, asked: Asked) -> Record:
         columns, findings = mapped(table, wanted.channels, asked.rate_Hz or wanted.source.sample_rate_Hz)
         speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
         mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
-        findings += of_time(columns["t_s"], f"{path.name}: t_s")
+        findings += [
+            *of_values(table, wanted.channels, columns, findings),
+            *of_time(columns["t_s"], f"{path.name}: t_s"),
+        ]
         if asked.speed_mps is not None:
             columns.pop("drive_position_m", None)
         return _record(path, columns, Known(speed, asked.load_N, mass), findings, "")
@@ -101,7 +104,7 @@ def read_record(path: Path, asked: Asked) -> Record:
         if load_N is None:
             text = f"{found.coefficient!r} is told as a coefficient: the load is not known; add --load 94.5N"
         findings.append(Finding("assumed", path.name, text))
-    findings += of_time(columns["t_s"], f"{path.name}: t_s")
+    findings += [*of_values(table, channels, columns, findings), *of_time(columns["t_s"], f"{path.name}: t_s")]
     zero_N, told = tare_of(columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N")
     findings += told
     if zero_N:

@@ -1,15 +1,43 @@
-"""What is left out of a record because its times do not go on, with a finding for each kind."""
+"""What is left out of a record because it has no value, or its times do not go on, with a finding for each kind."""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
 from bridge.log.finding import Finding
+from bridge.tables.table import Table
 from bridge.units import counted
+from diagnosis.evidence.manifest_keys import ChannelMap
 
 Floats = npt.NDArray[np.float64]
 _GAP_STEPS = 10.0  # usual steps, as where the record is cut
 _MOST_BACK = 0.1  # share of rows that are not later than those before, from which the column is no time of the rows
+
+
+def of_values(
+    table: Table, channels: Mapping[str, ChannelMap], columns: Mapping[str, Floats], findings: Sequence[Finding]
+) -> list[Finding]:
+    """Rows that are left out because a channel has no value there, where `findings` do not tell of as many.
+
+    A cell of a workbook in which a formula ended in an error, such as #DIV/0!, comes as an empty one.
+    """
+    file = table.path.name
+    found: list[Finding] = []
+    for name, channel in channels.items():
+        values = columns[name]
+        where = {f"{file}: column {column}" for column in (channel.column, table.find(channel.column))}
+        known = sum(one.times for one in findings if one.kind in ("not-finite", "outlier") and one.where in where)
+        empty = np.flatnonzero(~np.isfinite(values))
+        if len(empty) > known:
+            text = (
+                f"{counted(len(empty), 'row')} of {len(values)} without a number (an empty cell, or one with an error)"
+            )
+            found.append(
+                Finding("not-finite", f"{file}: {name}", f"{text}, first row {empty[0] + 1}; left out", len(empty))
+            )
+    return found
 
 
 def of_time(t_s: Floats, where: str) -> list[Finding]:

@@ -33,6 +33,7 @@ _SHOWN = 60  # characters of a line in a finding
 def read_text(path: Path, given: Dialect) -> Table:
     """Read a text table; what `given` leaves open is found and said. Raises Fault BAD_TABLE."""
     text, encoding = decoded(path.read_bytes(), given.encoding, path.name)
+    text = text.replace("\u2212", "-")  # a typographer's minus, which no reader of numbers knows
     top = text[:_HEAD_CHARACTERS]
     if '"' in top:
         text = _NAME_OF_LINES.sub(lambda name: re.sub(r"\s+", " ", name[0]), top) + text[_HEAD_CHARACTERS:]

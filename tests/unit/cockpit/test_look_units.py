@@ -70,6 +70,27 @@ def test_formulas_that_nobody_calculated_are_named(tmp_path: Path, formula: str,
     assert told in json.loads(refused.stdout)["line"]
 
 
+def test_cells_without_a_value_are_told_once(tmp_path: Path) -> None:
+    """Those of a workbook with an error come as empty ones; a text in place of a number is told where it is read."""
+    path = tmp_path / "book.xlsx"
+    with xlsxwriter.Workbook(path) as book:
+        sheet = book.add_worksheet()
+        sheet.write_row(0, 0, ["Time [s]", "Force [N]", "Position [mm]"])
+        for row in range(1, 1001):
+            sheet.write_row(row, 0, [row * 1e-3, 8.0 + row % 100 / 50.0, row * 1e-3])
+            if row in (78, 500, 700):
+                sheet.write_formula(row, 1, "=1/0", None, "#DIV/0!")
+            if row in (90, 91):
+                sheet.write_string(row, 2, "lost")
+    findings = json.loads(CliRunner().invoke(app, ["look", str(path), "--json"]).stdout)["findings"]
+    told = {(one["where"].partition(": ")[2], one["text"]) for one in findings if one["kind"] == "not-finite"}
+    without = "3 rows of 1000 without a number (an empty cell, or one with an error), first row 78; left out"
+    assert told == {
+        ("drive_force_N", without),
+        ("column Position [mm]", "2 cells without a number, first row 90 = 'lost'; left out"),
+    }
+
+
 def test_where_no_column_is_the_force_the_sheet_is_named(tmp_path: Path) -> None:
     path = tmp_path / "book.xlsx"
     with xlsxwriter.Workbook(path) as book:
