@@ -90,7 +90,7 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
     left = [name for name in numeric if name not in found.values()]
     if "force" not in found and "coefficient" not in found:
         by_unit = [name for name in left if _in(table, name, "force")]
-        if len(by_unit) != 1 and (empty := _empty_force(table, numeric)):
+        if len(by_unit) != 1 and (empty := _empty(table, "force", numeric)):
             text = f"{table.path.name}: column {empty!r} holds no number: must hold the force, by its name"
             raise Fault(
                 "CONFIG", f'{text}; let a spreadsheet program calculate and save its formulas, or add --force "NAME"'
@@ -103,6 +103,9 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
         reasons.append(f"{what} = {only[0]!r}, the only one left")
     if "position" in found and _flat(table, found["position"]):
         del found["position"]
+    for what in ("load", "position", "speed"):
+        if what not in found and (empty := _empty(table, what, numeric)):
+            reasons.append(f"no {what}, as column {empty!r} holds no number")
     kinds = ("time", "force", "load", "position", "speed", "coefficient")
     time, force, load, position, speed, coefficient = (found.get(what, "") for what in kinds)
     return Guess(time, force, load, position, speed, coefficient, reasons)
@@ -113,11 +116,9 @@ def _in(table: Table, name: str, what: str) -> bool:
     return (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES[what]
 
 
-def _empty_force(table: Table, numeric: list[str]) -> str:
-    """A column that is named as a force and has no cell with a value; empty where there is none."""
-    named = (
-        name for name in table.columns if name not in numeric and re.search(_NAMES["force"], bare_name(name), re.I)
-    )
+def _empty(table: Table, what: str, numeric: list[str]) -> str:
+    """A column that is named as what is wanted and has no cell with a value; empty where there is none."""
+    named = (name for name in table.columns if name not in numeric and re.search(_NAMES[what], bare_name(name), re.I))
     return next((name for name in named if _is_empty(table, name)), "")
 
 

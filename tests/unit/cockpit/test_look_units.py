@@ -75,14 +75,16 @@ def test_cells_without_a_value_are_told_once(tmp_path: Path) -> None:
     path = tmp_path / "book.xlsx"
     with xlsxwriter.Workbook(path) as book:
         sheet = book.add_worksheet()
-        sheet.write_row(0, 0, ["Time [s]", "Force [N]", "Position [mm]"])
+        sheet.write_row(0, 0, ["Time [s]", "Force [N]", "Position [mm]", "Normal load [N]"])
         for row in range(1, 1001):
             sheet.write_row(row, 0, [row * 1e-3, 8.0 + row % 100 / 50.0, row * 1e-3])
             if row in (78, 500, 700):
                 sheet.write_formula(row, 1, "=1/0", None, "#DIV/0!")
             if row in (90, 91):
                 sheet.write_string(row, 2, "lost")
+            sheet.write_formula(row, 3, "=B2", value="")
     findings = json.loads(CliRunner().invoke(app, ["look", str(path), "--json"]).stdout)["findings"]
+    assert "no load, as column 'Normal load [N]' holds no number" in findings[0]["text"]
     told = {(one["where"].partition(": ")[2], one["text"]) for one in findings if one["kind"] == "not-finite"}
     without = "3 rows of 1000 without a number (an empty cell, or one with an error), first row 78; left out"
     assert told == {
