@@ -20,12 +20,14 @@ _MOST_BAD = 0.5  # share of cells that are neither empty nor numbers, from which
 # blanks and apostrophes that part thousands, all of which are written as one in a dialect
 BLANKS = (" ", "\xa0", "\u202f", "\u2009")
 APOSTROPHES = ("'", "\u2019")
-# hours, minutes, seconds and milliseconds behind a third colon; with a fraction behind the second number, minutes and seconds
-_CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+|:\d{3})?)|([.,]\d+))?\s*([AaPp][Mm])?")
+# hours, minutes and seconds, behind a third colon milliseconds (`:1` is one); with a fraction behind the second number, minutes
+# and seconds
+_CLOCK = re.compile(r"(\d{1,3}):(\d{2})(?::(\d{2}(?:[.,]\d+|:\d{1,3}(?![\d:]))?)|([.,]\d+))?\s*([AaPp][Mm])?")
 _DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
 # a month by its English name or its first letters, as MATLAB writes it: `05-Mar-2024`
 _BY_NAME = re.compile(r"(\d{1,2})[- ./]([A-Za-z]{3,9})[- ./](\d{4}|\d{2})(?!\d)")
 _MONTHS = {name.lower(): at for names in (calendar.month_abbr, calendar.month_name) for at, name in enumerate(names)}
+_MONTHS["sept"] = 9
 _ORDERS = ("mdy", "dmy", "ymd")  # of a date's numbers: with strokes as in the United States, if nothing tells otherwise
 _ZONE = re.compile(r"\s*(?:Z|UTC|[+-]\d{2}:?\d{2})$")
 _DAY_S, _HOUR_S = 86400.0, 3600.0
@@ -153,6 +155,8 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
     stamps = [_time_in(text, order) for text in texts]
     # a calendar in seconds would cost microseconds of its digits
     began = next((day for day, _ in filter(None, stamps)), 0)
+    if _counts_frames(texts):
+        return None, []
     times = [None if one is None else (one[0] - began) * _DAY_S + one[1] for one in stamps]
     if sum(time is None for time in times) > _MOST_BAD * len(texts):
         return None, []
@@ -167,6 +171,14 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
         )
         found.append(Finding("not-finite", where, text, len(bad)))
     return counted_on - first, found
+
+
+def _counts_frames(texts: list[str]) -> bool:
+    """Whether frames or hundredths stand behind the third colon of clock times: never three digits, as milliseconds have."""
+    thirds = [
+        clock[3].partition(":")[2] for text in texts if (clock := _CLOCK.search(text)) and ":" in (clock[3] or "")
+    ]
+    return 0 < max(map(len, thirds), default=0) < 3
 
 
 def _order_of(texts: list[str]) -> str:
@@ -223,10 +235,15 @@ def _time_in(text: str, order: str) -> tuple[int, float] | None:
         return day, 0.0
     if clock[4]:
         return day, 60.0 * int(clock[1]) + float((clock[2] + clock[4]).replace(",", "."))
-    hours, minutes, secs = int(clock[1]), int(clock[2]), float((clock[3] or "0").replace(",", ".").replace(":", "."))
+    hours, minutes, secs = int(clock[1]), int(clock[2]), _seconds_in(clock[3] or "0")
     if clock[5]:
         hours = hours % 12 + (12 if clock[5].lower() == "pm" else 0)
     return day, 3600.0 * hours + 60.0 * minutes + secs
+
+
+def _seconds_in(text: str) -> float:
+    whole, _, milliseconds = text.partition(":")
+    return float(whole.replace(",", ".")) + 1e-3 * float(milliseconds or 0.0)
 
 
 def is_time(text: str) -> bool:

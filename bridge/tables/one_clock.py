@@ -33,10 +33,9 @@ def with_own_rows(t_s: Floats, columns: dict[str, Floats]) -> bool:
 
 def _has_own_rows(t_s: Floats, values: Floats) -> bool:
     empty = ~np.isfinite(values) & np.isfinite(t_s)
-    if not _OWN_ROWS < empty.mean() < 1.0:
-        return False
     rows = np.flatnonzero(~empty)
-    if len(rows) < 2:
+    # a column that begins later or ends sooner than the others is empty there, and full in between
+    if len(rows) < 2 or empty[rows[0] : rows[-1]].mean() <= _OWN_ROWS:
         return False
     # a sensor that failed leaves one long stretch; rows of its own are spread over the file
     return float(np.quantile(np.diff(rows), 0.9)) <= 20.0 * float(np.median(np.diff(rows))) and rows[-1] - rows[

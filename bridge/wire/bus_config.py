@@ -12,7 +12,7 @@ from bridge.config import Strict
 class BusConfig(Strict):
     """Address and key prefix of the bus of one rig, and where the certificates are."""
 
-    endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/.+:\d{1,5}$")] = "tcp/127.0.0.1:7447"
+    endpoint: Annotated[str, Field(pattern=r"^(tcp|tls)/[^\s,?/]+:[0-9]{1,5}$")] = "tcp/127.0.0.1:7447"
     prefix: Annotated[str, Field(pattern=r"^[^/*$?#]+(/[^/*$?#]+)*$")] = "rig"
     certificates: str = Field(
         default="",

@@ -20,7 +20,7 @@ from diagnosis.evidence.import_table import ImportMap
 from diagnosis.evidence.manifest_keys import ChannelMap
 from diagnosis.evidence.mapped import calendar_unit_s, has_time, mapped
 from diagnosis.evidence.run_log import columns_of_log
-from diagnosis.look.guess import Guess, guess
+from diagnosis.look.guess import Guess, guess, no_time
 from diagnosis.look.look import Known
 from diagnosis.look.record import FEWEST
 from diagnosis.look.whose_way import is_of_slide
@@ -66,7 +66,7 @@ def read_record(path: Path, asked: Asked) -> Record:
         speed = asked.speed_mps if asked.speed_mps is not None else wanted.run.drive_velocity_mps
         mass = asked.mass_kg if asked.mass_kg is not None else wanted.rig.get("mass_kg")
         findings += [
-            *of_values(table, wanted.channels, columns, findings),
+            *of_values(table, _as_read(wanted.channels, columns), findings),
             *of_time(columns["t_s"], f"{path.name}: t_s"),
         ]
         if asked.speed_mps is not None:
@@ -77,7 +77,7 @@ def read_record(path: Path, asked: Asked) -> Record:
     channels = _channels(table, found)
     if asked.rate_Hz is None and not has_time(table, channels):
         known = ", ".join(f'"{name}"' for name in table.columns)
-        line = f"{path.name}: no time: which column is it, or how many rows a second are there?"
+        line = f"{path.name}: no time: {no_time(table)}which column is it, or how many rows a second are there?"
         raise Fault("CONFIG", f'{line} Add --time "NAME" or --rate 1kHz; columns here: {known}')
     torsion = bool(found.force) and (known_unit(table.unit(found.force)) or ("",))[0] == "torque"
     if asked.speed_turns not in (None, torsion):
@@ -93,8 +93,15 @@ def read_record(path: Path, asked: Asked) -> Record:
         findings.append(Finding("assumed", path.name, text))
     load_N, of_load = asked.load_N, not found.force and bool(found.coefficient)
     if load_N is None and found.load and not torsion:
-        load_N = float(np.nanmean(np.abs(_si(table, found.load, "N", findings))))
-        findings.append(Finding("assumed", path.name, f"load = mean of {found.load!r}, {load_N:.6g} N"))
+        loads_N = _si(table, found.load, "N", findings)
+        findings += of_values(table, {found.load: loads_N}, table.findings)
+        load_N = float(np.nanmean(np.abs(loads_N))) or None
+        text = (
+            f"load = mean of {found.load!r}, {load_N:.6g} N"
+            if load_N
+            else f"{found.load!r} is 0 throughout: no load; add --load 94.5N"
+        )
+        findings.append(Finding("assumed", path.name, text))
     if of_load:
         factor = load_N or 1.0
         columns["drive_force_N"] = columns["drive_force_N"] * factor
@@ -104,7 +111,10 @@ def read_record(path: Path, asked: Asked) -> Record:
         if load_N is None:
             text = f"{found.coefficient!r} is told as a coefficient: the load is not known; add --load 94.5N"
         findings.append(Finding("assumed", path.name, text))
-    findings += [*of_values(table, channels, columns, findings), *of_time(columns["t_s"], f"{path.name}: t_s")]
+    findings += [
+        *of_values(table, _as_read(channels, columns), findings),
+        *of_time(columns["t_s"], f"{path.name}: t_s"),
+    ]
     zero_N, told = tare_of(columns["drive_force_N"], columns.get("drive_position_m"), f"{path.name}: drive_force_N")
     findings += told
     if zero_N:
@@ -173,6 +183,10 @@ def _channels(table: Table, found: Guess) -> dict[str, ChannelMap]:
     if found.position:
         channels["drive_position_m"] = ChannelMap(column=found.position)
     return channels
+
+
+def _as_read(channels: dict[str, ChannelMap], columns: dict[str, Floats]) -> dict[str, Floats]:
+    return {str(channel.column): columns[name] for name, channel in channels.items()}
 
 
 def _si(table: Table, column: str, unit: str, findings: list[Finding]) -> Floats:

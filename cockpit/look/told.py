@@ -7,36 +7,38 @@ import numpy.typing as npt
 
 from bridge.faults import Fault
 from bridge.log.finding import Finding
+from bridge.tables.one_clock import with_own_rows
 from bridge.tables.table import Table
 from bridge.units import counted
-from diagnosis.evidence.manifest_keys import ChannelMap
 
 Floats = npt.NDArray[np.float64]
 _GAP_STEPS = 10.0  # usual steps, as where the record is cut
 _MOST_BACK = 0.1  # share of rows that are not later than those before, from which the column is no time of the rows
 
 
-def of_values(
-    table: Table, channels: Mapping[str, ChannelMap], columns: Mapping[str, Floats], findings: Sequence[Finding]
-) -> list[Finding]:
-    """Rows that are left out because a channel has no value there, where `findings` do not tell of as many.
+def of_values(table: Table, columns: Mapping[str, Floats], findings: Sequence[Finding]) -> list[Finding]:
+    """Rows that are left out because a column has no value there, where `findings` do not tell of as many.
 
     A cell of a workbook in which a formula ended in an error, such as #DIV/0!, comes as an empty one.
+
+    Args:
+        table: the file.
+        columns: as they were read, [rows] each, by the names that find them in the table.
+        findings: what is told already.
+
     """
     file = table.path.name
     found: list[Finding] = []
-    for name, channel in channels.items():
-        values = columns[name]
-        where = {f"{file}: column {column}" for column in (channel.column, table.find(channel.column))}
+    for name, values in columns.items():
+        where = {f"{file}: column {column}" for column in (name, table.find(name))}
         known = sum(one.times for one in findings if one.kind in ("not-finite", "outlier") and one.where in where)
         empty = np.flatnonzero(~np.isfinite(values))
-        if len(empty) > known:
+        if len(empty) > known and not with_own_rows(np.arange(float(len(values))), {name: values}):
             text = (
                 f"{counted(len(empty), 'row')} of {len(values)} without a number (an empty cell, or one with an error)"
             )
-            found.append(
-                Finding("not-finite", f"{file}: {name}", f"{text}, first row {empty[0] + 1}; left out", len(empty))
-            )
+            text += f", first row {empty[0] + 1}; left out"
+            found.append(Finding("not-finite", f"{file}: column {name}", text, len(empty)))
     return found
 
 

@@ -66,6 +66,7 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
             found[what] = column
             reasons.append(f"{what} = {column!r} by its name")
     if "load" in found and "load" not in given and not {"force", "coefficient"} & found.keys():
+        _refuse_empty_force(table, numeric)
         found["force"] = found.pop("load")  # what a testing machine calls the load is the force that it measures
         reasons = [reason for reason in reasons if not reason.startswith("load = ")]
         reasons.append(f"force = {found['force']!r}, as no other column is one")
@@ -90,11 +91,8 @@ def guess(table: Table, given: dict[str, str]) -> Guess:
     left = [name for name in numeric if name not in found.values()]
     if "force" not in found and "coefficient" not in found:
         by_unit = [name for name in left if _in(table, name, "force")]
-        if len(by_unit) != 1 and (empty := _empty(table, "force", numeric)):
-            text = f"{table.path.name}: column {empty!r} holds no number: must hold the force, by its name"
-            raise Fault(
-                "CONFIG", f'{text}; let a spreadsheet program calculate and save its formulas, or add --force "NAME"'
-            )
+        if len(by_unit) != 1:
+            _refuse_empty_force(table, numeric)
         only = by_unit if len(by_unit) == 1 else [one for one in left if not (_OTHER.search(one) or _rises(table, one))]
         if len(only) != 1:
             raise Fault("CONFIG", _ask(table, numeric))
@@ -116,17 +114,38 @@ def _in(table: Table, name: str, what: str) -> bool:
     return (known_unit(table.unit(name)) or ("",))[0] in _QUANTITIES[what]
 
 
+def _refuse_empty_force(table: Table, numeric: list[str]) -> None:
+    """Raise Fault CONFIG where a column is named as the force and holds no number: another one must not stand for it."""
+    if empty := _empty(table, "force", numeric):
+        text = f"{table.path.name}: column {empty!r} holds no number: must hold the force, by its name"
+        raise Fault(
+            "CONFIG", f'{text}; let a spreadsheet program calculate and save its formulas, or add --force "NAME"'
+        )
+
+
+def no_time(table: Table) -> str:
+    """Of a column of texts that is named as a time, what cannot be read, in words; empty where there is none."""
+    for name, values in table.columns.items():
+        if re.search(_NAMES["time"], bare_name(name), re.IGNORECASE):
+            try:
+                table.column(name)
+            except Fault:
+                return f"column {name!r} begins with {str(values[0])[:40]!r}, which is not read as a number, date or clock time; "
+    return ""
+
+
 def _empty(table: Table, what: str, numeric: list[str]) -> str:
     """A column that is named as what is wanted and has no cell with a value; empty where there is none."""
     named = (name for name in table.columns if name not in numeric and re.search(_NAMES[what], bare_name(name), re.I))
-    return next((name for name in named if _is_empty(table, name)), "")
+    return next((name for name in named if _is_empty(table, what, name)), "")
 
 
-def _is_empty(table: Table, name: str) -> bool:
+def _is_empty(table: Table, what: str, name: str) -> bool:
+    """Whether no cell holds a number; where there are words in their place, only of a column that states its unit."""
     try:
         return not np.isfinite(table.column(name)).any()
     except Fault:
-        return False
+        return _in(table, name, what)
 
 
 def _ask(table: Table, numeric: list[str]) -> str:

@@ -61,7 +61,9 @@ def headline(seen: Look) -> str:
         return f"no slip in {seen.seconds:.3g} s: {level}"
     if not seen.sticks:
         swings = f"{counted(len(seen.cycles), 'swing')} in {seen.seconds:.3g} s"
-        return f"{swings} without a straight climb: it swings, and no stick is seen"
+        both_ways = len({part.sign for part in seen.parts}) > 1
+        tared = "; where the force was tared about zero, give its zero back by the offset in a map" if both_ways else ""
+        return f"{swings} without a straight climb: it swings, and no stick is seen{tared}"
     rate = 60.0 * seen.slips / seen.seconds
     text = f"{counted(seen.slips, 'slip')} in {seen.seconds:.3g} s, {rate:.3g} per minute"
     period = seen.numbers.get("period_s")

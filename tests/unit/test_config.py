@@ -146,6 +146,8 @@ def test_a_misspelt_key_is_not_told_as_a_missing_one_too() -> None:
         (["bus.endpoint=udp/127.0.0.1:7447"], ["bus.endpoint", "udp/127.0.0.1:7447", "tcp"]),
         (["bus.endpoint=tcp/127.0.0.1:99999"], ["bus.endpoint", "tcp/127.0.0.1:99999", "from 1 to 65535"]),
         (["bus.endpoint=tcp/127.0.0.1:0"], ["bus.endpoint", "from 1 to 65535"]),
+        (["bus.endpoint=tls/127.0.0.1:1,tcp/127.0.0.1:2"], ["bus.endpoint", "must have the form of"]),
+        (["bus.endpoint=tcp/127.0.0.1:\uff11\uff17"], ["bus.endpoint", "must have the form of"]),
         (["bus.certificates=keys"], ["--set bus.certificates=keys: bus: certificates = 'keys'", "must be a tls/ one"]),
         (["rig.drive.profile=[[1.0, 0.1], [0.5, 0.1]]"], ["profile", "must increase"]),
         (

@@ -27,13 +27,17 @@ _PIECES, _PIECE_CHARACTERS = 12, 4096  # of the rest, in which the form of the r
 _MOST_LEFT_OUT = 0.1  # share of rows with too many or too few cells, from which it is another kind of file
 # a quoted name over several lines, as spreadsheets write a cell with line breaks; a quote elsewhere is an inch
 _NAME_OF_LINES = re.compile(r'(?:^|(?<=[,;\t|]))"[^"\r\n]{0,80}[\r\n][^"]{0,80}"(?=[,;\t|\r\n]|\Z)', re.MULTILINE)
+# as word processors write a minus, which no reader of numbers knows: the one of typographers, a dash, and the wide one
+_MINUS = ("\u2212", "\u2013", "\uff0d")
+_MINUS_OF_NUMBER = re.compile(rf'(?<![^\n\r;,\t |"eE])[{"".join(_MINUS)}](?=[\d.,])')
 _SHOWN = 60  # characters of a line in a finding
 
 
 def read_text(path: Path, given: Dialect) -> Table:
     """Read a text table; what `given` leaves open is found and said. Raises Fault BAD_TABLE."""
     text, encoding = decoded(path.read_bytes(), given.encoding, path.name)
-    text = text.replace("\u2212", "-")  # a typographer's minus, which no reader of numbers knows
+    if any(minus in text for minus in _MINUS):
+        text = _MINUS_OF_NUMBER.sub("-", text)
     top = text[:_HEAD_CHARACTERS]
     if '"' in top:
         text = _NAME_OF_LINES.sub(lambda name: re.sub(r"\s+", " ", name[0]), top) + text[_HEAD_CHARACTERS:]

@@ -88,9 +88,61 @@ def test_cells_without_a_value_are_told_once(tmp_path: Path) -> None:
     told = {(one["where"].partition(": ")[2], one["text"]) for one in findings if one["kind"] == "not-finite"}
     without = "3 rows of 1000 without a number (an empty cell, or one with an error), first row 78; left out"
     assert told == {
-        ("drive_force_N", without),
+        ("column Force [N]", without),
         ("column Position [mm]", "2 cells without a number, first row 90 = 'lost'; left out"),
     }
+
+
+@pytest.mark.parametrize("cell", ["", "#VALUE!"])
+def test_a_load_does_not_stand_for_a_force_without_numbers(tmp_path: Path, cell: str) -> None:
+    rows = "".join(f"{1e-3 * row:.3f};{cell};{94.5 + 0.01 * (row % 7):.2f}\n" for row in range(1000))
+    (tmp_path / "a.csv").write_text(f"Time [s];Friction force [N];Fz\n{rows}")
+    refused = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--json"])
+    assert "column 'Friction force [N]' holds no number: must hold the force" in json.loads(refused.stdout)["line"]
+
+
+def test_a_column_that_ends_sooner_is_told_with_its_row(tmp_path: Path) -> None:
+    t_s, force_N, drive_mm = saw_teeth()
+    there = len(t_s) - 1000
+    rows = [f"{t:.6g},{f:.6g},{x:.6g}" for t, f, x in zip(t_s, force_N, drive_mm, strict=True)]
+    rows[there:] = [row.rpartition(",")[0] + "," for row in rows[there:]]
+    (tmp_path / "a.csv").write_text("\n".join(["t [s],F [N],Position [mm]", *rows]))
+    told = said(seen_in(tmp_path / "a.csv"))
+    assert (
+        f"1000 rows of {len(t_s)} without a number (an empty cell, or one with an error), first row {there + 1}" in told
+    )
+    assert "clock" not in told
+
+
+def test_loads_that_are_missing_or_all_0_are_told(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    some = table_of(tmp_path / "a.csv", "t [s],F [N],Normal load [N]", t_s, force_N, np.where(t_s < 0.1, np.nan, 94.5))
+    assert "50 rows of 4000 without a number" in said(seen_in(some))
+    tenth = table_of(
+        tmp_path / "c.csv", "t [s],F [N],Normal load [N]", t_s, force_N, np.where(np.arange(4000) % 10, np.nan, 94.5)
+    )
+    assert "without a number" not in said(seen_in(tenth))
+    none = table_of(tmp_path / "b.csv", "t [s],F [N],Normal load [N]", t_s, force_N, np.zeros(len(t_s)))
+    assert "'Normal load [N]' is 0 throughout: no load; add --load 94.5N" in said(seen_in(none))
+
+
+def test_a_force_that_was_tared_about_zero_is_seen_with_its_offset(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    path = table_of(tmp_path / "a.csv", "t [s],F [N]", t_s, force_N - 14.5)
+    assert seen_in(path, "--out", str(tmp_path / "map.toml"))["headline"].endswith("by the offset in a map")
+    written = (tmp_path / "map.toml").read_text()
+    (tmp_path / "map.toml").write_text(written.replace('column = "F [N]",', 'column = "F [N]", offset = 14.5,'))
+    seen = seen_in(path, "--map", str(tmp_path / "map.toml"))
+    assert seen["numbers"]["static_force_N"]["value"] == pytest.approx(16.0, abs=0.1)
+
+
+def test_a_time_that_cannot_be_read_is_shown(tmp_path: Path) -> None:
+    rows = "".join(f"{1 + row // 500:02d}-Foo-2024 10:00:00;{row % 50}\n" for row in range(1000))
+    (tmp_path / "a.csv").write_text(f"Time;F [N]\n{rows}")
+    refused = CliRunner().invoke(app, ["look", str(tmp_path / "a.csv"), "--json"])
+    assert (
+        "column 'Time' begins with '01-Foo-2024 10:00:00', which is not read as" in json.loads(refused.stdout)["line"]
+    )
 
 
 def test_where_no_column_is_the_force_the_sheet_is_named(tmp_path: Path) -> None:

@@ -160,6 +160,8 @@ KINDS = (
     Kind("month-by-name.csv", "Date,F\n" + rows([f"{s[8:10]}-Mar-2026 {s[11:]}" for s in _STAMPS], FORCE), ("Date", "F", ""), says="counted in seconds from the first row"),
     Kind("short-year-after-month.csv", "Date,F\n" + rows([f"{s[8:10]}-march-{s[2:4]} {s[11:]}" for s in _STAMPS], FORCE), ("Date", "F", "")),
     Kind("milliseconds.csv", "Time,F\n" + rows([f"{s[11:19]}:{s[20:23]}" for s in _STAMPS], FORCE), ("Time", "F", ""), says="counted in seconds from the first row"),
+    Kind("milliseconds-not-padded.csv", "Time;F\n" + rows([f"{s[11:19]}:{int(s[20:23])}" for s in _STAMPS], FORCE, sep=";"), ("Time", "F", "")),
+    Kind("dash.csv", "t,F\n" + rows(T, [f"\u2013{f:.5f}" for f in FORCE]), ("t", "F", ""), force_too=-1.0),
     Kind("minus.csv", "t,F\n" + rows(T, [f"\u2212{f:.5f}" for f in FORCE]), ("t", "F", ""), force_too=-1.0),
     Kind("hash-comments.csv", "# rig 7, 2026-03-01\n# 500 Hz\nt,F\n" + rows(T, FORCE), ("t", "F", "")),
     Kind("klipper.csv", "#time,accel_x,accel_y\n" + rows(T, FORCE, POSITION, form="{:.8f}"), ("time", "accel_x", "accel_y")),
