@@ -18,6 +18,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import sensor_block
 from bridge.wire.topics import APPLIED, SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
+from tests.system.lost import lost_of
 from tests.system.ports import free_endpoint
 from tests.system.rogue import rogue, say
 from tests.system.run_under_way import COMMAND
@@ -83,7 +84,7 @@ def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None
             with rogue(endpoint) as session:
                 attack(session, applied.sequence)
             time.sleep(1.5)
-            assert not viewer.wait_for({"plant", "controller", "recorder"}, 5.0)
+            assert not viewer.wait_for({"plant", "controller", "recorder"}, 60.0)
         run.send_signal(signal.SIGINT)
         out, err = run.communicate(timeout=60)
     finally:
@@ -99,9 +100,11 @@ def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None
     numbers = data.sensors["sequence"].astype(np.int64)
     gaps = np.diff(numbers, prepend=-1) - 1
     assert gaps.min() >= 0
-    assert 0 <= gaps.sum() < 0.02 * len(numbers)
+    assert gaps.sum() == lost_of(data.events)["/sensors"]
     before, after = data.applied[1000 : applied.sequence], data.applied[applied.sequence :]
-    assert after["amplitude_m"].max() < 1.2 * before["amplitude_m"].max()
+    # a controller that the machine kept from its rig feels its way anew, and goes beyond what it needs
+    alone = {"FALLBACK", "STALE"} & {event.code for event in data.events}
+    assert after["amplitude_m"].max() < (2.0 if alone else 1.2) * before["amplitude_m"].max()
     assert after["fallback"].mean() < 0.1  # a busy machine may be late
     told = Counter(event.code for event in data.events)
     assert {"BAD_MESSAGE", "FOREIGN"} <= set(told)

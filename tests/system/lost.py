@@ -1,0 +1,15 @@
+"""What a log tells was lost on its way: a machine that stands still for longer than a link waits costs messages."""
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+
+from bridge.wire import stickslip_pb2 as wire
+
+_GAP = re.compile(r"(/\S+): (\d+) lost before \d+")
+
+
+def lost_of(events: Iterable[wire.Event]) -> Counter[str]:
+    """Messages that were lost, by topic; none on a machine that runs on."""
+    found = (_GAP.fullmatch(event.text) for event in events if event.code == "GAP")
+    return sum((Counter({gap[1]: int(gap[2])}) for gap in found if gap), Counter())
