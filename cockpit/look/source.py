@@ -186,6 +186,7 @@ def _channels(table: Table, found: Guess) -> dict[str, ChannelMap]:
 
 
 def _as_read(channels: dict[str, ChannelMap], columns: dict[str, Floats]) -> dict[str, Floats]:
+    """Columns by the names that find them in the table."""
     return {str(channel.column): columns[name] for name, channel in channels.items()}
 
 

@@ -137,6 +137,8 @@ def no_time(table: Table) -> str:
 def _empty(table: Table, what: str, numeric: list[str]) -> str:
     """A column that is named as what is wanted and has no cell with a value; empty where there is none."""
     named = (name for name in table.columns if name not in numeric and re.search(_NAMES[what], bare_name(name), re.I))
+    if what == "force":
+        named = (name for name in named if not re.search(_NAMES["load"], bare_name(name), re.I))  # a normal force
     return next((name for name in named if _is_empty(table, what, name)), "")
 
 

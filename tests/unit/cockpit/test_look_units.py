@@ -101,6 +101,14 @@ def test_a_load_does_not_stand_for_a_force_without_numbers(tmp_path: Path, cell:
     assert "column 'Friction force [N]' holds no number: must hold the force" in json.loads(refused.stdout)["line"]
 
 
+def test_a_normal_force_without_numbers_hides_no_force(tmp_path: Path) -> None:
+    t_s, force_N, _ = saw_teeth()
+    rows = "".join(f"{t:.6g};;{f:.6g}\n" for t, f in zip(t_s, force_N, strict=True))
+    (tmp_path / "a.csv").write_text(f"Time [s];Normal force [N];Load [N]\n{rows}")
+    seen = seen_in(tmp_path / "a.csv")
+    assert "force = 'Load [N]', as no other column is one" in said(seen)
+
+
 def test_a_column_that_ends_sooner_is_told_with_its_row(tmp_path: Path) -> None:
     t_s, force_N, drive_mm = saw_teeth()
     there = len(t_s) - 1000
