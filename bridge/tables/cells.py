@@ -155,7 +155,7 @@ def _times_from_text(texts: list[str], where: str) -> tuple[Floats | None, list[
     stamps = [_time_in(text, order) for text in texts]
     # a calendar in seconds would cost microseconds of its digits
     began = next((day for day, _ in filter(None, stamps)), 0)
-    if _counts_frames(texts):
+    if filled.count(":") > 2 and _counts_frames(texts):
         return None, []
     times = [None if one is None else (one[0] - began) * _DAY_S + one[1] for one in stamps]
     if sum(time is None for time in times) > _MOST_BAD * len(texts):

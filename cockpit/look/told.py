@@ -33,6 +33,7 @@ def of_values(table: Table, columns: Mapping[str, Floats], findings: Sequence[Fi
         where = {f"{file}: column {column}" for column in (name, table.find(name))}
         known = sum(one.times for one in findings if one.kind in ("not-finite", "outlier") and one.where in where)
         empty = np.flatnonzero(~np.isfinite(values))
+        # rows of its own are told as a clock of its own
         if len(empty) > known and not with_own_rows(np.arange(float(len(values))), {name: values}):
             text = (
                 f"{counted(len(empty), 'row')} of {len(values)} without a number (an empty cell, or one with an error)"

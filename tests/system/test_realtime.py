@@ -43,7 +43,9 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     # after the last of 6 s the vibration fades
     assert 6000 <= len(data.sensors) + lost["/sensors"] < 6100, result.stderr
     # how soon the answers come is for the bench to say; that they come at all, or are told as lost, is for this test
-    for answered in (data.trace["block"][data.trace["events"] & BLOCK != 0], data.command["block"]):
+    traced = data.trace["block"][data.trace["events"] & BLOCK != 0]
+    assert (np.diff(traced.astype(np.int64)) > 0).all()
+    for answered in (traced, data.command["block"]):
         assert len(np.setxor1d(answered, data.sensors["sequence"])) <= lost.total(), lost
     assert int(data.applied["commands"].sum()) + lost.total() > 5700  # a pause at the end leaves some under way
     assert set(data.headers) == {"run", "plant", "controller", "verdict"}

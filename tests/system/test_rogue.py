@@ -102,9 +102,10 @@ def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None
     assert gaps.min() >= 0
     assert gaps.sum() == lost_of(data.events)["/sensors"]
     before, after = data.applied[1000 : applied.sequence], data.applied[applied.sequence :]
-    # a controller that the machine kept from its rig feels its way anew, and goes beyond what it needs
-    alone = {"FALLBACK", "STALE"} & {event.code for event in data.events}
-    assert after["amplitude_m"].max() < (2.0 if alone else 1.2) * before["amplitude_m"].max()
+    # no more than the rig's own controller wants, which is what it was unless the machine kept the two apart
+    assert after["amplitude_m"].max() <= data.trace["wanted_amplitude_m"].max()
+    if not {"FALLBACK", "STALE"} & {event.code for event in data.events}:
+        assert after["amplitude_m"].max() < 1.2 * before["amplitude_m"].max()
     assert after["fallback"].mean() < 0.1  # a busy machine may be late
     told = Counter(event.code for event in data.events)
     assert {"BAD_MESSAGE", "FOREIGN"} <= set(told)
