@@ -8,4 +8,6 @@ config    strict TOML                              faults   codes, exit statuses
 files     checks before reading, atomic writing    units    units in names, numbers in words
 provenance   what made a page or a picture: version, command, date, hashes
 kernel, kernel_cache   compiled code; where it is kept, and what renews it
+kernel_linking   how kernels that call each other are compiled once
+compiling   how many kernels are left to compile, and what a command guards that time with
 """

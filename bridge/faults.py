@@ -133,6 +133,13 @@ FAULTS = {
             "Else end other programs, raise the limit, or take a part of the file.",
         ),
         FaultKind(
+            "NOT_JUDGED",
+            14,
+            "The verdict on a run can be neither ok nor not ok: nothing was tested, a sensor that decides does not work, or "
+            "blocks are missing where they decide (more than 1 %, or within a slip). The line `control` has the reason. "
+            "Repeat the run; where blocks are missing, `data` and `computer` show who lost them.",
+        ),
+        FaultKind(
             "INTERRUPTED",
             130,
             "Somebody pressed Ctrl-C, ended the command (SIGTERM), or closed its terminal (SIGHUP). In real time the vibration "

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from llvmlite.binding import get_host_cpu_features
 
 from bridge.kernel_cache import FOLDER, usable_folder
+from bridge.kernel_linking import Kernel, SharedKernel
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -22,6 +23,8 @@ Record = Any
 
 _settings: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
 _settings.CACHE_DIR = os.environ[FOLDER] = str(usable_folder())  # for this process and its children
+# the colours of thousands of messages that numba alone reads are 3 % of a compilation
+_settings.DISABLE_ERROR_MESSAGE_HIGHLIGHTING = True
 _settings.CACHE_LOCATOR_CLASSES = "bridge.kernel_cache.SourcesLocator"
 
 
@@ -38,19 +41,39 @@ _layouts: Any = numba.types.Record
 _layouts.mangling_args = property(_named_by_content)
 
 
+def _written_once(layout: Any, write: Callable[[Any], str] = _layouts.__repr__) -> str:
+    """The text of a layout, kept with it: numba asks for it 9000 times for the controller, 8 % of its compilation."""
+    kept: dict[str, str] = layout.__dict__
+    if "text" not in kept:
+        kept["text"] = write(layout)
+    return kept["text"]
+
+
+_layouts.__repr__ = _written_once
+
+
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function`. With `NUMBA_DISABLE_JIT=1` it runs interpreted, with the same bits.
+    """Compile `function`, as a part of each kernel that calls it. With `NUMBA_DISABLE_JIT=1` it runs interpreted: equal bits.
 
     `fastmath` stays off and kernels use `math.*` on scalars: fast maths and numpy's vector maths both change the last bit, and
     replay guarantees equal bits. With numpy's rules for division (1 / 0 is infinite) numba checks no divisor.
     """
-    compiled: Any = numba.njit(cache=True, fastmath=False, error_model="numpy")(function)
+    compiled: Any = function if _settings.DISABLE_JIT else Kernel(function)
+    return compiled
+
+
+def shared_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """As `kernel`, and compiled once for all kernels that call it: for a step that runs in several loops.
+
+    A call costs some 50 ns more than that of a `kernel`. It must be a function of a module, under its own name.
+    """
+    compiled: Any = function if _settings.DISABLE_JIT else SharedKernel(function)
     return compiled
 
 
 def unlocked_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """As `kernel`, and other threads of Python go on while it runs: for calls of a millisecond and more."""
-    compiled: Any = numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True)(function)
+    compiled: Any = function if _settings.DISABLE_JIT else Kernel(function, unlocked=True)
     return compiled
 
 

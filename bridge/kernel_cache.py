@@ -16,7 +16,8 @@ from pathlib import Path
 
 from numba.core.caching import UserProvidedCacheLocator
 
-from bridge.plain import ANOTHER_COMPILES, COMPILED, COMPILING, say
+from bridge.compiling import compiling
+from bridge.plain import ANOTHER_COMPILES, say
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("bridge", "controller", "plant", "diagnosis", "cockpit")
@@ -84,38 +85,32 @@ def mark_of(what: str, path: Path, root: Path = ROOT) -> str:
     return f"{what}-{place}-{sources_digest(path, root)}"
 
 
-def compile_once(what: str, compiling: Callable[[], object]) -> None:
-    """Call `compiling`, which calls kernels for the first time. Of several processes one compiles, and the others wait.
+def compile_once(what: str, load: Callable[[], object]) -> None:
+    """Call `load`, which calls kernels for the first time. Of several processes one compiles them, and the others wait.
 
     Args:
         what: of whose kernels, in words that make a file name.
-        compiling: compiles the kernels, or loads them where they are kept.
+        load: compiles the kernels, or loads them where they are kept.
 
     """
     folder = Path(os.environ[FOLDER])
-    done = folder / mark_of(what, Path(sys.modules[compiling.__module__].__file__ or ""))
-    if done.exists():
-        compiling()
-        return
-    with (folder / f"{what}.lock").open("a") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            _say(f"{ANOTHER_COMPILES}{what}: waiting for it")
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        except OSError:  # a file system without locks: each process compiles
-            pass
-        if not done.exists():
-            _say(f"{COMPILING}{what} (first start of this version, about a minute)")
-        compiling()
-        for old in folder.glob(f"{done.name.rpartition('-')[0]}-*"):
-            old.unlink(missing_ok=True)
-        done.touch()
-    _say(f"{COMPILED}{what}")
-
-
-def _say(words: str) -> None:
-    print(f"stickslip: {words}", file=sys.stderr, flush=True)
+    done = folder / mark_of(what, Path(sys.modules[load.__module__].__file__ or ""))
+    with compiling(load.__module__):
+        if done.exists():
+            load()
+            return
+        with (folder / f"{what}.lock").open("a") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                say(f"stickslip: {ANOTHER_COMPILES}{what}: waiting for it")
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            except OSError:  # a file system without locks: each process compiles
+                pass
+            load()
+            for old in folder.glob(f"{done.name.rpartition('-')[0]}-*"):
+                old.unlink(missing_ok=True)
+            done.touch()
 
 
 def _is_ours(folder: Path) -> bool:

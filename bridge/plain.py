@@ -8,10 +8,8 @@ from collections.abc import Callable
 # forge what a person reads, and an escape code can do more (rename the window, answer in the person's name)
 _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
 
-# what a process says on stderr of its compiled kernels; who has started it reads these words
-COMPILING = "compiling the kernels of "
+# what a process reports on stderr where it waits; the process that has started it reads these words
 ANOTHER_COMPILES = "another process compiles the kernels of "
-COMPILED = "compiled are the kernels of "
 # and once it has loaded all that it needs, and only waits for the others
 LOADED = "loaded"
 

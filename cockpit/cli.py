@@ -45,7 +45,7 @@ app.command(
         "stickslip run",
         "stickslip run --in-process --set controller.limits.v_ratio=1.3",
         "stickslip run --scenario stop-and-go --log runs/axis.mcap",
-        "stickslip run --set duration_s=0          until Ctrl-C",
+        "stickslip run --scenario belt-axis --set duration_s=0          until Ctrl-C",
         "stickslip run --lockstep --json > verdict.json",
     ),
 )(run)

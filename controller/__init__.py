@@ -18,7 +18,7 @@ core           one step of all of these
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
 doubts         what is wrong with what it receives; rig_header: whether the rig is one that it can control
-replay         the controller on the frames of a log
+replay         the controller on the frames of a log, piece by piece; replay_steps: its steps beside the log's
 codes          modes, states, reasons and limits as numbers
 loop_design    margins of the amplitude loop where its delay is off
 

@@ -13,6 +13,7 @@ from controller.codes import CHECKING, HELD, PIEZO_WEAK
 from controller.trips.band import banded, is_known, note_known
 from controller.trips.delivered import is_even, note_command
 from controller.trips.doubts import ACCELEROMETER
+from controller.trips.stall import is_judged
 
 TWO_PI = 2.0 * math.pi
 REMEMBERED = 512  # steps of the command: 0.1 s of blocks of 0.25 ms
@@ -71,7 +72,8 @@ def _least(p: Record, slots: Record) -> float:
 def listen(p: Record, s: Record, late: bool) -> None:
     """Learn loop delay and gain from the v_a of this block, and correct the gain where v_a is too large.
 
-    A block that comes `late` shows a v_a that was commanded longer ago than is known: it teaches nothing.
+    A block that comes `late` shows a v_a that was commanded longer ago than is known: it teaches nothing. One soon after a stall
+    teaches no gain, as the rig may not have its vibration back; too much v_a is cut all the same.
     """
     if (
         s.guard_state == CHECKING
@@ -104,8 +106,10 @@ def listen(p: Record, s: Record, late: bool) -> None:
     if s.heard_steps < steps or s.demodulated_Hz != s.allowed_Hz or doubted:
         s.loud_steps = 0
         return
+    if late:
+        return
     most_mps = _largest(p, s.most_sent_mps)
-    if not late:
+    if is_judged(s):
         _learn(p, s, s.candidate, most_mps)
     _hold_down(p, s, s.candidate, most_mps)
 
@@ -189,7 +193,7 @@ def amplitude(p: Record, s: Record) -> None:
     largest_m = min(p.amplitude_max_m, p.velocity_max_mps / (TWO_PI * s.wanted_Hz))
     settled = s.free_steps > s.loop_delay_steps + p.settle_steps
     tried = s.growth >= 1.0 or s.gain_known[s.candidate] == 1
-    unheard = settled and tried and s.vibration_velocity_mps < 0.02 * velocity_mps
+    unheard = settled and tried and is_judged(s) and s.vibration_velocity_mps < 0.02 * velocity_mps
     s.at_limit = 1 if s.wanted_m > largest_m or unheard or s.banded == 1 or doubted else 0
     weak = s.at_limit == 1 and not doubted and s.vibration_velocity_mps < _ALARM_RATIO * s.held_mps
     _judge_piezo(p, s, weak)
@@ -197,6 +201,9 @@ def amplitude(p: Record, s: Record) -> None:
 
 @kernel
 def _judge_piezo(p: Record, s: Record, weak: bool) -> None:
+    if not is_judged(s):
+        s.weak_s = 0.0
+        return
     s.weak_s = max(s.weak_s, 0.0) + p.block_s if weak else min(s.weak_s, 0.0) - p.block_s
     if s.weak_s > _WEAK_S:
         s.reason = PIEZO_WEAK

@@ -10,7 +10,9 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.complaints import FOREIGN
 from bridge.wire.event_codes import is_told
+from bridge.wire.inbox import WAITING
 from bridge.wire.payloads import parsed
+from bridge.wire.session import LEASE_S
 from bridge.wire.topics import (
     ANNOUNCE,
     COMMAND,
@@ -28,22 +30,18 @@ from controller.doubts import Doubts
 from controller.node import ControllerNode
 from controller.rig_header import RigAgain, refuse_another_rig
 
-# Blocks that may wait for the controller. Too small: a short pause loses blocks. Larger: commands answer older blocks.
-# A step with its messages takes 0.04 ms (median of Trace.lateness_ns), so 256 blocks are answered within 11 ms.
-INBOX_LIMIT = 256
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
 _GIVEN_UP_S = 30.0  # without a rig this process ends then, as long as one waits for a rig at the start
 _HEADER_S = 1.0  # longest wait for what the rig says of itself; one that says nothing costs all of it
-_LINKS_S = 0.5  # for links to be made again: clients dial every 20 ms
 _TOLD_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token costs all of it
 _AT_ONCE_S = 0.05  # time for a second controller of the same moment to appear, and the period of looking again
 _SAID_AGAIN_S = 0.4  # between two answers to one word of an operator, who says it every 0.5 s until it is answered
 _MOST_SAID = 16  # answers to operators a second; a flood of words is obeyed, and answered so often
-_MOST_OWED = 15  # events that wait for the links; older ones are given up
 _LONGEST_WHO = 200  # letters of a name
 _UNSEEN = "is its transducer at the end of its range, or loose? without v_d nothing is vibrated"
-# Wait for another controller to leave. Too small: one that was killed, and whose lease of 0.1 s lasts, still refuses this one.
-_OTHER_GONE_S = 0.5
+# Wait for another controller to leave. Shorter: one that is frozen refuses this one, though its lease is about to end. Longer: a
+# second controller is told later that there is one.
+_OTHER_GONE_S = LEASE_S + 0.2
 
 
 def run(
@@ -128,7 +126,7 @@ class ControllerProcess:
         self._lockstep = lockstep
         self._block_s = config.block_s
         self._stale_after_s = config.limits.stale_after_s
-        self._inbox = inbox or Inbox(INBOX_LIMIT)
+        self._inbox = inbox or Inbox(WAITING)
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
         self._doubts = Doubts(node, self._inbox, self.event)
@@ -138,8 +136,7 @@ class ControllerProcess:
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
         self._rig_lost = ""  # why, from when it was told until blocks come again
-        self._owed_due_s = 0.0
-        self._owed: list[tuple[str, str]] = []  # events that wait until the links stand
+        self._paused_s = 0.0  # for which this process stood still, and has not told
         self._stale = False  # told, and not yet FRESH
         self._in_time = 0  # blocks in a row without a stale step, of those that FRESH waits for
         self._unreadable = False  # told, and not yet FRESH
@@ -209,8 +206,9 @@ class ControllerProcess:
                 self._doubts.look()
                 self._rig_again.refuse()
             if realtime.was_paused(waited_until_s, waited_until_s):
-                self._tell_own_pause(time.monotonic() - waited_until_s)
                 heard_s = time.monotonic()
+                if not self._lockstep:
+                    self._stale, self._in_time, self._paused_s = True, 0, heard_s - waited_until_s
             # a rig that has left wakes nobody: it is known at the latest when its next block does not come
             if time.monotonic() < due_s or self._ended:
                 continue
@@ -226,34 +224,17 @@ class ControllerProcess:
             due_s = time.monotonic() + (self._block_s if silent else self._stale_after_s)
 
     def _tell_fresh(self) -> None:
-        """Blocks are back once as many came in time as make a silence stale."""
+        """Blocks are back once as many came in time as make a silence stale; those that waited meanwhile are late."""
         if not self._stale:
             return
-        self._in_time += 1
-        links_stand = not self._owed or time.monotonic() > self._owed_due_s
-        if self._in_time * self._block_s >= self._stale_after_s and links_stand:
-            self._pay()
+        self._in_time = 0 if self._node.is_late else self._in_time + 1
+        if self._in_time * self._block_s >= self._stale_after_s:
+            if self._paused_s:  # now, as the link may have been down before
+                text = f"this controller stalled for {self._paused_s:.2f} s; the rig had no command meanwhile"
+                self.event("PAUSED", text)
+                self._paused_s = 0.0
             self.event("FRESH", f"blocks arrive again, {self._in_time} in time")
             self._stale = False
-
-    def _tell_own_pause(self, paused_s: float) -> None:
-        """Tell that this process itself stood still."""
-        if not self._lockstep:
-            self._stale, self._in_time = True, 0
-            self._owed_due_s = time.monotonic() + _LINKS_S  # blocks that waited in the old link come first
-            text = f"this controller stood still for {paused_s:.2f} s; the rig had no command meanwhile"
-            self._tell_later("PAUSED", text)
-
-    def _tell_later(self, code: str, text: str) -> None:
-        """Tell it with FRESH, or now where no FRESH is due: links may have lapsed, and what is said before they stand is lost."""
-        self._owed = [*self._owed[-_MOST_OWED:], (code, text)]
-        if not self._stale:
-            self._pay()
-
-    def _pay(self) -> None:
-        for code, text in self._owed:
-            self.event(code, text)
-        self._owed = []
 
     def _ramp(self, silent_blocks: int) -> None:
         self._send[COMMAND.name](self._node.stale(silent_blocks).payload)
@@ -279,11 +260,9 @@ class ControllerProcess:
         node = self._node
         if received.topic is SENSORS:
             before = node.last_block
-            command = node.block(received.payload, received.arrival_ns)
+            command = node.block(received.payload, received.arrival_ns, time.perf_counter_ns())
             if command is not None:
                 self._send[COMMAND.name](command.payload)
-                if not self._lockstep:
-                    realtime.let_the_bus_send()
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
                 self._tell_of_block(before)
             return command is not None
@@ -310,11 +289,11 @@ class ControllerProcess:
         if node.restarts != self._restarts:
             self._restarts = node.restarts
             text = f"block {node.last_block} after block {before}: taken up again, windows begin anew"
-            self._tell_later("RIG_RESTARTED", text)
+            self.event("RIG_RESTARTED", text)
             self._rig_again.begin()
-        if self._rig_lost:  # why is said again, as nobody heard it while the link was down
+        if self._rig_lost:  # why is published again, as the link was down when it was lost
             self._tell("joined", "the rig again")
-            self._tell_later("RIG_BACK", f"blocks come again, from block {node.last_block} on; {self._rig_lost}")
+            self.event("RIG_BACK", f"blocks come again, from block {node.last_block} on; {self._rig_lost}")
             self._rig_lost = ""
         if self._end_said_s is not None and time.monotonic() - self._end_said_s > _PLANT_LOST_S:
             self._end_said_s = None

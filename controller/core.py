@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from bridge.kernel import Record, kernel
+from bridge.kernel import Record, kernel, shared_kernel
 from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
 from controller.codes import BLOCK, LATE
 from controller.estimate.contact import contact
@@ -18,6 +18,7 @@ from controller.needs.need import way_of
 from controller.policy import decide
 from controller.trips.band import begin_known, note_check
 from controller.trips.doubts import end_trips
+from controller.trips.stall import is_judged, note_stall
 from controller.trips.watch import restrain, told_reason, watch
 from controller.vibration import measure, skip
 
@@ -25,7 +26,7 @@ _STEPS_LOOK = 16  # blocks for one look at the resolution, which does not change
 _MOST_BRIDGED_BINS = 640  # 64 ms of bins of 0.1 ms: v_d is then still known from the longer windows
 
 
-@kernel
+@shared_kernel
 def step(
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],
@@ -52,6 +53,7 @@ def step(
     if s.steps == 0:
         _begin(p, s)
     end_trips(p, s, events)
+    note_stall(p, s, events, gap_blocks)
     force_N = 0.0
     usable = True
     if events & BLOCK:
@@ -69,7 +71,7 @@ def step(
             measure(p, s, block.base_accel_mps2)
             listen(p, s, events & LATE != 0)
             force_N = _look(p, s, block)
-            if events & LATE:
+            if not is_judged(s):
                 s.even_steps = 0  # what was commanded lately is not what this block shows
             watch(p, s, block)
             decide(p, s, t_ns, force_N, p.block_s)
@@ -134,7 +136,7 @@ def _begin(p: Record, s: Record) -> None:
     s.listening, s.onset_steps, s.loop_delay_steps = 1, -1, -1
     s.silent_steps = p.silence_steps  # nothing was ever commanded
     s.level, s.swing_level = -1, -1
-    s.growth = FIRST_SHARE
+    s.growth, s.quiet_s = FIRST_SHARE, math.inf
     s.demodulated_Hz = 0.0
     s.tail[:, :], s.spike_at[:] = math.nan, -1
     for way in range(2):

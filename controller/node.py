@@ -19,6 +19,7 @@ from controller.core import step
 from controller.records import build
 from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips.age import MARGIN_NS, Age
+from controller.trips.stall import SETTLED_S
 from controller.trips.tell import TripTeller
 
 _ANEW_BLOCKS = 1024  # that count as lost before the first block of a rig that was restarted: every window begins anew
@@ -76,6 +77,11 @@ class ControllerNode:
         return int(self._state[0]["guard_state"]) != wire.NO_GUARD
 
     @property
+    def is_late(self) -> bool:
+        """Whether the last block was older than the loop is made for."""
+        return self.age.late_ns > MARGIN_NS
+
+    @property
     def unreadable(self) -> bool:
         """Whether the last block held a sample of NaN or infinity."""
         return int(self._trace[0]["limit"]) == wire.NOT_FINITE
@@ -129,10 +135,16 @@ class ControllerNode:
         self._numbers.sender_was_away()
         self._seals = False
 
-    def block(self, payload: bytes, arrival_ns: int = 0) -> Outgoing | None:
+    def block(self, payload: bytes, arrival_ns: int = 0, answered_ns: int = 0) -> Outgoing | None:
         """Consume a sensor block; return the command that answers it, or None for a block that is late, repeated or a stranger's.
 
         Send the command first; then `rest` gives the other messages of the step.
+
+        Args:
+            payload: the block.
+            arrival_ns: when it came (time.perf_counter_ns); 0 in lockstep.
+            answered_ns: the present time, from which its age is judged: a block that waited in this process is late as well.
+
         """
         payload = self._layout.canonical(payload, SENSORS.name)
         if self._seals or has_checksum(payload):
@@ -156,12 +168,10 @@ class ControllerNode:
         if verdict is Verdict.ANEW or self.clock_jump_ns:
             self.age.forget()
         if not self._lockstep:
-            self.age.note(arrival_ns, t_ns)
+            self.age.note(answered_ns, t_ns)
         self.block_t_ns = self.t_ns = t_ns
         sensors = self._layout.record(payload)
-        events = (
-            BLOCK | (GAP if gap_blocks else 0) | (LATE if self.age.late_ns > MARGIN_NS else 0) | self._operator_events
-        )
+        events = BLOCK | (GAP if gap_blocks else 0) | (LATE if self.is_late else 0) | self._operator_events
         return self._step(sensors, events, gap_blocks)
 
     def _refuse_changed(self, payload: bytes) -> None:
@@ -207,7 +217,7 @@ class ControllerNode:
 
     def news(self) -> list[tuple[str, str]]:
         """Codes and texts of trips and limits that the last step began, or ended."""
-        return self._teller.news(self._trace[0])
+        return self._teller.news(self._trace[0], bool(self._state[0]["quiet_s"] < SETTLED_S))
 
     def rest(self, lateness_ns: int) -> list[Outgoing]:
         """The messages after the command: the trace, and at their rates the plotted state and a snapshot of the memory."""

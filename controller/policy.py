@@ -53,6 +53,7 @@ from controller.needs.need import (
 )
 from controller.needs.probe import STEADY_S, begin_probe, probe
 from controller.needs.wobble import LEAST_ASKED, slide_mps, slide_noise_mps, windows_for, wobble_factor
+from controller.trips.stall import is_judged
 
 TWO_PI = 2.0 * math.pi
 ON_DEMAND, WHILE_MOVING, START_ONLY, SETTLE = range(len(MODES))
@@ -255,9 +256,10 @@ def _hold(p: Record, s: Record, way: int, force_N: float, speed_mps: float, bloc
         s.even_s, s.lead, s.top = 0.0, 0.0, -1.0
     settle_s = settling_s(p, s, force_N, speed_mps)
     s.lead *= max(1.0 - block_s / settle_s, 0.0)
-    if s.level >= 0 and s.mode_s > starting_s and not changed and s.waiting_s == 0.0:
+    judged = is_judged(s)
+    if s.level >= 0 and s.mode_s > starting_s and not changed and s.waiting_s == 0.0 and judged:
         _note_swing(p, s, force_N, speed_mps, block_s, settle_s)
-    if s.contact == SMOOTH and s.mode_s > starting_s and s.wobbles == 0 and s.at_limit == 0:
+    if s.contact == SMOOTH and s.mode_s > starting_s and s.wobbles == 0 and s.at_limit == 0 and judged:
         follow_swing(p, s, block_s, settle_s)
     if s.calm_s > min(max(_CALM_SHARE * s.expected_stick_s, _LEAST_CALM_S), _MOST_CALM_S):
         s.helpless = 0

@@ -266,6 +266,8 @@ STATE = np.dtype(
         ("slip_count", "f8"),  # in the last second
         ("slips_wound", "f8"),  # for which the spring could wind up in it
         ("unbelieved_s", "f8"),  # for which slips count as noise
+        ("quiet_s", "f8"),  # since the last stall of the computer or the link
+        ("stalling_s", "f8"),  # for which blocks have not been compared with commands, because of such stalls
         ("noise_told_s", "f8"),  # for which it is told that noise became larger
         ("slide_accel_unread", "i8"),  # whether the slide's accelerometer shows no numbers
         ("outside", "i8"),  # whether the drive is outside of its travel

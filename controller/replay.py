@@ -2,26 +2,32 @@
 
 Inputs are fed, outputs are compared; no output is ever copied from the log. The only field that is not compared is the
 lateness in the trace, which comes from a clock and decides nothing.
+
+A log is replayed piece by piece. A step goes through the controller once its block, its command and its announcements are there,
+and is then forgotten, so that the memory does not grow with the log.
 """
 
-from typing import Any, NamedTuple
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from bridge.faults import Fault
-from bridge.kernel import Record, kernel
 from bridge.log.logfile import RunData
-from bridge.wire.messages import COMMAND, TRACE, Layout, Records
-from controller.announced import take_announcement
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import ANNOUNCE, COMMAND, TRACE, Records, sensor_block
 from controller.codes import BLOCK
 from controller.config import ControllerConfig
-from controller.core import step
 from controller.records import LAYOUT_ID, STATE, build
+from controller.replay_steps import NO_ROW, Difference, StepComparer, Stretch
 
-_NO_ROW = -1
-_OF_A_CLOCK = "lateness_ns"  # the field that is not compared
-_COMPARED_ROWS = 4096  # at once; with more the processor's cache does not hold them
+# Steps that a message may come late in the log, 10 s of blocks of 1 ms. What is not there by then counts as lost. Larger: a log
+# that lacks messages needs more memory, 0.8 MB a second. Smaller: a log whose recorder was told of a block by its controller
+# more than this before its rig told it is read twice, the second time in whole.
+WINDOW: Final = 10_000
+_DEFAULT_SAMPLES = 20
 
 
 class Change(NamedTuple):
@@ -31,26 +37,11 @@ class Change(NamedTuple):
     config: ControllerConfig
 
 
-class Difference(NamedTuple):
-    """The first place where a replay differs from the log."""
-
-    table: str  # command or trace
-    step: int
-    block: int
-    t_s: float
-    field: str
-    logged: float
-    replayed: float
-
-
 class Replay(NamedTuple):
-    """The answers of today's controller to the frames of a log, one row for each step that could be replayed."""
+    """How the answers of today's controller compare with those in a log."""
 
-    steps: npt.NDArray[np.int64]  # sequence of each replayed step
-    command: Records
-    trace: Records
+    compared: int  # steps
     skipped: int  # steps of the log that cannot be rebuilt: their block or their memory is not in the log
-    compared: int
     difference: Difference | None
 
     @property
@@ -59,225 +50,302 @@ class Replay(NamedTuple):
         return self.difference is None
 
 
-@kernel
-def _steps(
-    params: npt.NDArray[Any],
-    state: npt.NDArray[Any],
-    sensors: npt.NDArray[Any],
-    rows: npt.NDArray[np.int64],
-    events: npt.NDArray[np.int64],
-    gap_blocks: npt.NDArray[np.int64],
-    t_ns: npt.NDArray[np.int64],
-    announced: npt.NDArray[np.int64],
-    announce: npt.NDArray[Any],
-    command: npt.NDArray[Any],
-    trace: npt.NDArray[Any],
-) -> None:
-    s: Record = state[0]
-    for i in range(rows.shape[0]):
-        while s.announced_count < min(announced[i], announce.shape[0]):
-            said: Record = announce[s.announced_count]
-            take_announcement(s, said.holds_from_ns, said.drive_velocity_mps)
-        row = max(rows[i], 0)  # a step without a block does not read its row
-        step(
-            params, state, sensors[row : row + 1], events[i], gap_blocks[i], t_ns[i],
-            command[i : i + 1], trace[i : i + 1],
-        )  # fmt: skip
+class OutOfOrder(Exception):
+    """A message stands in the log after steps that would have needed it: only the log in whole can be replayed."""
+
+
+class _Waiting:
+    """Messages of one topic that no step has used so far, in order of their sequence."""
+
+    def __init__(self, empty: Records) -> None:
+        self._parts = [empty]
+        self.passed = -1  # largest sequence that no step will use any more
+
+    def add(self, records: Records) -> None:
+        """Messages in the order of the log."""
+        if len(records):
+            self._parts.append(records)
+
+    def records(self) -> Records:
+        """All that wait; of several with one sequence the first of the log comes first."""
+        if len(self._parts) > 1:
+            parts = [part for part in self._parts if len(part)]
+            # joined and moved as bytes: numpy would drop the tags between the fields
+            whole = parts[0] if len(parts) == 1 else _joined(parts)
+            sequence = whole["sequence"]
+            if not (sequence[1:] > sequence[:-1]).all():
+                order = np.argsort(sequence, kind="stable")
+                whole = whole.view(f"V{whole.dtype.itemsize}")[order].view(whole.dtype)
+            self._parts = [whole]
+        return self._parts[0]
+
+    def forget(self, count: int) -> None:
+        """Forget the first `count`."""
+        if count:
+            whole = self.records()
+            self.passed = max(self.passed, int(whole["sequence"][count - 1]))
+            self._parts = [whole[count:]]
+
+    def forget_until(self, sequence: int) -> None:
+        """Forget those up to a sequence, whether they came or not."""
+        self.forget(int(np.searchsorted(self.records()["sequence"], np.uint64(sequence), "right")))
+        self.passed = max(self.passed, sequence)
+
+    def rows(self, sequence: npt.NDArray[np.uint64]) -> npt.NDArray[np.int64]:
+        """The place of each sequence among those that wait, NO_ROW where it is not there."""
+        known = self.records()["sequence"]
+        if len(known) >= len(sequence) and np.array_equal(known[: len(sequence)], sequence):
+            return np.arange(len(sequence))
+        if not len(known):
+            return np.full(len(sequence), NO_ROW)
+        place = np.minimum(np.searchsorted(known, sequence), len(known) - 1)
+        return np.where(known[place] == sequence, place, NO_ROW)
+
+
+def _joined(parts: list[Records]) -> Records:
+    raw = f"V{parts[0].dtype.itemsize}"
+    return np.concatenate([part.view(raw) for part in parts]).view(parts[0].dtype)
+
+
+class Replayer:
+    """A replay that takes a log piece by piece, in its order. Methods raise OutOfOrder, but not with `whole`.
+
+    Args:
+        changes: configurations in order of time; the first holds from the start.
+        from_s: only steps from this time on are compared. It starts at the last snapshot before, or at the run's start.
+        whole: take all of the log into memory first. It may then be in any order.
+
+    """
+
+    def __init__(self, changes: list[Change], from_s: float = 0.0, whole: bool = False) -> None:
+        self._changes = [(change.t_ns, build(change.config)[0]) for change in changes]
+        self._from_s, self._from_ns = from_s, round(from_s * 1e9)
+        self._whole = whole
+        self._memory = build(changes[0].config)[1]
+        self._comparer = StepComparer(self._memory, from_s)
+        self._trace = _Waiting(TRACE.blank(0))
+        self._command = _Waiting(COMMAND.blank(0))
+        self._sensors = _Waiting(sensor_block(_DEFAULT_SAMPLES).blank(0))
+        self._announce = _Waiting(ANNOUNCE.blank(0))
+        self._tables = {
+            "trace": self._trace, "command": self._command, "sensors": self._sensors, "announce": self._announce,
+        }  # fmt: skip
+        self._snapshots: deque[wire.Snapshot] = deque()
+        self._before: wire.Snapshot | None = None  # the last one before `from_s`
+        self._newest_step = -1  # of a snapshot
+        self._phase: Callable[[int], bool] = self._start
+        self._next = 0  # step that follows the memory
+        self._lost_from = 0  # step; the memory is that of a snapshot at or after it
+        self._lacking: dict[str, list[npt.NDArray[np.uint64]]] = {
+            "sensors": [],
+            "command": [],
+        }  # steps went on without them
+        self._lacks_announcements = False
+        self._compared = self._skipped = 0
+        self._newest = 0  # steps of the newest piece, the other topics of which may follow
+
+    def add(self, topic: str, records: Records) -> None:
+        """Messages of a streaming topic; those that no step needs are passed over."""
+        waiting = self._tables.get(topic)
+        if waiting is None or not len(records):
+            return
+        if not self._whole:
+            records = self._in_time(topic, waiting, records)
+            self._newest = len(records) if topic == "trace" else self._newest
+        waiting.add(records)
+        if not self._whole:
+            self._advance(end=False)
+
+    def add_snapshot(self, snapshot: wire.Snapshot) -> None:
+        """A memory of the controller; one of another version is passed over."""
+        if snapshot.layout != LAYOUT_ID:
+            return
+        early = snapshot.t_ns < self._from_ns
+        if not self._whole:
+            if snapshot.step <= self._newest_step or (early and self._phase != self._start):
+                raise OutOfOrder
+            self._newest_step = snapshot.step
+            if early:
+                self._snapshots.clear()
+        self._snapshots.append(snapshot)
+        if early:
+            self._before = snapshot
+            if not self._whole:
+                self._pass_over(int(np.searchsorted(self._trace.records()["sequence"], np.uint64(snapshot.step + 1))))
+
+    def result(self) -> Replay:
+        """What came of it, at the end of the log. Raises Fault BAD_LOG where two controllers answered: no step is whose."""
+        self._advance(end=True)
+        return Replay(self._compared, self._skipped, self._comparer.difference)
+
+    def _in_time(self, topic: str, waiting: _Waiting, records: Records) -> Records:
+        """Those that can still be used; one that comes twice is passed over, as the first counts."""
+        sequence = records["sequence"]
+        if topic == "announce":
+            known = waiting.records()["sequence"]
+            if self._lacks_announcements or (np.diff(sequence, prepend=known[-1:]).astype(np.int64) <= 0).any():
+                raise OutOfOrder
+            return records
+        late = sequence <= np.uint64(max(waiting.passed, 0))
+        if waiting.passed < 0 or not late.any():
+            return records
+        if topic == "trace" or any(np.isin(sequence[late], lacking).any() for lacking in self._lacking[topic]):
+            raise OutOfOrder
+        return records.view(f"V{records.dtype.itemsize}")[~late].view(records.dtype)
+
+    def _advance(self, end: bool) -> None:
+        """Take every step that is complete; with `end` all of them, as nothing more comes."""
+        while len(trace := self._trace.records()):
+            sequence = trace["sequence"]
+            twice = np.flatnonzero(sequence[1:] == sequence[:-1])
+            if len(twice):
+                if not self._whole:
+                    raise OutOfOrder
+                self._refuse_two(trace[twice[0]], trace[twice[0] + 1])
+            if not self._phase(len(trace) if end else max(len(trace) - max(WINDOW, self._newest), 0)):
+                break
+        for waiting in (self._sensors, self._command):  # of blocks that no controller answered
+            waiting.forget(max(len(waiting.records()) - 2 * WINDOW, 0) if not self._whole else 0)
+
+    @staticmethod
+    def _refuse_two(first: Any, second: Any) -> None:
+        at_s, again_s = 1e-9 * int(first["t_ns"]), 1e-9 * int(second["t_ns"])
+        line = f"/trace: step {first['sequence']} is there at {at_s:.3f} s and again at {again_s:.3f} s"
+        why = "the controller was started again, or two answered"
+        raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a log of its own")
+
+    # each phase has the number of steps for which nothing can come any more, and says whether another phase follows
+
+    def _start(self, sure: int) -> bool:
+        """Find where the replay begins."""
+        first = int(self._trace.records()["sequence"][0])
+        if not sure and (first or self._from_ns > 0):
+            return False
+        if self._before is not None:
+            self._snapshots.appendleft(self._before)
+            self._lost_from = self._before.step
+            self._phase = self._lost
+        elif first == 0:
+            self._phase = self._run
+        else:
+            self._lost_from = first
+            self._phase = self._lost
+        return True
+
+    def _run(self, sure: int) -> bool:
+        """Take the steps that follow the memory, up to one that cannot be rebuilt."""
+        trace = self._trace.records()
+        events, gaps, t_ns, announced = (
+            trace[name].astype(np.int64) for name in ("events", "gap_blocks", "t_ns", "announcements")
+        )
+        sequence, block = trace["sequence"], trace["block"]
+        consumes = events & BLOCK != 0
+        rows = np.where(consumes, self._sensors.rows(block), NO_ROW)
+        command_rows = self._command.rows(sequence)
+        self._must_wait(block[consumes & (rows == NO_ROW)], self._sensors)
+        self._must_wait(sequence[command_rows == NO_ROW], self._command)
+        lost = consumes & (rows == NO_ROW)
+        broken = lost.copy()
+        broken[0] |= int(sequence[0]) != self._next
+        broken[1:] |= np.diff(sequence) != 1
+        incomplete = broken | (command_rows == NO_ROW) | (announced > len(self._announce.records()))
+        incomplete[:sure] = broken[:sure]
+        end = int(np.argmax(incomplete)) if incomplete.any() else len(trace)
+        if end and not len(self._sensors.records()) and self._sensors.passed < 0 and not sure:
+            return False  # of how many samples a block is, is not known
+        stretch = Stretch(trace, rows, command_rows, events, gaps, t_ns, announced)
+        self._feed(stretch.part(0, end))
+        if end == len(trace) or not broken[end] or end >= sure:
+            return False
+        if lost[end]:
+            self._lacking["sensors"].append(block[end : end + 1].copy())
+            self._sensors.forget_until(int(block[end]))
+        self._lost_from = int(sequence[end])
+        self._phase = self._lost
+        return True
+
+    def _lost(self, sure: int) -> bool:
+        """Pass over steps until a snapshot gives the memory back."""
+        sequence = self._trace.records()["sequence"]
+        while self._snapshots:
+            snapshot = self._snapshots[0]
+            following = snapshot.step + 1
+            if snapshot.step >= self._lost_from:
+                self._must_wait(np.array([following], np.uint64), self._trace)
+                place = int(np.searchsorted(sequence, np.uint64(following)))
+                if place < len(sequence) and int(sequence[place]) == following:
+                    self._snapshots.popleft()
+                    self._pass_over(place)
+                    self._memory[:] = np.frombuffer(snapshot.memory, STATE)
+                    self._next = following
+                    self._phase = self._run
+                    return True
+                if sure <= place and sure < len(sequence):  # it may still come
+                    break
+                if snapshot is self._before and place < len(sequence):
+                    self._lost_from = int(sequence[place])
+            self._snapshots.popleft()
+        self._pass_over(sure)
+        return False
+
+    def _must_wait(self, sequence: npt.NDArray[np.uint64], waiting: _Waiting) -> None:
+        """Refuse messages that are forgotten, as steps came again or in another order than their blocks."""
+        if not self._whole and waiting.passed >= 0 and (sequence <= np.uint64(waiting.passed)).any():
+            raise OutOfOrder
+
+    def _feed(self, steps: Stretch) -> None:
+        """Take steps whose memory is there, and forget them."""
+        count = len(steps.rows)
+        if not count:
+            return
+        command, sequence = self._command.records(), steps.trace["sequence"]
+        announce, sensors = self._announce.records(), self._sensors.records()
+        starts = [int(np.searchsorted(steps.t_ns, t_ns)) if t_ns > 0 else 0 for t_ns, _ in self._changes]
+        for (_, params), start, end in zip(self._changes, starts, [*starts[1:], count], strict=True):
+            if start < end:
+                self._comparer.feed(params, sensors, announce, command, steps.part(start, end))
+        self._compared += self._counted(steps.t_ns)
+        self._next = int(sequence[-1]) + 1
+        lacking = steps.command_rows == NO_ROW
+        if lacking.any():
+            self._lacking["command"].append(sequence[lacking])
+        self._lacks_announcements |= bool((steps.announced > len(announce)).any())
+        self._sensors.forget(int(steps.rows.max()) + 1)
+        self._command.forget_until(self._next - 1)
+        self._trace.forget(count)
+        while self._snapshots and self._snapshots[0].step < self._next:
+            self._snapshots.popleft()
+
+    def _pass_over(self, count: int) -> None:
+        """Forget the first steps, which cannot be rebuilt."""
+        steps = self._trace.records()[:count]
+        if not len(steps):
+            return
+        self._skipped += self._counted(steps["t_ns"].astype(np.int64))
+        consumed = steps["block"][steps["events"] & BLOCK != 0]
+        if len(consumed):
+            self._sensors.forget_until(int(consumed.max()))
+        self._command.forget_until(int(steps["sequence"][-1]))
+        self._trace.forget(count)
+
+    def _counted(self, t_ns: npt.NDArray[np.int64]) -> int:
+        return int((t_ns >= self._from_s * 1e9).sum())
 
 
 def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:
-    """Replay a log from `from_s` on, starting at the last snapshot before it (or at the run's start).
+    """Replay a log that is in memory, from `from_s` on.
 
     Args:
         run: the log.
         changes: configurations in order of time; the first holds from the start.
-        from_s: only steps from this time on are compared and returned.
+        from_s: only steps from this time on are compared.
 
     Raises Fault BAD_LOG where two controllers answered, as their steps cannot be told apart.
 
     """
-    trace = _in_order(run.trace)
-    sequence, events, gaps, t_ns, announced = (
-        trace[name].astype(np.int64) for name in ("sequence", "events", "gap_blocks", "t_ns", "announcements")
-    )
-    announce = _writable(_in_order(run.announce))
-    twice = np.flatnonzero(np.diff(sequence) == 0)
-    if len(twice):
-        at_s, again_s = 1e-9 * t_ns[twice[0]], 1e-9 * t_ns[twice[0] + 1]
-        line = f"/trace: step {sequence[twice[0]]} is there at {at_s:.3f} s and again at {again_s:.3f} s"
-        why = "the controller was started again, or two answered"
-        raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a log of its own")
-    rows = _rows(run.sensors, trace["block"], events)
-    sensors = _writable(run.sensors)
-
-    _, memory = build(changes[0].config)
-    replayed: list[npt.NDArray[np.int64]] = []
-    commands, traces = COMMAND.blank(len(trace)), TRACE.blank(len(trace))
-    at = _start(run, sequence, round(from_s * 1e9), memory)
-    while at < len(trace):
-        end = _until(sequence, rows, events, at)
-        for start, stop, params in _spans(changes, t_ns, at, end):
-            part = slice(start, stop)
-            _steps(
-                params, memory, sensors, rows[part], events[part], gaps[part], t_ns[part],
-                announced[part], announce, commands[part], traces[part],
-            )  # fmt: skip
-        replayed.append(np.arange(at, end))
-        at = _resume(run, sequence, end, memory)
-    done = np.concatenate(replayed) if replayed else np.empty(0, np.int64)
-    wanted = _place(done[t_ns[done] >= from_s * 1e9])
-    considered = int((t_ns >= from_s * 1e9).sum())
-    steps, command = sequence[wanted], commands[wanted]
-    found = _first_difference(trace[wanted], run.command, steps, command, traces[wanted])
-    return Replay(steps, command, traces[wanted], considered - len(steps), len(steps), found)
-
-
-def _in_order(records: Records) -> Records:
-    """Messages in order of their sequence; those that are in order already are not copied."""
-    sequence = records["sequence"]
-    return records if (sequence[1:] > sequence[:-1]).all() else records[np.argsort(sequence, kind="stable")]
-
-
-def _place(rows: npt.NDArray[np.int64]) -> Any:
-    """Ascending rows as an index; without a gap they are a slice, which copies nothing."""
-    whole = len(rows) > 0 and (np.diff(rows) == 1).all()
-    return slice(int(rows[0]), int(rows[-1]) + 1) if whole else rows
-
-
-def _writable(records: Records) -> Records:
-    return records if records.flags.writeable else np.frombuffer(bytearray(records.tobytes()), records.dtype)
-
-
-def _rows(sensors: Records, block: Any, events: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Row of the sensor block that each step consumed; _NO_ROW where the log does not hold it."""
-    order = np.argsort(sensors["sequence"], kind="stable")
-    known = sensors["sequence"][order]
-    if not len(known):
-        return np.full(len(block), _NO_ROW)
-    place = np.minimum(np.searchsorted(known, block), len(known) - 1)
-    found = (known[place] == block) & (events & BLOCK != 0)
-    return np.where(found, order[place], _NO_ROW)
-
-
-def _until(sequence: Any, rows: Any, events: Any, start: int) -> int:
-    """End of the stretch from `start` in which every step can be rebuilt."""
-    jumps = np.flatnonzero(np.diff(sequence[start:]) != 1)
-    missing = np.flatnonzero((rows[start:] == _NO_ROW) & (events[start:] & BLOCK != 0))
-    ends = [len(sequence) - start]
-    if len(jumps):
-        ends.append(int(jumps[0]) + 1)
-    if len(missing):
-        ends.append(int(missing[0]))
-    return start + min(ends)
-
-
-def _spans(changes: list[Change], t_ns: Any, start: int, end: int) -> list[tuple[int, int, Any]]:
-    """The stretch, cut where the configuration changes: start, end and parameters of each part."""
-    spans: list[tuple[int, int, Any]] = []
-    for change, following in zip(changes, [*changes[1:], None], strict=True):
-        first = max(start, int(np.searchsorted(t_ns, change.t_ns)) if change.t_ns > 0 else 0)
-        last = end if following is None else min(end, int(np.searchsorted(t_ns, following.t_ns)))
-        if first < last:
-            spans.append((first, last, build(change.config)[0]))
-    return spans
-
-
-def _start(run: RunData, sequence: Any, from_ns: int, memory: Any) -> int:
-    """Index of the first step to replay, after its memory is restored."""
-    usable = [s for s in run.snapshots if s.layout == LAYOUT_ID and s.t_ns < from_ns]
-    if usable:
-        after = _restore(sequence, usable[-1], memory)
-        if after is not None:
-            return after
-        return _resume(run, sequence, int(np.searchsorted(sequence, usable[-1].step + 1)), memory)
-    if len(sequence) and sequence[0] == 0:
-        return 0
-    return _resume(run, sequence, 0, memory)
-
-
-def _resume(run: RunData, sequence: Any, at: int, memory: Any) -> int:
-    """Index after the next snapshot from index `at` on, after its memory is restored; the end without a snapshot."""
-    if at >= len(sequence):
-        return at
+    replayer = Replayer(changes, from_s, whole=True)
+    for topic in ("announce", "sensors", "command", "trace"):
+        replayer.add(topic, getattr(run, topic))
     for snapshot in run.snapshots:
-        if snapshot.layout == LAYOUT_ID and snapshot.step >= sequence[at]:
-            after = _restore(sequence, snapshot, memory)
-            if after is not None:
-                return after
-    return len(sequence)
-
-
-def _restore(sequence: Any, snapshot: Any, memory: Any) -> int | None:
-    """Index of the step after a snapshot, after its memory is restored; None when that step is not in the log."""
-    after = int(np.searchsorted(sequence, snapshot.step + 1))
-    if after == len(sequence) or sequence[after] != snapshot.step + 1:
-        return None
-    memory[:] = np.frombuffer(snapshot.memory, STATE)
-    return after
-
-
-def _first_difference(
-    logged_trace: Records, logged: Records, steps: npt.NDArray[np.int64], command: Records, trace: Records
-) -> Difference | None:
-    """The earliest step with a bit that differs, trace before command.
-
-    Args:
-        logged_trace: of the log, one row for each of the `steps`.
-        logged: all commands of the log.
-        steps, command, trace: numbers and messages of the replayed steps.
-
-    """
-    place = np.searchsorted(logged["sequence"], steps)
-    place = np.minimum(place, max(len(logged) - 1, 0))
-    logged_command = logged[_place(place)]
-    there = logged_command["sequence"] == steps  # commands that the recorder lost cannot be compared
-    tables = (
-        ("trace", TRACE, logged_trace, trace, np.ones(len(steps), bool)),
-        ("command", COMMAND, logged_command, command, there),
-    )
-    found: list[Difference] = []
-    for name, layout, was, again, valid in tables:
-        row = _first_row(layout, was, again, valid)
-        if row is not None:
-            index, field = row
-            found.append(
-                Difference(
-                    table=name,
-                    step=int(steps[index]),
-                    block=int(trace["block"][index]),
-                    t_s=float(trace["t_ns"][index]) * 1e-9,
-                    field=field,
-                    logged=float(was[field][index]),
-                    replayed=float(again[field][index]),
-                )
-            )
-    return min(found, key=lambda difference: difference.step) if found else None
-
-
-def _first_row(layout: Layout, logged: Records, again: Records, valid: Any) -> tuple[int, str] | None:
-    """First row with a bit that differs, and the first field of this row with one."""
-    fields = [field.name for field in layout.message.DESCRIPTOR.fields if field.name != _OF_A_CLOCK]
-    for first in range(0, len(again), _COMPARED_ROWS):
-        part = slice(first, first + _COMPARED_ROWS)
-        if _same_bytes(logged[part], again[part]):  # the usual case, 10 times as fast as field by field
-            continue
-        differs = {name: _bits(logged[part], name) != _bits(again[part], name) for name in fields}
-        some = np.logical_or.reduce([*differs.values()]) & valid[part]
-        if some.any():
-            row = int(np.argmax(some))
-            return first + row, next(name for name in fields if differs[name][row])
-    return None
-
-
-def _same_bytes(logged: Records, again: Records) -> bool:
-    """Whether the messages are equal but for the field of a clock."""
-    copy = again.view(np.uint8).copy()
-    if _OF_A_CLOCK in (again.dtype.names or ()):
-        np.frombuffer(copy, again.dtype)[_OF_A_CLOCK] = logged[_OF_A_CLOCK]
-    return np.array_equal(copy, logged.view(np.uint8))
-
-
-def _bits(records: Records, field: str) -> npt.NDArray[Any]:
-    """A field as whole numbers, which are equal where all bits are; NaN too."""
-    values = records[field]
-    return values.view(f"u{values.dtype.itemsize}")
+        replayer.add_snapshot(snapshot)
+    return replayer.result()

@@ -18,6 +18,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.clock import time
 from bridge.wire.complaints import BAD_MESSAGE, FOREIGN, Complaints
 from bridge.wire.event_codes import is_told
+from bridge.wire.inbox import WAITING
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import ANNOUNCE, APPLIED, COMMAND, FAULT, OPERATOR, PLANT_EVENT, SENSORS
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
@@ -32,8 +33,6 @@ _GOODBYE_S = 3.0  # longest wait for the other processes to leave the bus
 _ROUND_TRIPS_KEPT = 1024  # blocks whose time of sending is kept; answers to older blocks have no round trip
 _LONGEST_FADE_BLOCKS = 1000  # an exciter that does not come to rest within them never will
 _LATE_NS = 1_000_000  # round trip beyond which a command counts as late
-_LINKS_S = 0.5  # for links to be made again: clients dial every 20 ms
-_ON_THE_WAY = 256  # commands of a block that a fault of the bus may take
 _PAUSE_NS = 250_000_000  # a block that is due and leaves so much later: this process stood still
 
 
@@ -139,10 +138,9 @@ class PlantProcess:
         self._complaints = Complaints(self.event)
         self._commands = Commands(self._complaints)
         self._answers = Inbox(64)
-        self._on_the_way: collections.deque[Received] = collections.deque(maxlen=_ON_THE_WAY)
+        self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)
         self._events = 0
-        self._paused = ""  # what is to be told of a pause
-        self._paused_told_s = 0.0
+        self._paused_ns = 0  # for which this process stalled, and has not told
         self._send_sensors = bus.publisher(SENSORS)
         self._send_applied = bus.publisher(APPLIED)
         self._send_announce = bus.publisher(ANNOUNCE)
@@ -171,12 +169,7 @@ class PlantProcess:
         self.event("END", f"blocks={self._node.block}")
         self._bus.withdraw()
 
-    def _note_pause(self, late_ns: int) -> None:
-        """Note that this rig stood still: told when the links that lapsed meanwhile stand again."""
-        self._paused = f"this rig stood still for {late_ns * 1e-9:.2f} s; the blocks that were due followed at once"
-        self._paused_told_s = time.monotonic() + _LINKS_S
-
-    def _send(self, sensors: bytes, applied: bytes, in_time: bool = False) -> None:
+    def _send(self, sensors: bytes, applied: bytes) -> None:
         """Send the messages of a block, through the faults of the bus, if any act, and tell what is new."""
         faults = self._node.faults
         self._announce()
@@ -185,8 +178,6 @@ class PlantProcess:
                 self._send_sensors(message.payload)
         else:
             self._send_sensors(sensors)
-        if in_time:
-            realtime.let_the_bus_send()
         self._send_applied(applied)
         self._tell()
         for code, text in faults.news():
@@ -277,7 +268,6 @@ class PlantProcess:
         node, pacer = self._node, realtime.Pacer(self._node.block_ns)
         sent_ns = [0] * _ROUND_TRIPS_KEPT
         tick = 0
-        late_before_ns = 0
         while node.block < blocks and not stop.is_set():
             late_ns = pacer.wait(tick)
             tick += 1
@@ -295,14 +285,14 @@ class PlantProcess:
                     late_commands += round_trip_ns > _LATE_NS
             sensors, applied = node.advance(commands, late_commands, round_trip_ns, late_ns)
             sent_ns[(node.block - 1) % _ROUND_TRIPS_KEPT] = time.perf_counter_ns()
-            self._send(sensors.payload, applied.payload, in_time=late_ns < node.block_ns)
+            self._send(sensors.payload, applied.payload)
             self._complaints.tell_when_due()
-            if late_ns - late_before_ns > _PAUSE_NS:
-                self._note_pause(late_ns)
-            late_before_ns = late_ns
-            if self._paused and time.monotonic() > self._paused_told_s:
-                self.event("PAUSED", self._paused)
-                self._paused = ""
+            if late_ns > _PAUSE_NS:
+                self._paused_ns = max(self._paused_ns, late_ns)
+            elif self._paused_ns and late_ns < node.block_ns and commands:  # whose sender has its link again
+                text = f"this rig stalled for {self._paused_ns * 1e-9:.2f} s; the blocks that were due followed at once"
+                self.event("PAUSED", text)
+                self._paused_ns = 0
 
     def lockstep(self, blocks: int, stop: threading.Event) -> None:
         """Advance block by block; each block waits for the command that answers the block before."""

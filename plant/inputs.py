@@ -1,6 +1,7 @@
 """What comes into a rig block by block besides the command: the drive's velocity, noise, and how late commands are."""
 
 import math
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,32 @@ class Inputs(NamedTuple):
     delay_blocks: npt.NDArray[np.int64]  # that a command takes which comes before the block, [blocks]
     announcements: npt.NDArray[np.int64]  # that go out before the block's samples, [blocks]
     announce: Records  # these announcements, in order
+
+    def joined(self, later: "Inputs") -> "Inputs":
+        """These blocks and later ones."""
+        if not len(self.noise):
+            return later
+        announce = ANNOUNCE.blank(len(self.announce) + len(later.announce))
+        announce[: len(self.announce)], announce[len(self.announce) :] = self.announce, later.announce
+        return Inputs(
+            np.concatenate([self.velocity_mps, later.velocity_mps]),
+            np.concatenate([self.noise, later.noise]),
+            np.concatenate([self.delay_blocks, later.delay_blocks]),
+            np.concatenate([self.announcements, later.announcements]),
+            announce,
+        )
+
+    def part(self, blocks: slice) -> "Inputs":
+        """Some of these blocks, of a slice without a step."""
+        first, last, _ = blocks.indices(len(self.noise))
+        said = slice(int(self.announcements[:first].sum()), int(self.announcements[:last].sum()))
+        return Inputs(
+            self.velocity_mps[blocks],
+            self.noise[blocks],
+            self.delay_blocks[blocks],
+            self.announcements[blocks],
+            self.announce[said],
+        )
 
 
 class RigInputs:
@@ -86,3 +113,28 @@ class RigInputs:
             return np.full(blocks, whole_blocks(loop.delay_s, block_s))
         late_s = loop.delay_s + loop.jitter_s * self._jitter.random(blocks)
         return np.array([whole_blocks(one_s, block_s) for one_s in late_s], np.int64)
+
+
+class InputsAhead:
+    """The numbers of `RigInputs`, drawn by a second thread while those drawn before are used: a sixth of a run's time.
+
+    Args:
+        inputs: nobody else draws from them.
+
+    """
+
+    def __init__(self, inputs: RigInputs) -> None:
+        self._inputs = inputs
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="inputs")
+        self._ahead: Future[Inputs] | None = None
+
+    def draw(self, blocks: int) -> Inputs:
+        """The inputs of the next blocks; as many blocks after them are drawn meanwhile."""
+        ahead = self._inputs.draw(blocks) if self._ahead is None else self._ahead.result()
+        if (missing := blocks - len(ahead.noise)) > 0:
+            ahead = ahead.joined(self._inputs.draw(missing))
+        self._ahead = self._thread.submit(self._more, ahead.part(slice(blocks, None)), blocks)
+        return ahead.part(slice(blocks))
+
+    def _more(self, rest: Inputs, blocks: int) -> Inputs:
+        return rest.joined(self._inputs.draw(max(blocks - len(rest.noise), 0)))

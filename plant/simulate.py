@@ -46,16 +46,20 @@ def run_blocks(
 
     """
     samples = params[0].samples_per_block
+    # of one block: a part of the run's arrays is not contiguous, and `advance` would be compiled for that as well
+    own_analogue, own_truth = np.empty((analogue.shape[0], samples)), np.empty((truth.shape[0], samples))
     for block in range(drive.shape[0]):
-        rows = slice(block * samples, (block + 1) * samples)
         if params[0].disturbed:
             advance_disturbed(
-                params, state, drive[block], frequency_Hz[block], amplitude_m[block], analogue[:, rows], truth[:, rows]
+                params, state, drive[block], frequency_Hz[block], amplitude_m[block], own_analogue, own_truth
             )
         else:
-            advance(
-                params, state, drive[block], frequency_Hz[block], amplitude_m[block], analogue[:, rows], truth[:, rows]
-            )
+            advance(params, state, drive[block], frequency_Hz[block], amplitude_m[block], own_analogue, own_truth)
+        for i in range(samples):
+            for row in range(analogue.shape[0]):
+                analogue[row, block * samples + i] = own_analogue[row, i]
+            for row in range(truth.shape[0]):
+                truth[row, block * samples + i] = own_truth[row, i]
 
 
 def simulate(

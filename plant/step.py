@@ -6,13 +6,13 @@ import numpy.typing as npt
 
 from bridge.guard.check import tell_gain
 from bridge.guard.core import allow, look
-from bridge.kernel import Record, kernel
+from bridge.kernel import Record, kernel, shared_kernel
 from plant.core import advance, advance_disturbed
 from plant.loop_delay import receive, send
 from plant.sensors import digitise
 
 
-@kernel
+@shared_kernel
 def act(
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],
@@ -45,7 +45,7 @@ def act(
     digitise(p, analogue, noise, block)
 
 
-@kernel
+@shared_kernel
 def report(
     params: npt.NDArray[Any],
     state: npt.NDArray[Any],

@@ -10,18 +10,21 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-pytest_plugins = ["tests.cpu_limit"]
+pytest_plugins = ["tests.cpu_limit", "tests.stall_report"]
 
 # the first example compiles kernels, and these machines are shared: time is no criterion in a test
 settings.register_profile("stickslip", deadline=None, derandomize=True)
 settings.load_profile("stickslip")
-# a suite that a script starts with `&` inherits an ignored SIGINT, and so would all that the tests start: Ctrl-C is tested
+# A suite that a script starts with `&` inherits an ignored SIGINT, one under `nohup` an ignored SIGHUP, and so would all that the
+# tests start; the ends of commands are tested. A handler of Python is none in a child, and a closed terminal still ends no suite.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda _number, _frame: None)
 # where rigs leave their passwords: a folder that is gone afterwards, with a short name as in a login
 os.environ["XDG_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 atexit.register(shutil.rmtree, os.environ["XDG_RUNTIME_DIR"], ignore_errors=True)
-_NIGHTLY_S = 1800.0  # a whole diagnosis beside other work
-_REALTIME_S = 120.0  # nobody waits longer for a process: one that hangs is known soon
+_NIGHTLY_S = 3600.0  # a whole diagnosis beside other work
+_REALTIME_S = 180.0  # a process that hangs is reported soon
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -12,8 +12,11 @@ from bridge.log.logfile import STREAMING, RunData, read_run
 from bridge.log.runlog import RunLog
 from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, sensor_block
 from bridge.wire.topics import BY_NAME
+from cockpit.judge.judged import judge_tables
+from cockpit.judge.verdict import RunVerdict
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
+from diagnosis.features.cycles import Cycles
 
 Tables = dict[str, Any]
 
@@ -34,6 +37,16 @@ def in_chunks(path: Path, blocks: int) -> bytes:
     again = path.with_name("again.mcap")
     write(again, tables_of(run), run, blocks)
     return again.read_bytes()
+
+
+def verdict_of(run: RunData) -> RunVerdict:
+    """The verdict on a log that was read, and perhaps changed since."""
+    return judge_tables(run)[0]
+
+
+def cycles_of(run: RunData) -> Cycles | None:
+    """Its slips."""
+    return judge_tables(run)[1]
 
 
 def tables_of(run: RunData) -> Tables:

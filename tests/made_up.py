@@ -29,6 +29,7 @@ from diagnosis.result import (
     Share,
     Shrinkage,
 )
+from tests.patience import PATIENCE_S
 
 Progress = Callable[[str, float], None]
 RIG = """
@@ -192,17 +193,17 @@ def _who(_shared: None, _item: int) -> int:
 
 
 def marks(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
-    """Like `quick`, but leaves a line in the evidence's folder each time, and `slow` takes a minute."""
+    """Like `quick`, but leaves a line in the evidence's folder each time, and `slow` does not end."""
     with (evidence.folder / "done").open("a") as file:
         file.write("once\n")
     if "slow" in evidence.folder.name and not (evidence.folder / "fast").exists():
-        time.sleep(60.0)
+        time.sleep(PATIENCE_S)
     return quick(evidence, progress, jobs)
 
 
 def endless(evidence: Evidence, progress: Progress, jobs: int, budget_s: float | None = None) -> Diagnosis:
-    """Says who works, and does so for a minute."""
+    """Says who works, and does not end."""
     (evidence.folder / "worker").write_text(str(os.getpid()))
     progress("this takes long", 0.1)
-    time.sleep(60.0)
+    time.sleep(PATIENCE_S)
     return quick(evidence, progress, jobs)

@@ -5,13 +5,11 @@ from typing import Any
 
 from bridge.faults import Fault
 from bridge.wire.complaints import BAD_MESSAGE, FLOOD, FOREIGN, Complaints
+from bridge.wire.inbox import WAITING
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
 from bridge.wire.topics import COMMAND
 from bridge.wire.zenoh_link import Received
 
-# Commands that may wait for a block; the oldest give way. Too small: a flood displaces the controller's own. Larger: reading a
-# flood takes more of the block, about 1 ms for 256.
-_WAITING = 256
 # beyond any exciter that vibrates a machine; a rig limits what is smaller to its own stroke and band
 _LARGEST_M = 1e-3
 _HIGHEST_HZ = 1e6
@@ -27,7 +25,7 @@ class Commands:
 
     def __init__(self, complaints: Complaints) -> None:
         self._complaints = complaints
-        self._waiting: collections.deque[Received] = collections.deque(maxlen=_WAITING)
+        self._waiting: collections.deque[Received] = collections.deque(maxlen=WAITING)
         self._came = 0  # written by the receiving thread alone
         self._read = 0
         self._lost = 0

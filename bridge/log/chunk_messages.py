@@ -2,7 +2,9 @@
 
 import struct
 from collections.abc import Sequence
-from itertools import accumulate
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,38 +45,50 @@ class Walk(NamedTuple):
     broken: int  # stretches of bytes that are no whole record
 
 
-class Messages(NamedTuple):
+@dataclass(eq=False)
+class Messages:
     """Messages of some chunks in file order."""
 
     data: Bytes  # of the chunks
     heads: npt.NDArray[Any]  # [messages], with the fields length, channel, sequence, log_ns and publish_ns
-    channel: Column  # of each, [messages]
+    channel: npt.NDArray[np.uint16]  # of each, [messages]; numpy sorts so short numbers five times as fast as long ones
     start: Column  # of the payload in `data`, [messages]
     others: Sequence[tuple[int, bytes]] = ()  # records between them, definitions for the most part: opcode and content
     broken: int = 0  # stretches of bytes between them that are no whole record
 
-    def channels(self) -> list[int]:
-        """The channels that have messages."""
-        return np.flatnonzero(np.bincount(self.channel)).tolist()
+    @cached_property
+    def by_channel(self) -> "dict[int, Messages]":
+        """The messages of each channel, in file order."""
+        whole = self._some(np.argsort(self.channel, kind="stable"))
+        ends = np.cumsum(np.bincount(self.channel))
+        parts = [slice(begin, end) for begin, end in pairwise([0, *ends.tolist()])]
+        return {
+            channel: Messages(self.data, whole.heads[part], whole.channel[part], whole.start[part])
+            for channel, part in enumerate(parts)
+            if part.start < part.stop
+        }
 
     def of(self, channels: Sequence[int]) -> "Messages":
         """The messages of some channels, in file order."""
-        mine = np.flatnonzero(self.channel == channels[0] if len(channels) == 1 else np.isin(self.channel, channels))
-        return Messages(self.data, _as_bytes(self.heads)[mine].view(HEAD), self.channel[mine], self.start[mine])
+        return self._some(np.flatnonzero(np.isin(self.channel, channels)))
 
-    def payload_bytes(self) -> Column:
-        """The size of each payload."""
-        return self.heads["length"].astype(np.int64) - _FIELDS_BYTES
+    def _some(self, rows: Column) -> "Messages":
+        return Messages(self.data, _as_bytes(self.heads)[rows].view(HEAD), self.channel[rows], self.start[rows])
 
     def payloads(self, most: int | None = None) -> list[bytes]:
         """The payload of each, or of the first `most`."""
         starts = self.start[:most]
-        ends = starts + self.payload_bytes()[:most]
+        ends = starts + self.heads["length"][:most].astype(np.int64) - _FIELDS_BYTES
         return [self.data[start:end].tobytes() for start, end in zip(starts, ends, strict=True)]
 
-    def stacked(self, size: int) -> Bytes:
-        """The payloads, all of this size, one below the other, [messages, size]."""
-        return cut(self.data, self.start, size).view(np.uint8).reshape(-1, size)
+    @cached_property
+    def stacked(self) -> Bytes | None:
+        """The payloads one below the other, [messages, size]; None where they are of several sizes."""
+        lengths = self.heads["length"]
+        if not len(lengths) or (lengths != lengths[0]).any():
+            return None
+        size = int(lengths[0]) - _FIELDS_BYTES
+        return cut(self.data, self.start, size).view(np.uint8).reshape(-1, size) if size else None
 
 
 def messages_of(chunks: Sequence[Chunked]) -> Messages:
@@ -91,7 +105,7 @@ def messages_of(chunks: Sequence[Chunked]) -> Messages:
         heads = cut(data, offsets, HEAD.itemsize).view(HEAD)
         others = [other for walk in walks for other in walk.others]
         broken = sum(walk.broken for walk in walks)
-    return Messages(data, heads, heads["channel"].astype(np.int64), offsets + HEAD.itemsize, others, broken)
+    return Messages(data, heads, heads["channel"].copy(), offsets + HEAD.itemsize, others, broken)
 
 
 def _indexed(chunks: Sequence[Chunked], begins: Column) -> Column:

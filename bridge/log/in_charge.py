@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.log.finding import Finding
+from bridge.log.watches.arrays import median, steps
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import WEAK_REASONS
@@ -14,10 +15,12 @@ from bridge.wire.words import words
 
 Integers = npt.NDArray[np.int64]
 NO_COMMAND = (1 << 64) - 1  # in `Applied.command_block`: the rig has none, before the first or on its way out
-GONE_S = 0.5  # a longer fallback is no late command but a controller that is not there
+# A longer fallback is no stall but a controller that is not there. Smaller: a process that is held up for 0.5 s, and catches up
+# counts as gone. Larger: slips without a controller count as slips in a stall. The bus gives a frozen process up after some 1 s.
+GONE_S = 1.0
 UNANSWERED_SHARE = 0.01  # of the blocks: more without an answer is a fault; less has every busy desktop now and then
 WEAK_S = 1.0  # of one reason that says the vibration does not do its work: more is a fault
-_MOST_STRETCHES = 1000  # that are kept; of more, only their time
+_MOST_STRETCHES = 1000  # that a result lists; of more, only their time
 
 
 class InCharge(NamedTuple):
@@ -72,7 +75,7 @@ class ChargeWatch:
     """Looks at one log, piece by piece, in file order; the memory does not grow with the log."""
 
     def __init__(self) -> None:
-        self._stretches: list[tuple[float, float]] = []
+        self.stretches: list[tuple[float, float]] = []  # all that ended
         self._fallbacks = 0
         self._fallback_ns = self._longest_ns = 0
         self._since_ns: int | None = None  # of the fallback that goes on
@@ -94,10 +97,10 @@ class ChargeWatch:
             return
         t_ns = records["t_ns"].astype(np.int64)
         if not self._block_ns:
-            self._block_ns = int(np.median(np.diff(t_ns))) if len(t_ns) > 1 else int(t_ns[0])
+            self._block_ns = int(median(np.diff(t_ns))) if len(t_ns) > 1 else int(t_ns[0])
         fallback = records["fallback"] != 0
         without = records["command_block"] == np.uint64(NO_COMMAND)
-        edges = np.flatnonzero(np.diff(fallback.astype(np.int8), prepend=np.int8(self._since_ns is not None)))
+        edges = np.flatnonzero(steps(fallback.view(np.int8), int(self._since_ns is not None)))
         for at in edges:
             if fallback[at]:
                 self._since_ns = int(t_ns[at]) - self._block_ns
@@ -116,8 +119,12 @@ class ChargeWatch:
         self._fallbacks += 1
         self._fallback_ns += length_ns
         self._longest_ns = max(self._longest_ns, length_ns)
-        if len(self._stretches) < _MOST_STRETCHES:
-            self._stretches.append((since_ns * 1e-9, until_ns * 1e-9))
+        self.stretches.append((since_ns * 1e-9, until_ns * 1e-9))
+
+    @property
+    def open_from_s(self) -> float | None:
+        """Begin of the fallback that goes on [s]; None where there is none, or the rig is on its way out."""
+        return self._since_ns * 1e-9 if self._since_ns is not None and not self._leaving else None
 
     def command(self, records: Records) -> None:
         """Take commands, [messages]."""
@@ -131,7 +138,7 @@ class ChargeWatch:
         newest = np.maximum.accumulate(np.concatenate([[self._newest_answered], blocks]))
         self._answered += int(np.count_nonzero(np.diff(newest) > 0))
         self._newest_answered = int(newest[-1])
-        step = np.diff(numbers, prepend=numbers[0] - 1 if self._next_command is None else self._next_command - 1)
+        step = steps(numbers, int(numbers[0]) - 1 if self._next_command is None else self._next_command - 1)
         self._lost_commands += int((step[step > 1] - 1).sum())
         self._next_command = int(numbers[-1]) + 1
 
@@ -158,7 +165,7 @@ class ChargeWatch:
             fallback_s=self._fallback_ns * 1e-9,
             fallbacks=self._fallbacks,
             longest_fallback_s=self._longest_ns * 1e-9,
-            stretches=list(self._stretches),
+            stretches=self.stretches[:_MOST_STRETCHES],
             unanswered=unanswered,
             answerable=answerable,
             controller_until_s=until_ns * 1e-9 if left and until_ns is not None else None,

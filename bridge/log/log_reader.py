@@ -4,6 +4,7 @@ So a cut or damaged file loses only the part that is cut or damaged: a checksum 
 cannot be read the pass goes on with the next whole chunk.
 """
 
+from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from io import BytesIO
@@ -18,7 +19,15 @@ from bridge.faults import Fault
 from bridge.log.chunk_messages import Chunked, Messages, messages_of
 from bridge.log.damage import Damage, also_before
 from bridge.log.library import HEAD, MAGIC, READABLE, refuse_other_version
-from bridge.log.reading.chunk_bytes import LARGEST_CHUNK_BYTES, UNREADABLE, next_chunk, next_record, opened, unpacked
+from bridge.log.reading.chunk_bytes import (
+    LARGEST_CHUNK_BYTES,
+    UNREADABLE,
+    Record,
+    next_chunk,
+    next_record,
+    opened,
+    unpacked,
+)
 from bridge.log.reading.definitions import Definitions
 from bridge.log.storage.parts import LOST, OF_FILES, parts_of
 
@@ -29,36 +38,71 @@ _ANYWAY_BYTES = 1 << 24
 _FOOTER_BYTES = 20
 # of chunks that are taken apart at once; with less the calls cost more than the work, as a chunk of 0.1 s holds 0.1 MB
 AT_ONCE_BYTES = 1 << 19
+# Groups that the second thread works on, ahead of the caller. With 1 it waits while the caller takes a group in; more cost
+# 2 MB each and save no time.
+_GROUPS_AHEAD = 2
 _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 _MOST_NAMES = 3  # of the schemas of another program's file that are told
 
 
-class _Packed(NamedTuple):
-    """A chunk on its way out of the file, or messages that stand in no chunk."""
+class _Group(NamedTuple):
+    """Chunks on their way out of the file, or messages that stand in no chunk."""
 
-    unpacked: "Future[bytes | None]"  # None where it cannot be read
-    indexes: list[bytes]  # contents of the index records after it
-    end_bytes: int  # place of its end in the file
+    apart: "Future[_Apart]"
+    end_bytes: int  # place of their end in the file
 
 
-class _Loose:
-    """Messages that stand in no chunk, gathered to be taken apart like one."""
+class _Apart(NamedTuple):
+    """The messages of a group."""
+
+    messages: Messages | None  # None where no chunk of it can be read
+    bad_chunks: int
+
+
+class _Filling:
+    """The group that is read at present: chunks with their indexes, and messages that stand in no chunk."""
 
     def __init__(self) -> None:
-        self._records: list[bytes] = []
-        self.bytes = 0
+        self._parts: list[tuple[Chunk | bytes | None, list[bytes]]] = []
+        self._loose: list[bytes] = []
+        self.bytes = 0  # uncompressed, as the chunks claim
 
-    def add(self, content: bytes) -> None:
-        """One more message."""
-        self._records.append(HEAD.pack(Opcode.MESSAGE, len(content)) + content)
+    def add_chunk(self, chunk: Chunk | None) -> list[bytes]:
+        """One more chunk; the list for its indexes, which follow it."""
+        self._end_loose()
+        indexes: list[bytes] = []
+        self._parts.append((chunk, indexes))
+        self.bytes += chunk.uncompressed_size if chunk is not None else 0
+        return indexes
+
+    def add_message(self, content: bytes) -> None:
+        """One more message that stands in no chunk."""
+        self._loose.append(HEAD.pack(Opcode.MESSAGE, len(content)) + content)
         self.bytes += len(content) + HEAD.size
 
-    def taken(self, end_bytes: int) -> _Packed:
-        """All of them so far, which are then forgotten."""
-        done: Future[bytes | None] = Future()
-        done.set_result(b"".join(self._records))
-        self._records, self.bytes = [], 0
-        return _Packed(done, [], end_bytes)
+    def _end_loose(self) -> None:
+        if self._loose:
+            self._parts.append((b"".join(self._loose), []))
+            self._loose = []
+
+    def taken(self, end_bytes: int, worker: ThreadPoolExecutor) -> _Group | None:
+        """All of it so far, which is then forgotten; None where it is empty."""
+        self._end_loose()
+        parts, self._parts, self.bytes = self._parts, [], 0
+        return _Group(worker.submit(_taken_apart, parts), end_bytes) if parts else None
+
+
+def _taken_apart(parts: list[tuple[Chunk | bytes | None, list[bytes]]]) -> _Apart:
+    """The messages of a group; the chunks that are damaged are counted."""
+    chunks: list[Chunked] = []
+    for part, indexes in parts:
+        data = part if isinstance(part, bytes) else unpacked(part)
+        if data is not None:
+            chunks.append(Chunked(data, indexes))
+    messages = messages_of(chunks) if chunks else None
+    for mine in messages.by_channel.values() if messages is not None else ():
+        _ = mine.stacked  # here, as the caller has the more to do
+    return _Apart(messages, len(parts) - len(chunks))
 
 
 class LogReader:
@@ -99,7 +143,8 @@ class LogReader:
 
     def count_bad_messages(self, count: int) -> None:
         """Add `count` messages that are whole but not messages of their topic to the damage."""
-        self.damage = self.damage.and_also(bad_records=count)
+        if count:
+            self.damage = self.damage.and_also(bad_records=count)
 
     def topic(self, channel_id: int) -> str | None:
         """The topic of a channel of this project; None where the channel is another program's, or its definition is lost."""
@@ -151,84 +196,86 @@ class LogReader:
         self._stated = None
 
     def _some_at_once(self, path: Path, size_bytes: int, before_bytes: int) -> Iterator[Messages]:
-        some: list[Chunked] = []
-        bytes_of_some = 0
-        for chunk in self._of_file(path, size_bytes, before_bytes):
-            some.append(chunk)
-            bytes_of_some += len(chunk.data)
-            if bytes_of_some >= AT_ONCE_BYTES:
-                yield self._taken_apart(some)
-                some, bytes_of_some = [], 0
-        if some:
-            yield self._taken_apart(some)
+        # a second thread unpacks chunks and finds their messages while the caller works on those before; definitions wait in
+        # the same queue, so that each holds for the messages after it
+        ahead: deque[_Group | Record] = deque()
+        groups = 0
+        with path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as worker:
+            for item in self._items(file, worker, size_bytes):
+                ahead.append(item)
+                groups += isinstance(item, _Group)
+                while groups > _GROUPS_AHEAD:
+                    first = ahead.popleft()
+                    groups -= isinstance(first, _Group)
+                    yield from self._taken_in(first, before_bytes)
+            for item in ahead:
+                yield from self._taken_in(item, before_bytes)
 
-    def _taken_apart(self, chunks: list[Chunked]) -> Messages:
-        messages = messages_of(chunks)
+    def _taken_in(self, item: _Group | Record, before_bytes: int) -> Iterator[Messages]:
+        """Learn a definition, or hand out the messages of a group."""
+        if isinstance(item, Record):
+            self._learn(item.opcode, item.content)
+            return
+        messages, bad_chunks = item.apart.result()
+        self.position_bytes = before_bytes + item.end_bytes
+        bad_records = messages.broken if messages is not None else 0
+        if bad_chunks or bad_records:
+            self.damage = self.damage.and_also(bad_chunks=bad_chunks, bad_records=bad_records)
+        if messages is None:
+            return
         for opcode, content in messages.others:
             if opcode in _DEFINITIONS:
                 self._learn(opcode, content)
-        if messages.broken:
-            self.damage = self.damage.and_also(bad_records=messages.broken)
-        return messages
+        yield messages
 
-    def _of_file(self, path: Path, size_bytes: int, before_bytes: int) -> Iterator[Chunked]:
-        # the next chunk is uncompressed while the caller works on the present one
-        with path.open("rb") as file, ThreadPoolExecutor(max_workers=1) as beside:
-            ready: _Packed | None = None
-            for packed in self._packed(file, beside, size_bytes):
-                if ready is not None:
-                    yield from self._taken_out(ready, before_bytes)
-                ready = packed
-            if ready is not None:
-                yield from self._taken_out(ready, before_bytes)
-
-    def _taken_out(self, packed: _Packed, before_bytes: int) -> Iterator[Chunked]:
-        """A chunk; nothing, but for the count, where it is damaged."""
-        data = packed.unpacked.result()
-        if data is None:
-            self.damage = self.damage.and_also(bad_chunks=1)
-            return
-        self.position_bytes = before_bytes + packed.end_bytes
-        yield Chunked(data, packed.indexes)
-
-    def _packed(self, file: IO[bytes], beside: ThreadPoolExecutor, size_bytes: int) -> Iterator[_Packed]:
-        """Every chunk, while it is uncompressed."""
+    def _items(self, file: IO[bytes], worker: ThreadPoolExecutor, size_bytes: int) -> Iterator[_Group | Record]:
+        """Groups of chunks, and the records between them, in file order."""
         if file.read(len(MAGIC)) != MAGIC:
             line = f"{self.path}: {size_bytes} bytes, no MCAP file (its first 8 bytes say so); give a run log"
             raise Fault("BAD_LOG", line)
         whole_bytes = len(MAGIC)
-        packed: _Packed | None = None
-        loose = _Loose()
+        filling = _Filling()
+        indexes: list[bytes] | None = None  # of the chunk just before
         while not self.damage.closed:
             record = next_record(file, whole_bytes, size_bytes)
-            if packed is not None and (record is None or record.is_chunk or record.opcode != Opcode.MESSAGE_INDEX):
-                yield packed  # now that all of its indexes were read
-                packed = None
-            is_loose = record is not None and record.opcode == Opcode.MESSAGE
-            if loose.bytes and (not is_loose or loose.bytes > AT_ONCE_BYTES):
-                yield loose.taken(whole_bytes)
+            is_message = record is not None and record.opcode == Opcode.MESSAGE
+            is_index = record is not None and record.opcode == Opcode.MESSAGE_INDEX and not record.is_chunk
+            is_definition = record is not None and record.opcode in _DEFINITIONS and not record.is_chunk
+            if is_definition or (filling.bytes > AT_ONCE_BYTES and not is_index):
+                group = filling.taken(whole_bytes, worker)
+                if group is not None:
+                    yield group
             if record is None:
                 start = self._after_damage(file, whole_bytes, size_bytes)
                 if start is None:
                     break
                 whole_bytes = file.seek(start)
+                indexes = None
                 continue
             content_at = whole_bytes + HEAD.size
             whole_bytes = record.end_bytes
             if record.is_chunk:
                 chunk = opened(record.content)
                 self._refuse_a_bomb(chunk)
-                packed = _Packed(beside.submit(unpacked, chunk), [], whole_bytes)
-            elif is_loose:
-                loose.add(record.content)
+                indexes = filling.add_chunk(chunk)
+            elif is_message:
+                filling.add_message(record.content)
+                indexes = None
+            elif is_index and indexes is not None:
+                indexes.append(record.content)
             elif record.opcode == Opcode.FOOTER and len(record.content) == _FOOTER_BYTES:
                 self.damage = self.damage._replace(closed=True)
-            elif packed is not None:
-                packed.indexes.append(record.content)
             elif record.opcode == Opcode.ATTACHMENT:
                 self.attachments.append((Path(file.name), content_at, whole_bytes - content_at))
             else:
-                self._learn(record.opcode, record.content)
+                indexes = None
+                if is_definition:
+                    yield record
+                else:
+                    self._learn(record.opcode, record.content)
+        group = filling.taken(whole_bytes, worker)
+        if group is not None:
+            yield group
         if not self.damage.closed:
             self.damage = self.damage.and_also(cut_bytes=size_bytes - whole_bytes)
 

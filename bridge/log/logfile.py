@@ -21,6 +21,7 @@ from bridge.log.metadata import configuration_of
 from bridge.log.reading.definitions import DERIVED
 from bridge.log.storage.chain import Chain
 from bridge.log.storage.parts import chain_of_log, later_names
+from bridge.log.watches.arrays import median
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, Layout, Records, sensor_block
 from bridge.wire.payloads import parsed
@@ -51,14 +52,14 @@ def iter_pieces(reader: LogReader) -> Iterator[Piece]:
     layouts: dict[str, Layout] = dict(_LAYOUTS)
     for messages in reader.messages():
         channels: dict[str, list[int]] = {}
-        for channel_id in messages.channels():
+        for channel_id, mine in messages.by_channel.items():
             topic = reader.topic(channel_id)
             if topic is None:
-                reader.pass_over(channel_id, len(messages.of([channel_id]).start))
+                reader.pass_over(channel_id, len(mine.start))
             elif topic not in DERIVED:  # of one topic several may alternate: two publishers, or a log that was merged
                 channels.setdefault(topic, []).append(channel_id)
         for topic, same in channels.items():
-            mine = messages.of(same)
+            mine = messages.by_channel[same[0]] if len(same) == 1 else messages.of(same)
             log_ns = mine.heads["log_ns"].astype(np.int64)
             if topic in STREAMING:
                 if topic not in layouts:
@@ -85,10 +86,8 @@ def _samples(messages: Messages) -> int:
 
 def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt.NDArray[np.int64]]:
     """The readable payloads with every field written and in order, [messages, size]; and which of the messages they are of."""
-    lengths = messages.payload_bytes()
-    length = int(lengths[0]) if len(lengths) else 0
-    if length in layout.whole_sizes and (lengths == length).all():
-        stacked = messages.stacked(length)
+    stacked = messages.stacked
+    if stacked is not None and (length := stacked.shape[1]) in layout.whole_sizes:
         if length < layout.size:  # of an older schema, without the last fields
             whole = np.frombuffer(layout.blank(len(stacked)).tobytes(), np.uint8).reshape(-1, layout.size).copy()
             whole[:, :length] = stacked
@@ -121,7 +120,7 @@ def block_period_ns(sensors: Records) -> float:
     numbers, steps_ns = np.diff(sensors["sequence"].astype(np.int64)), np.diff(sensors["t_ns"])
     forward = (numbers > 0) & (steps_ns > 0)  # a clock that stands shows no period
     if forward.any():
-        return float(np.median(steps_ns[forward] / numbers[forward]))
+        return median(steps_ns[forward] / numbers[forward])
     if len(sensors) and sensors["t_ns"][0] > 0:
         return float(sensors["t_ns"][0]) / (float(sensors["sequence"][0]) + 1.0)
     return 1e6

@@ -1,4 +1,4 @@
-"""Pauses as events of a log: PAUSE of the machine, CORE_PAUSE of one core alone, WATCH for whether they were watched."""
+"""Stalls as events of a log: PAUSE of every core, CORE_PAUSE of one core alone, WATCH for whether they were watched."""
 
 import re
 from collections.abc import Iterable
@@ -7,7 +7,8 @@ from typing import NamedTuple
 from bridge.wire import stickslip_pb2 as wire
 
 PAUSE, CORE_PAUSE, WATCH = "PAUSE", "CORE_PAUSE", "WATCH"
-NOT_WATCHED = "pauses of the machine not watched: "
+NOT_WATCHED = "stalls of the computer not watched: "
+_NOT_WATCHED_BEFORE = "pauses of the machine not watched: "  # in logs of earlier versions
 _LENGTH = re.compile(r"\bfor (\d{1,12}\.\d{3}) ms\b")
 
 
@@ -19,20 +20,22 @@ class RunPause(NamedTuple):
 
 
 def in_words(length_ns: int, core: int | None) -> str:
-    """The text of an event PAUSE, or of CORE_PAUSE where one core stood still alone."""
-    who = "the machine" if core is None else f"core {core}"
-    return f"{who} stood still for {length_ns * 1e-6:.3f} ms"
+    """The text of an event PAUSE, or of CORE_PAUSE where one core stalled alone."""
+    who = "the computer" if core is None else f"core {core}"
+    return f"{who} stalled for {length_ns * 1e-6:.3f} ms"
 
 
 def pauses_of(events: Iterable[wire.Event], code: str = PAUSE) -> list[RunPause]:
-    """The pauses of the machine that a log tells, in order of time; with CORE_PAUSE those of one core alone."""
+    """The stalls of the computer in a log, in order of time; with CORE_PAUSE those of one core alone."""
     told = [(event.t_ns, _LENGTH.search(event.text)) for event in events if event.code == code]
     return sorted(RunPause(t_ns, t_ns + round(float(found[1]) * 1e6)) for t_ns, found in told if found)
 
 
 def not_watched(events: Iterable[wire.Event]) -> str:
-    """Why the machine's pauses are not known, or not all of them; empty where they were watched to the end."""
-    said = [event.text for event in events if event.code == WATCH]
-    if not said:
+    """Why the computer's stalls are not known, or not all of them; empty where they were watched to the end."""
+    texts = [event.text for event in events if event.code == WATCH]
+    if not texts:
         return "the recorder of this log did not"
-    return next((text.removeprefix(NOT_WATCHED) for text in said if text.startswith(NOT_WATCHED)), "")
+    prefixes = NOT_WATCHED, _NOT_WATCHED_BEFORE
+    refused = [text.removeprefix(prefix) for text in texts for prefix in prefixes if text.startswith(prefix)]
+    return refused[0] if refused else ""

@@ -1,4 +1,4 @@
-"""Writing the machine's pauses into the log that is being recorded, in the time of its run."""
+"""Writing the computer's stalls into the log that is being recorded, in the time of its run."""
 
 import time
 
@@ -57,7 +57,7 @@ class PauseWriter:
         self._due_s = 0.0
         if not watch.refused:
             cores = ", ".join(map(str, watch.cores))
-            text = f"pauses of the machine are watched on {counted(len(watch.cores), 'core')}: {cores}"
+            text = f"stalls of the computer are watched on {counted(len(watch.cores), 'core')}: {cores}"
             log.add_event(WATCH, text, holds=True)
 
     def note(self, received: Received) -> None:

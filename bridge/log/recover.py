@@ -74,7 +74,7 @@ class _Copy:
         """Messages and what defines them. Those of a channel without a definition have no topic, and are counted as lost."""
         self.take_metadata()
         ids = {
-            channel_id: self.take_channel(channel_id) for channel_id in {*self.reader.channels, *messages.channels()}
+            channel_id: self.take_channel(channel_id) for channel_id in {*self.reader.channels, *messages.by_channel}
         }
         columns = (messages.heads[name].tolist() for name in ("channel", "sequence", "log_ns", "publish_ns"))
         for channel, sequence, log_ns, publish_ns, payload in zip(*columns, messages.payloads(), strict=True):

@@ -10,6 +10,8 @@ from typing import Any
 from bridge.faults import Fault
 from bridge.log.block_rows import rows
 from bridge.log.mcap_chunks import ChunkWriter
+from bridge.log.storage.afterwards import file_end
+from bridge.log.storage.chain import Chain
 from bridge.log.storage.log_files import LogFiles, Rotation
 from bridge.log.storage.parts import PART, parts_of
 from bridge.log.viewers import foxglove_log
@@ -86,6 +88,16 @@ class RunLog:
             writer.add_metadata(PART, {key: json.dumps(value) for key, value in place.items()})
         for name, fields in self._tables.items():
             writer.add_metadata(name, fields)
+
+    @property
+    def tables(self) -> dict[str, dict[str, str]]:
+        """The metadata of the log so far, by name."""
+        return self._tables
+
+    def chain(self) -> Chain:
+        """What its hash chain says once the log is closed, known from writing: nothing is read back but the last bytes."""
+        files = self._files
+        return Chain(files.links, files.begins, files.last_link, [], 0, True, file_end(self.path), True)
 
     def add_header(self, header: wire.Header) -> None:
         """Write the configuration and versions of one process, so that a run can be repeated from its log alone."""

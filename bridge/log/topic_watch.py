@@ -1,13 +1,12 @@
 """Numbers and times of one topic of a log: missing messages, duplicates, jumps of a clock."""
 
 import numpy as np
-import numpy.typing as npt
 
 from bridge.log.finding import Finding
+from bridge.log.watches.arrays import Integers, steps
 from bridge.units import counted
 from bridge.wire.messages import Records
 
-Integers = npt.NDArray[np.int64]
 # Difference of t_ns and the message numbers up to which a clock is right; rounding to whole nanoseconds is far below.
 _CLOCK_TOLERANCE_NS = 1000
 _REMEMBERED_NUMBERS = 1 << 20  # missing numbers that are kept, to tell a late message from a duplicate; costs memory
@@ -25,11 +24,14 @@ class TopicWatch:
         self._missing_numbers: set[int] = set()
         self._gaps_for_good: list[range] = []  # gaps before a restart, and gaps too large to remember each number
         self._highest = -1
-        self._duplicates: list[int] = []
-        self._late: list[int] = []
+        self._duplicates = self._late = 0
+        self._first_duplicate = self._first_late = 0
         self._restarted_at: list[int] = []
-        self._jumps: list[tuple[int, int]] = []  # number, by how much [ns]
-        self._arrived_before: list[tuple[int, int]] = []
+        self.jumps = self.standing = 0  # steps of the clock that do not follow the numbers; those of 0
+        self.first_jump = (0, 0)  # number, step less the expected one [ns]
+        self._first_step_ns = 0
+        self._arrived_before = 0
+        self._first_before = (0, 0)
         self._last_number = -1
         self._last_log_time_ns = 0
 
@@ -51,17 +53,26 @@ class TopicWatch:
             self._last_number = self._highest = int(number[0]) - 1
             self._last_log_time_ns = int(log_time_ns[0])
             self.last_t_ns = int(t_ns[0]) - round(period_ns)
-        step = np.diff(number, prepend=self._last_number)
-        step_ns = np.diff(t_ns, prepend=self.last_t_ns)
-        arrival_ns = np.diff(log_time_ns, prepend=self._last_log_time_ns)
+        step = steps(number, self._last_number)
+        step_ns = steps(t_ns.astype(np.int64), self.last_t_ns)
+        arrival_ns = steps(log_time_ns, self._last_log_time_ns)
         for i in np.flatnonzero(step != 1):
             self._odd_number(int(number[i]), int(number[i]) - int(step[i]))
         # the running maximum; `_odd_number` sets it back at a restart
         self._highest = max(self._highest, int(number[-1]))
         forward = step > 0
-        jumped = np.abs(step_ns - period_ns * step) > _CLOCK_TOLERANCE_NS if period_ns else step_ns < 0
-        self._jumps += [(int(number[i]), int(step_ns[i])) for i in np.flatnonzero(forward & jumped)]
-        self._arrived_before += [(int(number[i]), int(arrival_ns[i])) for i in np.flatnonzero(arrival_ns < 0)]
+        off_ns = step_ns - period_ns * step
+        jumped = np.flatnonzero(forward & (np.abs(off_ns) > _CLOCK_TOLERANCE_NS if period_ns else step_ns < 0))
+        if len(jumped):
+            if not self.jumps:
+                self.first_jump = int(number[jumped[0]]), int(off_ns[jumped[0]])
+                self._first_step_ns = int(step_ns[jumped[0]])
+            self.jumps += len(jumped)
+            self.standing += int(np.count_nonzero(step_ns[jumped] == 0))
+        if len(back := np.flatnonzero(arrival_ns < 0)):
+            if not self._arrived_before:
+                self._first_before = int(number[back[0]]), int(arrival_ns[back[0]])
+            self._arrived_before += len(back)
         self.messages += len(number)
         self._last_number, self.last_t_ns = int(number[-1]), int(t_ns[-1])
         self._last_log_time_ns = int(log_time_ns[-1])
@@ -83,9 +94,11 @@ class TopicWatch:
             self._highest = 0
         elif number in self._missing_numbers:
             self._missing_numbers.remove(number)
-            self._late.append(number)
+            self._first_late = self._first_late if self._late else number
+            self._late += 1
         elif number <= self._highest:
-            self._duplicates.append(number)
+            self._first_duplicate = self._first_duplicate if self._duplicates else number
+            self._duplicates += 1
 
     def findings(self) -> list[Finding]:
         """A finding for each kind of fault of the topic."""
@@ -113,27 +126,17 @@ class TopicWatch:
             )
         if self.topic == "sensors" and self.first_number > 0:
             add("gap", f"begins with block {self.first_number}: those before were not recorded", self.first_number)
-        if self._duplicates:
-            text = (
-                f"numbers come a second time at {counted(len(self._duplicates), 'place')}, first {self._duplicates[0]}"
-            )
-            add("duplicate", text, len(self._duplicates))
-        if self._late:
-            add(
-                "order",
-                f"{counted(len(self._late), 'message')} came after a later one, first {self._late[0]}",
-                len(self._late),
-            )
-        if self._jumps:
-            number, step_ns = self._jumps[0]
-            places = counted(len(self._jumps), "place")
-            text = f"t_ns does not follow the numbers at {places}, first {number}: a step of {step_ns / 1e6:g} ms"
-            add("clock-jump", text, len(self._jumps))
-        if self._arrived_before:
-            number, step_ns = self._arrived_before[0]
-            places = counted(len(self._arrived_before), "place")
-            text = f"log_time goes back at {places}, first {number}: by {-step_ns / 1e6:g} ms"
-            add("log-time-back", text, len(self._arrived_before))
+        times = counted(self._duplicates, "place")
+        add("duplicate", f"numbers come a second time at {times}, first {self._first_duplicate}", self._duplicates)
+        late = counted(self._late, "message")
+        add("order", f"{late} came after a later one, first {self._first_late}", self._late)
+        places, step = counted(self.jumps, "place"), f"a step of {self._first_step_ns / 1e6:g} ms"
+        text = f"t_ns does not follow the numbers at {places}, first {self.first_jump[0]}: {step}"
+        add("clock-jump", text, self.jumps)
+        number, step_ns = self._first_before
+        places = counted(self._arrived_before, "place")
+        text = f"log_time goes back at {places}, first {number}: by {-step_ns / 1e6:g} ms"
+        add("log-time-back", text, self._arrived_before)
         return found
 
 

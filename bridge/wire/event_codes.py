@@ -95,7 +95,7 @@ EVENTS = {
         ),
         EventCode("RIG_BACK", "controller", NEWS, "blocks come again"),
         EventCode("RIG_RESTARTED", "controller", OUTSIDE, "the rig counts its blocks anew, and is taken up again"),
-        EventCode("PAUSED", "plant, controller", OUTSIDE, "this process itself stood still for more than 0.25 s"),
+        EventCode("PAUSED", "plant, controller", OUTSIDE, "this process itself stalled for more than 0.25 s"),
         EventCode("FOREIGN", "plant, controller, recorder", OUTSIDE, "a message that none of the known processes sent"),
         EventCode(
             "REPEATED", "plant, controller, recorder", OUTSIDE, "a message that was there already; it was dropped"

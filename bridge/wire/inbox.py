@@ -6,6 +6,10 @@ from typing import NamedTuple
 
 from bridge.wire.topics import Topic
 
+# Blocks, or commands, that may wait for a loop that stalls. 256: a stall of 256 ms loses blocks. At least the blocks of 1 ms of a
+# lease, 1500, as a longer stall ends the link anyway. Larger: a controller that floods its rig delays a block by more than 16 ms,
+# at 4 us a command.
+WAITING = 4096
 # Rare messages of one topic that may wait. Too small: a burst of announcements is lost. Larger: who floods a topic is read for
 # longer before the next block, which 256 messages delay by less than 1 ms.
 _KEPT = 256

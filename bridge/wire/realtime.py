@@ -102,8 +102,8 @@ def _beside_the_loop() -> frozenset[int]:
 def hasten() -> None:
     """Let this process go before all without SCHED_FIFO, where it may: for one who only looks on, and keeps no time.
 
-    Where all cores are busy it is otherwise held up for more than the lease of 100 ms: its link lapses, what is said until it
-    stands again is lost, and a person's STOP on a page waits. Call it after the bus is open.
+    Where all cores are busy it is otherwise held up for some 100 ms, and an operator's STOP waits. Threads that begin later
+    inherit it.
     """
     beside = _beside_the_loop()
     for thread in _threads():
@@ -123,14 +123,6 @@ def _lock_memory() -> bool:
     if os.geteuid() != 0 and resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
         return False
     return ctypes.CDLL(None).mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) == 0
-
-
-def let_the_bus_send() -> None:
-    """Let the thread that sends run now: it has this thread's core and priority, and waits until the loop sleeps otherwise.
-
-    Not while a loop makes up for blocks, which others could not take as fast (docs/method/bridge.md).
-    """
-    os.sched_yield()
 
 
 def may_claim(priority: int = LOOP_PRIORITY) -> bool:

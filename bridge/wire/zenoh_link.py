@@ -199,17 +199,15 @@ class Bus:
     def publisher(self, topic: Topic) -> Callable[[bytes], None]:
         """A function that sends bytes on `topic`.
 
-        Sensors, announcements and commands have priority; what one role sends of them comes in the order of sending. In real
-        time a message that cannot be sent is dropped; in lockstep the call waits.
+        Zenoh sends a message at once where its queue is empty, and packs messages together where it is not: 16 packets then hold
+        some 1600 blocks. Sent `express`, each message fills a packet, and a receiver that pauses for 17 ms loses the rest. In
+        real time a message that cannot be sent is dropped; in lockstep the call waits.
         """
-        control = topic.name in {"sensors", "command", "announce"}
         block = zenoh.CongestionControl.BLOCK
         declared = self._session.declare_publisher(
             self._key(topic.name),
             encoding=zenoh.Encoding.APPLICATION_PROTOBUF,
-            priority=zenoh.Priority.REAL_TIME if control else zenoh.Priority.DATA,
             congestion_control=block if self._lockstep else zenoh.CongestionControl.DROP,
-            express=control,
         )
         self._keep.append(declared)
         return declared.put

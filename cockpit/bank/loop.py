@@ -69,7 +69,8 @@ def advance_with_truth(
         answered: 1 where `commands[0]` answers the block before the first, 0 at the start of a run.
         analogue, sensors, applied: [5, samples] and one record each, overwritten by every block.
         commands: message records [blocks + 1]; the first is what the rig hears first, the others are filled.
-        traces, truth, v_a_mps, frequency_Hz, gain: filled, as `cockpit.bank.watch.watch` takes them.
+        truth: filled, [blocks, 6, samples], rows as `plant.records.TRUTH`.
+        traces, v_a_mps, frequency_Hz, gain: filled, as `cockpit.bank.watch.watch` takes them.
 
     Fewer blocks than asked are done where the slide's velocity becomes NaN or infinite.
 
@@ -77,7 +78,7 @@ def advance_with_truth(
     samples = analogue.shape[1]
     blocks, said = noise.shape[0], 0
     for i in range(blocks):
-        rows = truth[:, i * samples : (i + 1) * samples]
+        rows = truth[i]
         came = answered if i == 0 else 1
         if came == 1 and not accept(guard_params[0], guard_state[0], commands[i]):
             came = 0
@@ -187,7 +188,7 @@ class JudgedLoop:
         known_mps = sliding_window_view(np.abs(velocity_mps[first:]), last - first + 1).max(axis=1)
         commands = COMMAND.blank(blocks + 1)
         commands[:1] = self._last_command
-        traces, truth = TRACE.blank(blocks), np.empty((len(TRUTH), blocks * samples))
+        traces, truth = TRACE.blank(blocks), np.empty((blocks, len(TRUTH), samples))
         v_a_mps, frequency_Hz, gain = (np.empty(blocks) for _ in range(3))
         done = advance_with_truth(
             *self._plant, *self._guard, velocity_mps[:blocks], noise, self._by_rule, *self._subject, *self._rule,
@@ -196,4 +197,5 @@ class JudgedLoop:
         )  # fmt: skip
         self.block += done
         self._last_command = commands[done : done + 1]
-        return Stretch(truth[:, : done * samples], v_a_mps[:done], frequency_Hz[:done], gain[:done], traces[:done])
+        in_time = truth[:done].transpose(1, 0, 2).reshape(len(TRUTH), done * samples)
+        return Stretch(in_time, v_a_mps[:done], frequency_Hz[:done], gain[:done], traces[:done])

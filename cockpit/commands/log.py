@@ -9,7 +9,7 @@ import typer
 from bridge.faults import Fault
 from bridge.units import counted
 from cockpit.commands.as_json.option import STDOUT, Json, JsonGroup, carry_out, tell
-from cockpit.commands.options import watched_share
+from cockpit.commands.options import Strict, Verbose, watched_share
 from cockpit.run.writable import LOG, TABLE, check_output, check_output_folder
 
 if TYPE_CHECKING:
@@ -22,16 +22,20 @@ LogArgument = Annotated[Path, typer.Argument(help="A run log, .mcap.")]
 
 
 @log_app.command("info")
-def log_info(path: LogArgument, as_json: Json = None) -> None:
-    """Judge the run in a log: slips, swing, v_a / v_d, latency, what was lost; exit status 1 where it is not good."""
+def log_info(path: LogArgument, verbose: Verbose = False, strict: Strict = False, as_json: Json = None) -> None:
+    """Judge the run in a log, and check the log; exit status 0 ok, 1 not ok, 14 not judged."""
 
     def work() -> int:
-        from cockpit.judge.verdict import judge
-        from cockpit.judge.verdict_words import headline, in_words
+        from cockpit.judge.judged import judge_log
+        from cockpit.judge.verdict_words import in_words, shortened, strictly
 
-        verdict = judge(path)
-        tell(as_json, verdict.as_dict(), [headline(verdict), *in_words(verdict)])
-        return 0 if verdict.good else 1
+        with watched_share(f"judging {path.name}", quiet=as_json == STDOUT) as progress:
+            verdict, check, _ = judge_log(path, progress)
+        known = {line.partition(":")[0].lower().replace("_", "-") for line in (*verdict.faults, *verdict.told)}
+        findings = [f"finding  {finding.in_words()}" for finding in check.findings if finding.kind not in known]
+        words = [*in_words(verdict, verbose), *shortened(findings, verbose), *strictly(verdict, strict)]
+        tell(as_json, verdict.as_dict() | {"findings": check.as_dict()["findings"]}, words)
+        return verdict.exit_status(strict)
 
     carry_out(work, as_json)
 
@@ -201,7 +205,7 @@ def _import_as_seen(path: Path, out: Path, kept: Path, speed: str, mass: str) ->
 
 @log_app.command("check")
 def log_check(path: LogArgument, as_json: Json = None) -> None:
-    """Say what is wrong with a log; exit status 0 when nothing is, 1 with findings, 7 when it is no run log."""
+    """The findings of a log alone, for scripts; exit status 0 without any, 1 with findings, 7 when it is no run log."""
 
     def work() -> int:
         from bridge.log.check.log_check import check_log

@@ -31,6 +31,10 @@ Wait = Annotated[
     float | None,
     typer.Option("--wait", min=0.1, max=1e6, metavar="S", help="Longest wait for the others at the start, in seconds."),
 ]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="All figures, warnings and findings.")]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="For acceptance tests: any lost message or late command is exit status 1, too.")
+]
 Prefix = Annotated[str | None, typer.Option(help="First part of every key on the bus.")]
 Lockstep = Annotated[
     bool,

@@ -11,10 +11,12 @@ from cockpit.commands.options import DEFAULT_SCENARIO, Certs, Endpoint, Prefix, 
 
 def _say(word: str, scenario: str, endpoint: str | None, prefix: str | None, certs: Path | None, as_json: Json) -> None:
     def work() -> int:
+        from bridge.wire import realtime
         from cockpit.run.operator import tell as say
         from cockpit.run.scenario_file import load_bus
 
         bus = load_bus(scenario, as_settings([], None, endpoint, prefix, certs))
+        realtime.hasten()  # a stop must not wait for a core
         obeyed = say(bus, word)
         tell(as_json, obeyed, obeyed.in_words())
         return 0 if obeyed.done else 1

@@ -77,7 +77,7 @@ def plot(
         with _written(picture, PICTURE):
             verdict = draw_logs(logs, picture, request, data)[0]
         words = [f"picture  {picture}", *([f"data     {data}"] if data is not None else [])]
-        tell(as_json, {"picture": picture, "data": data} | verdict.as_dict(), words)
+        tell(as_json, verdict.as_dict() | {"picture": picture, "data": data}, words)
 
     carry_out(work, as_json)
 

@@ -16,6 +16,8 @@ from cockpit.commands.options import (
     ScenarioName,
     Seed,
     Settings,
+    Strict,
+    Verbose,
     Wait,
     as_settings,
 )
@@ -43,11 +45,14 @@ def run(
     without: Annotated[
         bool, typer.Option("--without", help="Simulate the same run without the controller, too, to compare with.")
     ] = False,
+    verbose: Verbose = False,
+    strict: Strict = False,
     as_json: Json = None,
 ) -> None:
-    """Run plant, controller and recorder to the end of a scenario and say what came of it."""
+    """Run plant, controller and recorder to the end of a scenario and judge it; exit status 0 ok, 1 not ok, 14 not judged."""
 
     def work() -> int:
+        from cockpit.judge.verdict_words import strictly
         from cockpit.run.run import run_scenario
         from cockpit.run.scenario_file import rig_setting
 
@@ -55,7 +60,7 @@ def run(
         changed = [*other, *as_settings(settings, seed, endpoint, prefix, certs, insecure)]
         with stopped_once():
             came = run_scenario(scenario, changed, lockstep, in_process, log, wait, without)
-            tell(as_json, came.as_dict(), came.in_words())
-        return 0 if came.verdict.good else 1
+            tell(as_json, came.as_dict(), [*came.in_words(verbose), *strictly(came.verdict, strict)])
+        return came.verdict.exit_status(strict)
 
     carry_out(work, as_json)

@@ -17,8 +17,8 @@ from bridge.wire import stickslip_pb2 as wire
 from cockpit.figures.curves import Curve, as_table, curve_of, window_of
 from cockpit.figures.request import PAPER, SCREEN, Request
 from cockpit.figures.signals import Signal, limits_of, named
-from cockpit.judge.slips import cycles_of
-from cockpit.judge.verdict import RunVerdict, judge_run
+from cockpit.judge.judged import judge_tables
+from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import headline
 from diagnosis.features.cycles import Cycles
 
@@ -71,7 +71,7 @@ def draw_logs(
 
 def _shown(path: Path, name: str) -> _Shown:
     run = read_run(path)
-    return _Shown(run, name, judge_run(run), cycles_of(run))
+    return _Shown(run, name, *judge_tables(run))
 
 
 def _names(logs: Sequence[Path]) -> list[str]:

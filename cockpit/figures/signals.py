@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bridge.faults import Fault
 from bridge.log.logfile import RunData, block_period_ns, sample_times_s
 from bridge.log.metadata import is_number
-from cockpit.judge.slips import absent_channels
+from cockpit.judge.setup import absent_channels
 
 Floats = npt.NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def named(text: str, run: RunData) -> list[Signal]:
 def holds(run: RunData, name: str) -> bool:
     """Whether a log holds a signal at all."""
     signal = SIGNALS[name]
-    if signal.topic == "sensors" and name in absent_channels(run):
+    if signal.topic == "sensors" and name in absent_channels(run.headers, run.path):
         return False
     return len(getattr(run, signal.topic)) > 0
 

@@ -1,9 +1,16 @@
-"""What came of a run.
+"""What came of a run: one judge for `run`, `log info`, `review`, `plot` and `replay`.
 
-verdict         slips before and after, what was lost, whether it is good
+judged          a run judged from its log, or from the arrays of a log that was read
+run_judge       messages in, verdict out; a composition of the modules below
+verdict         the figures, and whether control is ok, not ok or not judged
 verdict_words   the same in words
+setup           what of the configurations the judge needs
+window          the rows that wait, and the windows in which they are judged
 phases          the stretches of a run: before the controller, while it takes over, after
+slips, strokes  slips and swing of the drive force
 machine_terms   following error, quadrant error at reversals, dose of vibration
+pauses          stalls of the computer, and the commands that were late
+watches         latency, samples that are no numbers, the controller's steps, v_a/v_d
 margins         the stability margins of the amplitude loop
 stability_map   where a rig sticks and slips, as a picture
 """

@@ -18,14 +18,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.log.logfile import RunData
+from bridge.log.watches.arrays import median
 from bridge.wire import stickslip_pb2 as wire
+from cockpit.judge.window import Moved, Window
 
 Floats = npt.NDArray[np.floating[Any]]
 Bools = npt.NDArray[np.bool_]
 
 _FOLLOWS = 0.5  # of the drive's way: a slide that makes more has ended its stick
 _AT_TURN_SIGMAS = 6.0  # of the drive's noise within which it is where it turned
+_CHANGE_S = 0.25  # before the turn at the end of a window: the controller sees it some 0.03 s earlier or later
 _SEEN_SIGMAS = 10.0  # of the noise of both ways: the way of the drive on which its slide is judged
 
 
@@ -50,59 +52,133 @@ class Reversal(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """A run block by block, [blocks] each, and its reversals."""
+    """A stretch of a run block by block, [blocks] each, and its reversals."""
 
     t_s: Floats
     error_m: Floats | None  # drive less slide; None where one of them has no position
     direction: npt.NDArray[np.int64]  # of the drive, 0 where it stands
     dose_m2_per_s: Floats  # v_a^2 times the block, 0 where the exciter rests
     reversals: list[Reversal]
-    block_s: float
 
-    def following(self, counts: Callable[[Floats], Bools]) -> Following | None:
-        """The blocks and reversals whose times count; None where none moves, or a position is missing."""
-        chosen = counts(self.t_s) & (self.direction != 0)
-        if self.error_m is None or not chosen.any():
+
+class FollowingSum:
+    """How the slide follows the drive in a stretch of a run, gathered piece by piece."""
+
+    def __init__(self) -> None:
+        self._blocks = 0
+        self._squares_m2 = self._peak_m = self._dose_m2_per_s = 0.0
+        self._ways = {-1: (0, 0.0, 0.0), 1: (0, 0.0, 0.0)}  # by direction: blocks, mean, squares about the mean
+        self._reversals = 0
+        self._stick_s = self._quadrant_m = 0.0
+
+    def add(self, motion: Motion, counts: Callable[[Floats], Bools]) -> None:
+        """The blocks and reversals whose times count."""
+        counted = counts(motion.t_s)
+        self._dose_m2_per_s += float(motion.dose_m2_per_s[counted].sum())
+        if motion.error_m is None:
+            return
+        for way, before in self._ways.items():
+            error_m = motion.error_m[counted & (motion.direction == way)]
+            if not len(error_m):
+                continue
+            blocks, mean_m = before[0] + len(error_m), float(error_m.mean())
+            apart_m = mean_m - before[1]
+            about_m2 = float(((error_m - mean_m) ** 2).sum()) + apart_m**2 * before[0] * len(error_m) / blocks
+            self._ways[way] = blocks, before[1] + apart_m * len(error_m) / blocks, before[2] + about_m2
+            self._blocks += len(error_m)
+            self._squares_m2 += float((error_m**2).sum())
+            self._peak_m = max(self._peak_m, float(np.abs(error_m).max()))
+        inside = counts(np.array([reversal.t_s for reversal in motion.reversals]))
+        for reversal, here in zip(motion.reversals, inside, strict=True):
+            if here:
+                self._reversals += 1
+                self._stick_s = max(self._stick_s, reversal.stick_s)
+                self._quadrant_m = max(self._quadrant_m, reversal.quadrant_error_m)
+
+    def result(self, block_s: float) -> Following | None:
+        """All of it; None where no block moves, or a position is missing."""
+        if not self._blocks:
             return None
-        error_m, direction = self.error_m[chosen], self.direction[chosen]
-        about = np.concatenate([part - part.mean() for way in (-1, 1) if len(part := error_m[direction == way])])
-        turned = np.array([one.t_s for one in self.reversals])
-        inside = [one for one, here in zip(self.reversals, counts(turned), strict=True) if here]
         return Following(
-            moving_s=len(error_m) * self.block_s,
-            error_rms_m=_rms(error_m),
-            error_peak_m=float(np.abs(error_m).max()),
-            error_ripple_m=_rms(about),
-            reversals=len(inside),
-            reversal_stick_s=max((one.stick_s for one in inside), default=0.0),
-            quadrant_error_m=max((one.quadrant_error_m for one in inside), default=0.0),
+            moving_s=self._blocks * block_s,
+            error_rms_m=float(np.sqrt(self._squares_m2 / self._blocks)),
+            error_peak_m=self._peak_m,
+            error_ripple_m=float(np.sqrt(sum(way[2] for way in self._ways.values()) / self._blocks)),
+            reversals=self._reversals,
+            reversal_stick_s=self._stick_s,
+            quadrant_error_m=self._quadrant_m,
         )
 
-    def dose_mm2_per_s(self, counts: Callable[[Floats], Bools]) -> float:
-        """The integral of v_a^2 over the blocks that count."""
-        return 1e6 * float(self.dose_m2_per_s[counts(self.t_s)].sum())
+    @property
+    def dose_mm2_per_s(self) -> float:
+        """The integral of v_a^2."""
+        return 1e6 * self._dose_m2_per_s
 
 
-def motion_of(run: RunData, block_s: float) -> Motion:
-    """The motion of a run from its positions, and from what its controller saw of the drive."""
-    _, at_sensors, at_trace = np.intersect1d(run.sensors["sequence"], run.trace["block"], return_indices=True)
-    sensors, trace = run.sensors[at_sensors], run.trace[at_trace]
-    slide_m, drive_m = (
-        sensors[name].mean(axis=1, dtype=np.float64) for name in ("mass_position_m", "drive_position_m")
-    )
+class MotionOf:
+    """The motion of a run, window by window, from its positions and from what its controller saw of the drive."""
+
+    def __init__(self) -> None:
+        self._moved = Moved()
+        self._last: tuple[float, float, float, int] | None = (
+            None  # the last block of the windows before in which the drive moved
+        )
+        self._until_s = -np.inf  # to which changes of direction were judged
+
+    def __call__(self, window: Window, block_s: float) -> Motion:
+        """The rows of a window that are to be judged."""
+        rows, trace, slide_m, drive_m = _paired(window)
+        t_s = window.blocks.t_ns[rows] / 1e9
+        moves = (trace["state"] != wire.STANDSTILL) & np.isfinite(trace["drive_velocity_mps"])
+        direction = np.where(moves, np.sign(trace["drive_velocity_mps"]), 0.0).astype(np.int64)
+        own = (rows >= window.first) & (rows < window.end)
+        v_a_mps = trace["vibration_velocity_mps"]
+        shaken = _shaken(window, rows)
+        dose = np.where(shaken & np.isfinite(v_a_mps), v_a_mps, 0.0) ** 2 * block_s
+        slide_moved, drive_moved = self._moved("slide", slide_m), self._moved("drive", drive_m)
+        there = slide_moved and drive_moved and len(rows) > 0  # a transducer that is not there stands
+        found = self._reversals(window, t_s, slide_m, drive_m, direction) if there else []
+        error_m = (drive_m - slide_m)[own] if there else None
+        return Motion(t_s[own], error_m, direction[own], dose[own], found)
+
+    def _reversals(
+        self, window: Window, t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]
+    ) -> list[Reversal]:
+        """The changes of direction of a window; the one at its end belongs to the next, which sees the stroke after it."""
+        until_s = np.inf if window.is_last else window.own_ns[1] * 1e-9 - _CHANGE_S
+        columns: Any = t_s, slide_m, drive_m, direction
+        if self._last is not None and self._last[0] < t_s[0]:  # the drive may have stood since
+            columns = tuple(np.concatenate([[one], column]) for one, column in zip(self._last, columns, strict=True))
+        changed_s, found = _changes(*columns)
+        mine = [one for at_s, one in zip(changed_s, found, strict=True) if self._until_s <= at_s < until_s]
+        self._until_s = until_s
+        moving = np.flatnonzero((direction != 0) & (t_s < until_s))
+        if len(moving):
+            last = moving[-1]
+            self._last = float(t_s[last]), float(slide_m[last]), float(drive_m[last]), int(direction[last])
+        return mine
+
+
+def _paired(window: Window) -> tuple[npt.NDArray[np.int64], Any, Floats, Floats]:
+    """Rows of the blocks of a window that have both places and a step of the controller, these steps, and the places."""
+    blocks, trace = window.blocks, window.trace
+    rows = np.arange(len(blocks.sequence))
+    if len(rows) != len(trace) or not np.array_equal(blocks.sequence, trace["block"]):
+        _, rows, at_trace = np.intersect1d(blocks.sequence, trace["block"], return_indices=True)
+        trace = trace[at_trace]
+    slide_m, drive_m = blocks.slide_m[rows].mean(axis=1), blocks.drive_m[rows].mean(axis=1)
     usable = np.isfinite(slide_m) & np.isfinite(drive_m)
-    sensors, trace, slide_m, drive_m = sensors[usable], trace[usable], slide_m[usable], drive_m[usable]
-    moves = (trace["state"] != wire.STANDSTILL) & np.isfinite(trace["drive_velocity_mps"])
-    direction = np.where(moves, np.sign(trace["drive_velocity_mps"]), 0.0).astype(np.int64)
-    t_s = sensors["t_ns"] * 1e-9
-    v_a_mps = trace["vibration_velocity_mps"]
-    shaken = np.isin(sensors["sequence"], run.applied["sequence"][run.applied["amplitude_m"] > 0.0])
-    dose = np.where(shaken & np.isfinite(v_a_mps), v_a_mps, 0.0) ** 2 * block_s
-    there = (
-        len(slide_m) > 0 and np.ptp(slide_m) > 0.0 and np.ptp(drive_m) > 0.0
-    )  # a transducer that is not there stands
-    found = reversals_of(t_s, slide_m, drive_m, direction) if there else []
-    return Motion(t_s, drive_m - slide_m if there else None, direction, dose, found, block_s)
+    if usable.all():
+        return rows, trace, slide_m, drive_m
+    return rows[usable], trace[usable], slide_m[usable], drive_m[usable]
+
+
+def _shaken(window: Window, rows: npt.NDArray[np.int64]) -> Bools:
+    """Blocks in which the exciter moved."""
+    numbers, applied = window.blocks.sequence[rows], window.applied
+    if np.array_equal(numbers, applied["sequence"]):
+        return applied["amplitude_m"] > 0.0
+    return np.isin(numbers, applied["sequence"][applied["amplitude_m"] > 0.0])
 
 
 def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]) -> list[Reversal]:
@@ -113,10 +189,17 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
         direction: of the drive, 0 where it stands; it may be late.
 
     """
+    return _changes(t_s, slide_m, drive_m, direction)[1]
+
+
+def _changes(
+    t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.NDArray[np.int64]
+) -> tuple[list[float], list[Reversal]]:
+    """The reversals, and when the direction was seen to change for each."""
     moving = np.flatnonzero(direction)
     at = np.flatnonzero(np.diff(direction[moving])) + 1
     if not len(at):
-        return []
+        return [], []
     changes, lasts = moving[at], moving[at - 1]  # the first block with another sign, and the last with the one before
     seen_m = _SEEN_SIGMAS * np.hypot(noise_of(slide_m), noise_of(drive_m))
     at_turn_m = _AT_TURN_SIGMAS * noise_of(drive_m)
@@ -125,11 +208,12 @@ def reversals_of(t_s: Floats, slide_m: Floats, drive_m: Floats, direction: npt.N
         place_m = direction[change] * drive_m[begins[-1] : change + 1]
         begins.append(begins[-1] + int(np.flatnonzero(place_m <= place_m.min() + at_turn_m)[-1]))
     ends = [*np.minimum(begins[2:], lasts[1:] + 1), moving[-1] + 1]
-    return [
-        _reversal(t_s[begin:end], way * slide_m[begin:end], way * drive_m[begin:end], seen_m)
-        for begin, end, way in zip(begins[1:], ends, direction[changes], strict=True)
+    found = [
+        (float(t_s[change]), _reversal(t_s[begin:end], way * slide_m[begin:end], way * drive_m[begin:end], seen_m))
+        for change, begin, end, way in zip(changes, begins[1:], ends, direction[changes], strict=True)
         if end - begin > 1
     ]
+    return [at_s for at_s, _ in found], [reversal for _, reversal in found]
 
 
 def _reversal(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> Reversal:
@@ -154,8 +238,4 @@ def noise_of(place_m: Floats) -> float:
     if len(place_m) < 3:
         return 0.0
     bend_m: Any = np.abs(np.diff(place_m, 2))
-    return float(np.median(bend_m)) / 0.6745 / np.sqrt(6.0)
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return median(bend_m) / 0.6745 / np.sqrt(6.0)

@@ -4,12 +4,15 @@ The loop works in the logarithm of v_a: what the exciter delivers of its command
 exciter costs stroke and no stability. The margins are those for a delay that is a block longer than the learnt one.
 """
 
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from bridge.log.logfile import RunData
+from bridge.log.metadata import Metadata, configuration_of
+from bridge.log.watches.histogram import Histogram
 from bridge.wire import stickslip_pb2 as wire
+from cockpit.judge.window import Window
 from controller.config import ControllerConfig
 from controller.loop_design import margins
 from controller.records import build
@@ -33,32 +36,47 @@ class Margins(NamedTuple):
         return self._asdict()
 
 
-def loop_margins(run: RunData) -> Margins:
-    """Margins from the configuration in the log, shares and stroke from its commands and measurements."""
-    controller, plant = run.configuration("controller"), run.configuration("plant")
-    params: Any = build(ControllerConfig.model_validate(controller))[0][0]
-    delay_s = float(run.trace["loop_delay_s"].max()) if len(run.trace) else 0.0
-    delay_blocks = round(delay_s / params.block_s)
-    loop = margins(params.learn_share, params.filter_share, delay_blocks + 1, delay_blocks, params.block_s)
-    _, at_trace, at_command = np.intersect1d(run.trace["block"], run.command["block"], return_indices=True)
-    trace, command = run.trace[at_trace], run.command[at_command]
-    excited = (trace["mode"] == wire.EXCITE) & (command["amplitude_m"] > 0.0)
-    told_mps = 2.0 * np.pi * command["frequency_Hz"][excited] * command["amplitude_m"][excited]
-    share = trace["vibration_velocity_mps"][excited] / told_mps
-    low, high = np.quantile(share, (0.05, 0.95)) if len(share) else (0.0, 0.0)
-    return Margins(
-        phase_margin_deg=loop.phase_margin_deg,
-        gain_margin=loop.gain_margin,
-        loop_delay_s=delay_s,
-        delivered_min=float(low),
-        delivered_max=float(high),
-        amplitude_m=float(command["amplitude_m"].max()) if len(command) else 0.0,
-        amplitude_max_m=min(controller["limits"]["amplitude_max_m"], plant["rig"]["piezo"]["amplitude_max_m"]),
-    )
+class MarginSum:
+    """What the exciter delivered of its commands, and how far they went, window by window."""
+
+    def __init__(self) -> None:
+        self._share = Histogram()
+        self._amplitude_m = 0.0
+
+    def add(self, window: Window) -> None:
+        """The commands of a window that are to be judged."""
+        from_ns, until_ns = window.own_ns
+        command = window.command
+        command = command[(command["t_ns"] >= from_ns) & (command["t_ns"] < until_ns)]
+        self._amplitude_m = max(self._amplitude_m, float(command["amplitude_m"].max(initial=0.0)))
+        _, at_trace, at_command = np.intersect1d(window.trace["block"], command["block"], return_indices=True)
+        trace, command = window.trace[at_trace], command[at_command]
+        excited = (trace["mode"] == wire.EXCITE) & (command["amplitude_m"] > 0.0)
+        commanded_mps = 2.0 * np.pi * command["frequency_Hz"][excited] * command["amplitude_m"][excited]
+        self._share.add(trace["vibration_velocity_mps"][excited] / commanded_mps)
+
+    def result(self, headers: Metadata, path: Path, loop_delay_s: float) -> Margins:
+        """Margins from the configuration in the log, shares and stroke from its commands and measurements.
+
+        Raises Fault BAD_LOG.
+        """
+        controller, plant = (configuration_of(headers, role, path) for role in ("controller", "plant"))
+        params: Any = build(ControllerConfig.model_validate(controller))[0][0]
+        delay_blocks = round(loop_delay_s / params.block_s)
+        loop = margins(params.learn_share, params.filter_share, delay_blocks + 1, delay_blocks, params.block_s)
+        return Margins(
+            phase_margin_deg=loop.phase_margin_deg,
+            gain_margin=loop.gain_margin,
+            loop_delay_s=loop_delay_s,
+            delivered_min=self._share.quantile(0.05),
+            delivered_max=self._share.quantile(0.95),
+            amplitude_m=self._amplitude_m,
+            amplitude_max_m=min(controller["limits"]["amplitude_max_m"], plant["rig"]["piezo"]["amplitude_max_m"]),
+        )
 
 
 def margins_in_words(margins: Margins) -> list[str]:
-    """As lines for a person."""
+    """As lines for the operator."""
     m = margins
     lines = [
         f"loop     {m.loop_delay_s * 1e3:.3g} ms late, as learnt; a block later still: phase margin {m.phase_margin_deg:.0f} "

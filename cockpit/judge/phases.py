@@ -1,16 +1,20 @@
 """The stretches of a run: before the controller, while it takes over, after, and without anybody in charge."""
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from cockpit.judge.machine_terms import Following, Motion
-from cockpit.judge.strokes import swing_of
-from diagnosis.features.cycles import Cycles
+from cockpit.judge.machine_terms import Following, FollowingSum, Motion
+from cockpit.judge.slips import Forces
+from cockpit.judge.strokes import Swing
 
 Floats = npt.NDArray[np.floating[Any]]
 Stretches = list[tuple[float, float]]
+
+# The first ramp of a run starts from an unloaded spring, which is no swing of what follows: so much of a phase, or half.
+_RAMP_S = 4.0
 
 
 class Phase(NamedTuple):
@@ -34,71 +38,99 @@ class Phase(NamedTuple):
         return self._asdict() | {"following": self.following and self.following._asdict()}
 
 
-class Told(NamedTuple):
-    """What phases are made of; times, forces and parts are [blocks], those that are numbers alone."""
+class PhaseSum:
+    """A stretch of a run, gathered window by window. Its end is infinite while it is not known.
 
-    cycles: Cycles | None
-    t_s: Floats
-    mean_N: Floats
-    part: npt.NDArray[np.int64]  # the stroke in whose steady part a block is; -1 in none
-    motion: Motion | None  # None for measured data of another program
+    Args:
+        from_s, to_s: begin and end.
+
+    """
+
+    def __init__(self, from_s: float, to_s: float) -> None:
+        self.from_s, self.to_s = from_s, to_s
+        self.missing = 0  # blocks that are not in the log, or hold no force
+        self.unsure = 0  # slips in which blocks are missing
+        self.slips = 0
+        self._blocks = 0
+        self._whole, self._steady = Swing(), Swing()
+        self._following = FollowingSum()
+
+    def add(self, forces: Forces, motion: Motion | None, without: Stretches) -> None:
+        """The part of a window that is in the stretch, but for what lies in the stretches `without`."""
+
+        def counts(at_s: Floats) -> Any:
+            return (at_s > self.from_s) & (at_s <= self.to_s) & ~within(at_s, without)
+
+        inside = counts(forces.t_s)
+        self._blocks += int(np.count_nonzero(inside))
+        self.missing += int(forces.missing[inside].sum())
+        breakaway_s = forces.cycles.breakaway_t_s
+        slips = (breakaway_s >= self.from_s) & (breakaway_s < self.to_s) & ~within(breakaway_s, without)
+        self.slips += int(np.count_nonzero(slips))
+        self.unsure += int(np.count_nonzero(slips & forces.unsure))
+        later = inside & (forces.t_s > min(self.from_s + _RAMP_S, 0.5 * (self.from_s + self.to_s)))
+        self._steady.add(forces.mean_N[later], forces.part[later])
+        if not self._steady.blocks:
+            self._whole.add(forces.mean_N[inside], forces.part[inside])
+        if motion is not None:
+            self._following.add(motion, counts)
+
+    def result(self, block_s: float) -> Phase | None:
+        """What happened; None without a block."""
+        if not self._blocks:
+            return None
+        seconds = self._blocks * block_s
+        swing = self._steady if self._steady.blocks else self._whole
+        swing_N, strokes = swing.result()
+        return Phase(
+            seconds=seconds,
+            slips=self.slips,
+            slips_per_min=60.0 * self.slips / seconds,
+            swing_N=swing_N,
+            strokes=strokes,
+            mean_force_N=swing.mean_N,
+            following=self._following.result(block_s),
+            vibration_dose_mm2_per_s=self._following.dose_mm2_per_s,
+        )
 
 
-def phase(told: Told, from_s: float, to_s: float, without: Stretches) -> Phase | None:
-    """What happened from one time to another, but for what lies in the stretches `without`; None without a block or a force."""
-
-    def kept(at_s: Floats) -> Any:
-        return ~sum(((at_s > first_s) & (at_s <= last_s) for first_s, last_s in without), np.zeros(len(at_s), bool))
-
-    def counts(at_s: Floats) -> Any:
-        return (at_s > from_s) & (at_s <= to_s) & kept(at_s)
-
-    inside = counts(told.t_s)
-    if told.cycles is None or not inside.any():
-        return None
-    slips = int(np.count_nonzero(kept(told.cycles.between(from_s, to_s).breakaway_t_s)))
-    seconds = to_s - from_s - sum(max(min(last_s, to_s) - max(first_s, from_s), 0.0) for first_s, last_s in without)
-    # the first ramp of a run starts from an unloaded spring: no part of the swing of what follows
-    later = inside & (told.t_s > min(from_s + 4.0, 0.5 * (from_s + to_s)))
-    steady = later if later.any() else inside
-    swing_N, strokes = swing_of(told.mean_N[steady], told.part[steady])
-    return Phase(
-        seconds=seconds,
-        slips=slips,
-        slips_per_min=60.0 * slips / seconds,
-        swing_N=swing_N,
-        strokes=strokes,
-        mean_force_N=float(told.mean_N[steady].mean()),
-        following=told.motion.following(counts) if told.motion is not None else None,
-        vibration_dose_mm2_per_s=told.motion.dose_mm2_per_s(counts) if told.motion is not None else 0.0,
-    )
+def within(at_s: Floats, stretches: Iterable[tuple[float, float]]) -> Any:
+    """Whether times lie in any of the stretches."""
+    found = np.zeros(len(at_s), bool)
+    if not len(at_s):
+        return found
+    low_s, high_s = float(at_s.min()), float(at_s.max())
+    for first_s, last_s in stretches:
+        if first_s < high_s and last_s >= low_s:
+            found |= (at_s > first_s) & (at_s <= last_s)
+    return found
 
 
-def alone(told: Told, gone: Stretches) -> Phase | None:
-    """What happened while nobody was in charge, in all such stretches; how the slide followed, in the longest."""
-    phases = [phase(told, from_s, until_s, []) for from_s, until_s in gone]
-    there = [one for one in phases if one is not None]
+def together(phases: Iterable[Phase | None]) -> Phase | None:
+    """Several stretches as one; how the slide followed, in the longest. None without any."""
+    there = [phase for phase in phases if phase is not None]
     if not there:
         return None
-    seconds, slips = sum(one.seconds for one in there), sum(one.slips for one in there)
-    mean_N = sum(one.mean_force_N * one.seconds for one in there) / seconds
-    longest = max(there, key=lambda one: one.seconds)
-    widest = max(there, key=lambda one: one.swing_N)
+    seconds, slips = sum(phase.seconds for phase in there), sum(phase.slips for phase in there)
+    widest = max(there, key=lambda phase: phase.swing_N)
     return Phase(
         seconds=seconds,
         slips=slips,
         slips_per_min=60.0 * slips / seconds,
         swing_N=widest.swing_N,
         strokes=widest.strokes,
-        mean_force_N=mean_N,
-        following=longest.following,
-        vibration_dose_mm2_per_s=sum(one.vibration_dose_mm2_per_s for one in there),
+        mean_force_N=sum(phase.mean_force_N * phase.seconds for phase in there) / seconds,
+        following=max(there, key=lambda phase: phase.seconds).following,
+        vibration_dose_mm2_per_s=sum(phase.vibration_dose_mm2_per_s for phase in there),
     )
 
 
-def slips_in(cycles: Cycles | None, stretches: Stretches) -> int:
-    """Slips in any of the stretches, each counted once."""
-    if cycles is None or not stretches:
-        return 0
-    at_s = cycles.breakaway_t_s
-    return int(np.count_nonzero(np.any([(at_s > one[0]) & (at_s <= one[1]) for one in stretches], axis=0)))
+def apart(whole: tuple[float, float], without: Stretches) -> Stretches:
+    """The parts of a stretch that lie in none of others, which may overlap."""
+    at_s, end_s = whole
+    parts: Stretches = []
+    for from_s, until_s in sorted(without):
+        if from_s > at_s:
+            parts.append((at_s, min(from_s, end_s)))
+        at_s = max(at_s, until_s)
+    return [(first_s, last_s) for first_s, last_s in [*parts, (at_s, end_s)] if last_s > first_s]

@@ -13,76 +13,118 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.log.logfile import RunData, block_period_ns, sample_times_s
-from bridge.log.metadata import number_of, source_of_import, texts_of
-from cockpit.judge.strokes import steady_parts, strokes_of
+from cockpit.judge.setup import Setup
+from cockpit.judge.strokes import Stroke, steady_parts, strokes_of
+from cockpit.judge.window import Moved, Window
 from diagnosis.features.cycles import Cycles, find_cycles, smallest_drop_N
 
 Floats = npt.NDArray[np.floating[Any]]
 
-_BIN_S = 1e-3  # of means, as slips are found in
-_BESIDE_S = 0.02  # before and after a fall, in which the drive's velocity is looked at
+BIN_S = 1e-3  # of means, as slips are found in
+_BESIDE_S = (
+    0.02  # before and after a fall, in which the drive's velocity is looked at, and in which no block may be missing
+)
 _STOPS = 0.5  # of the drive's velocity before the fall
 # Velocity of the slide over the drive's, mean from 10 to 90 % of a fall: that of a sine whose peak is the 1.5 v_d of a slip.
 _RUNS_AHEAD = 1.4
+_NONE = Cycles(*(np.empty(0) for _ in Cycles._fields))
 
 
-def cycles_of(run: RunData) -> Cycles | None:
-    """The slips in the drive force of a log that was read; None where it holds no force. Raises Fault BAD_LOG.
+class Forces(NamedTuple):
+    """The slips of a window, and its blocks whose force is a number, [blocks]."""
 
-    Forces at breakaway and re-stick have the sign that they have in the log.
-    """
-    if not len(run.sensors) or "drive_force_N" in absent_channels(run):
-        return None
-    force_N = run.sensors["drive_force_N"].astype(np.float64)
-    finite = np.isfinite(force_N).all(axis=1)
-    if not finite.any():
-        return None
-    imported = source_of_import(run.headers, run.path)
-    period_ns = (
-        block_period_ns(run.sensors)
-        if imported
-        else 1e9 * number_of(run.configuration("controller"), "block_s", run.path)
-    )
-    sensors, force_N = run.sensors[finite], force_N[finite]
-    sample_s = sample_times_s(sensors, period_ns)
-    slowest_fall_s, drop_N = _slowest_fall_s(run), smallest_drop_N(sample_s.ravel(), force_N.ravel())
-    bins = math.gcd(force_N.shape[1], max(round(period_ns * 1e-9 / _BIN_S), 1))  # of a block
-    drive_m, slide_m = (_place_m(run, sensors, name, bins) for name in ("drive_position_m", "mass_position_m"))
+    cycles: Cycles  # forces at breakaway and re-stick have the sign that they have in the log
+    unsure: npt.NDArray[np.bool_]  # slips in which blocks are missing: what the force did there is not known, [slips]
+    t_s: Floats
+    mean_N: Floats
+    part: npt.NDArray[np.int64]  # number of the stroke in whose steady part a block is; -1 in none
+    missing: npt.NDArray[np.int64]  # blocks that are missing, or hold no force, just before this one
+    end: int  # row after the last of the window: where the drive turns, if it does
+    turned: bool
+    stroke: int  # number of the stroke that begins, or goes on, at `end`
+
+
+def bins_of(samples: int, period_ns: float) -> int:
+    """Into how many bins of about 1 ms the samples of a block go."""
+    return math.gcd(samples, max(round(period_ns * 1e-9 / BIN_S), 1))
+
+
+def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
+    """The slips and the forces of a window."""
+    block_s, blocks = setup.block_s, window.blocks
+    finite = np.asarray(np.isfinite(blocks.force_N).all(axis=1))
+    usable = np.flatnonzero(finite)
+    if not len(usable):
+        nothing = np.empty(0)
+        none = np.empty(0, np.int64)
+        return Forces(_NONE, np.empty(0, bool), nothing, nothing, none, none, window.end, False, window.stroke)
+    blocks = blocks.part(usable) if len(usable) < len(finite) else blocks
+    force_N = blocks.force_N.astype(np.float64)
+    samples, bins = force_N.shape[1], blocks.drive_m.shape[1]
+    sample_s = (blocks.t_ns[:, None] + (np.arange(samples) + 1 - samples) * (1e9 * block_s / samples)) / 1e9
+    drop_N = smallest_drop_N(sample_s.ravel(), force_N.ravel())
+    drive_m = _place_m(blocks.drive_m, "drive_position_m", setup, moved)
+    slide_m = _place_m(blocks.slide_m, "mass_position_m", setup, moved)
+    mean_N = force_N.mean(axis=1)
+    begins = int(np.searchsorted(usable, window.begins))
+    place_m = drive_m.reshape(-1, bins).mean(axis=1)[begins:]
+    strokes = strokes_of(place_m)
+    part = steady_parts(place_m, mean_N[begins:], strokes, block_s, window.after_turn)
+    first = int(np.searchsorted(usable, window.first))
+    present = next((i for i, one in enumerate(strokes) if begins + one.end > first), 0)
+    part[part >= 0] += window.stroke - present
+    part = np.concatenate([np.full(begins, -1), part])
+    end, turned = _end(window, [int(usable[begins + one.first]) for one in strokes[1:]])
+    from_s, until_s = (time_ns * 1e-9 for time_ns in (window._replace(end=end).own_ns))
     found: list[Cycles] = []
-    for first, end, way in strokes_of(drive_m[::bins]):
-        along_N = way * force_N[first:end]
-        cycles = find_cycles(sample_s[first:end].ravel(), along_N.ravel(), drop_N, slowest_fall_s)
-        inside = slice(first * bins, end * bins)
-        t_s = sample_s[first:end, :: force_N.shape[1] // bins].ravel()
-        stroke = _Stroke(t_s, _means(along_N, bins), way * drive_m[inside], way * slide_m[inside])
-        found.append(_signed(_slips_among(cycles, stroke, period_ns * 1e-9 / bins), way))
-    return Cycles(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    for stroke in (Stroke(begins + one.first, begins + one.end, one.way) for one in strokes):
+        if stroke.end <= first or usable[stroke.first] >= end:
+            continue
+        rows, inside = slice(stroke.first, stroke.end), slice(stroke.first * bins, stroke.end * bins)
+        along_N = stroke.way * force_N[rows]
+        cycles = find_cycles(sample_s[rows].ravel(), along_N.ravel(), drop_N, setup.slowest_fall_s)
+        own = (cycles.breakaway_t_s >= from_s) & (cycles.breakaway_t_s < until_s)
+        t_s = sample_s[rows, :: samples // bins].ravel()
+        force_of_bins_N = along_N.reshape(len(along_N), bins, -1).mean(axis=2).ravel()
+        places = _Stroke(t_s, force_of_bins_N, stroke.way * drive_m[inside], stroke.way * slide_m[inside])
+        found.append(_signed(_slips_among(cycles, own, places, block_s / bins), stroke.way))
+    cycles = Cycles(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else _NONE
+    mine = slice(first, int(np.searchsorted(usable, end)))
+    steps = np.diff(blocks.sequence, prepend=blocks.sequence[:1] - 1) - 1
+    goes_on = (i for i, one in enumerate(strokes) if usable[begins + one.end - 1] >= end)
+    return Forces(
+        cycles,
+        _unsure(cycles, blocks.t_ns * 1e-9, steps),
+        blocks.t_ns[mine] / 1e9,
+        mean_N[mine],
+        part[mine],
+        np.maximum(steps, 0)[mine],
+        end,
+        turned,
+        window.stroke - present + next(goes_on, present),
+    )
 
 
-def steady_parts_of(run: RunData) -> npt.NDArray[np.int64]:
-    """In the steady part of which stroke of the drive each block of a log is, as `steady_parts` has it. Raises Fault BAD_LOG."""
-    sensors = run.sensors
-    if not len(sensors):
-        return np.zeros(0, np.int64)
-    mean_N = sensors["drive_force_N"].mean(axis=1, dtype=np.float64)
-    return steady_parts(_place_m(run, sensors, "drive_position_m", 1), mean_N, block_period_ns(sensors) * 1e-9)
+def _end(window: Window, turns: list[int]) -> tuple[int, bool]:
+    """Where a window ends: at the last turn in its second half, else where it must; and whether the drive turns there."""
+    if window.is_last:
+        return window.end, False
+    late = [row for row in turns if (window.first + window.end) // 2 < row <= window.end]
+    return (late[-1], True) if late else (window.end, False)
 
 
-def absent_channels(run: RunData) -> list[str]:
-    """Channels that the file of another program did not hold; they are zeros in its log. Raises Fault BAD_LOG."""
-    return texts_of(run.headers, "import", "missing", run.path)
-
-
-def _slowest_fall_s(run: RunData) -> float:
-    """How long a slip may last: 1.6 times that of the plant's slide on its spring, and never less than 0.1 s."""
-    if "plant" not in run.headers:
-        return 0.1
-    try:
-        rig = run.configuration("plant")["rig"]
-        return max(0.1, 3.0 * math.sqrt(rig["slide"]["mass_kg"] / rig["drive"]["stiffness_N_per_m"]))
-    except (KeyError, TypeError, ValueError, ArithmeticError):  # another rig need not tell
-        return 0.1
+def _unsure(cycles: Cycles, t_s: Floats, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """Slips within which blocks are missing, [slips]."""
+    gaps = np.flatnonzero(steps > 0)
+    unsure = np.zeros(cycles.slips, bool)
+    for at in gaps if len(gaps) and cycles.slips else ():
+        slip = int(np.searchsorted(cycles.breakaway_t_s - _BESIDE_S, t_s[at], side="right")) - 1
+        if slip >= 0:
+            began_s = cycles.breakaway_t_s[slip]
+            later = int(np.searchsorted(cycles.restick_t_s, began_s))
+            ends_s = cycles.restick_t_s[later] if later < len(cycles.restick_t_s) else began_s
+            unsure[slip] |= bool(t_s[at - 1] < ends_s + _BESIDE_S)
+    return unsure
 
 
 class _Stroke(NamedTuple):
@@ -94,18 +136,14 @@ class _Stroke(NamedTuple):
     slide_m: Floats
 
 
-def _means(samples: Any, bins: int) -> Floats:
-    """Means of the bins of blocks, one after the other."""
-    return samples.reshape(len(samples), bins, -1).mean(axis=2, dtype=np.float64).ravel()
-
-
-def _place_m(run: RunData, sensors: Any, name: str, bins: int) -> Floats:
+def _place_m(means_m: Floats, name: str, setup: Setup, moved: Moved) -> Floats:
     """Means of bins, straight lines where they are no numbers; NaN throughout for a channel that is not there, or stands."""
-    place_m = _means(sensors[name], bins)
-    known = np.flatnonzero(np.isfinite(place_m))
-    if name in absent_channels(run) or not len(known) or np.ptp(place_m[known]) == 0.0:
+    place_m = means_m.ravel()
+    known = np.isfinite(place_m)
+    if not moved(name, place_m) or name in setup.absent or not known.any():
         return np.full(len(place_m), np.nan)
-    return np.interp(np.arange(len(place_m)), known, place_m[known])
+    at = np.flatnonzero(known)
+    return place_m if len(at) == len(place_m) else np.interp(np.arange(len(place_m)), at, place_m[at])
 
 
 def _signed(cycles: Cycles, way: int) -> Cycles:
@@ -114,10 +152,13 @@ def _signed(cycles: Cycles, way: int) -> Cycles:
     )
 
 
-def _slips_among(falls: Cycles, stroke: _Stroke, bin_s: float) -> Cycles:
+def _slips_among(falls: Cycles, own: npt.NDArray[np.bool_], stroke: _Stroke, bin_s: float) -> Cycles:
+    """Those of the falls of a stroke that are slips; only `own` ones are looked at, [falls]."""
     first = np.searchsorted(stroke.t_s, falls.breakaway_t_s, side="right") - 1
     last = [*first, len(stroke.t_s) - 1][1:]
-    slips = np.array([_is_slip(stroke, a, b, bin_s) for a, b in zip(first, last, strict=True)], bool)
+    slips = np.array(
+        [mine and _is_slip(stroke, a, b, bin_s) for a, b, mine in zip(first, last, own, strict=True)], bool
+    )
     stick = slips[: len(falls.restick_t_s)]
     return Cycles(
         falls.breakaway_t_s[slips],

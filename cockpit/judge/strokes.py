@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.log.watches.arrays import median
 from cockpit.judge.machine_terms import noise_of
 from diagnosis.look.turns import turns
 
@@ -41,42 +42,80 @@ def strokes_of(drive_m: Floats) -> list[Stroke]:
     return [Stroke(first, end, (-1) ** i) for i, (first, end) in enumerate(itertools.pairwise(limits)) if end > first]
 
 
-def steady_parts(drive_m: Floats, force_N: Floats, block_s: float) -> npt.NDArray[np.int64]:
+def steady_parts(
+    drive_m: Floats, force_N: Floats, strokes: list[Stroke], block_s: float, after_turn: bool
+) -> npt.NDArray[np.int64]:
     """In the steady part of which stroke each block is, from 0; -1 at turns, while the spring turns over, and in dwells.
 
     Args:
         drive_m, force_N: place of the drive, NaN where it is not known, and force of its spring, [blocks].
+        strokes: of the drive.
         block_s: length of a block.
+        after_turn: the drive turned at the first block.
 
     """
     part = np.full(len(drive_m), -1)
     if np.isnan(drive_m).any():
         return part + 1
     beside = max(round(_BESIDE_S / block_s), 1)
-    for number, (first, end, way) in enumerate(strokes_of(drive_m)):
+    for number, (first, end, way) in enumerate(strokes):
         way_m = np.pad(way * drive_m[first:end], beside, mode="edge")
         way_m = way_m[beside:] - way_m[:-beside]
         speed = np.minimum(way_m[:-beside], way_m[beside:])  # before and after the block
         moving = np.flatnonzero(speed > _MOVES * speed.max())
         if not len(moving):
             continue
-        fast = moving[speed[moving] >= _AWAY_FROM_TURN * np.median(speed[moving])]
-        if first > 0:
+        turned = first > 0 or after_turn
+        fast = moving[speed[moving] >= _AWAY_FROM_TURN * median(speed[moving])]
+        if turned:
             moving = moving[moving >= fast[0]]
         if end < len(drive_m):
             moving = moving[moving <= fast[-1]]
         along_N = way * force_N[first + moving]
-        if first > 0:  # the spring is turned over once the force is where it stays
+        if turned:  # the spring is turned over once the force is where it stays
             known_N = along_N[np.isfinite(along_N)]
-            moving = moving[int(np.argmax(along_N >= np.median(known_N))) if len(known_N) else 0 :]
+            moving = moving[int(np.argmax(along_N >= median(known_N))) if len(known_N) else 0 :]
         part[first + moving] = number
     return part
 
 
-def swing_of(force_N: Floats, part: npt.NDArray[np.int64]) -> tuple[float, int]:
-    """Largest less smallest force in the steady part of a stroke, median of strokes; and of how many, 0 where none is steady."""
-    there, blocks = np.unique(part[part >= 0], return_counts=True)
-    if not len(there):
-        return float(np.ptp(force_N)), 0
-    whole = there[blocks >= _WHOLE * blocks.max()]
-    return float(np.median([np.ptp(force_N[part == number]) for number in whole])), len(whole)
+class Swing:
+    """The swing of a force, stroke by stroke; of many rows a few numbers for each stroke."""
+
+    def __init__(self) -> None:
+        self.blocks = 0
+        self._sum_N = 0.0
+        self._lowest_N, self._highest_N = np.inf, -np.inf
+        self._strokes: dict[int, tuple[int, float, float]] = {}  # blocks, lowest and highest force
+
+    def add(self, force_N: Floats, part: npt.NDArray[np.int64]) -> None:
+        """Forces, and the number of the stroke in whose steady part each is, -1 in none; [blocks], in order of time."""
+        if not len(force_N):
+            return
+        self.blocks += len(force_N)
+        self._sum_N += float(force_N.sum())
+        self._lowest_N = min(self._lowest_N, float(force_N.min()))
+        self._highest_N = max(self._highest_N, float(force_N.max()))
+        steady = part >= 0
+        part, force_N = part[steady], force_N[steady]
+        begins = np.flatnonzero(np.diff(part, prepend=-1))
+        if not len(begins):
+            return
+        lows, highs = np.minimum.reduceat(force_N, begins), np.maximum.reduceat(force_N, begins)
+        counts = np.diff(begins, append=len(part))
+        for number, count, low_N, high_N in zip(part[begins].tolist(), counts.tolist(), lows, highs, strict=True):
+            known = self._strokes.get(number, (0, np.inf, -np.inf))
+            self._strokes[number] = known[0] + count, min(known[1], float(low_N)), max(known[2], float(high_N))
+
+    @property
+    def mean_N(self) -> float:
+        """Mean force of all blocks."""
+        return self._sum_N / self.blocks
+
+    def result(self) -> tuple[float, int]:
+        """Largest less smallest force in the steady part of a stroke, median of strokes; of how many, 0: that of all blocks."""
+        if not self._strokes:
+            return self._highest_N - self._lowest_N, 0
+        counts, lows, highs = np.array(list(self._strokes.values())).T
+        whole = counts >= _WHOLE * counts.max()
+        return median((highs - lows)[whole]), int(whole.sum())

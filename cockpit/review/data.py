@@ -13,12 +13,13 @@ from bridge.provenance import Provenance, shown_name
 from bridge.wire.event_codes import EVENTS, LETTERS
 from cockpit.figures.grid import Envelope, Grid, on_grid
 from cockpit.figures.signals import SIGNALS, Floats, Signal, holds, limits_of, samples_of
-from cockpit.judge.slips import cycles_of
-from cockpit.judge.verdict import RunVerdict, judge_run
+from cockpit.judge.judged import judge_tables
+from cockpit.judge.verdict import RunVerdict
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.review.bands import bands_of, title_of, used_words
 from cockpit.review.differences import differences, parameters_of
 from cockpit.review.panels import PANELS
+from diagnosis.features.cycles import Cycles
 
 FORMAT = "stickslip-review/1"
 # of all logs together where a run is longer: 11 signals of three values are 3.5 MB then; two runs of 20 s are 4.5 MB
@@ -31,9 +32,10 @@ def review_data(paths: Sequence[Path], made: Provenance) -> tuple[dict[str, Any]
     """The page's data and what came of each log. Raises Fault BAD_LOG."""
     runs = [read_run(path) for path in paths]
     grid = _grid(runs)
-    verdicts = [judge_run(run) for run in runs]
+    judged = [judge_tables(run) for run in runs]
+    verdicts = [verdict for verdict, _ in judged]
     labels = [chr(ord("A") + number) for number in range(len(runs))]
-    shown = [_log(run, verdict, label, grid) for run, verdict, label in zip(runs, verdicts, labels, strict=True)]
+    shown = [_log(run, *one, label, grid) for run, one, label in zip(runs, judged, labels, strict=True)]
     parameters = [parameters_of(run) for run in runs]
     rows = [row for run in runs for row in bands_of(run, grid)]
     data = {
@@ -66,8 +68,7 @@ def _grid(runs: Sequence[RunData]) -> Grid:
     return Grid(start_s, step_s, math.floor((end_s - start_s) / step_s + 0.5) + 1)
 
 
-def _log(run: RunData, verdict: RunVerdict, label: str, grid: Grid) -> dict[str, Any]:
-    cycles = cycles_of(run)
+def _log(run: RunData, verdict: RunVerdict, cycles: Cycles | None, label: str, grid: Grid) -> dict[str, Any]:
     return {
         "label": label,
         "name": shown_name(run.path.name),
@@ -97,7 +98,7 @@ def _figures(verdicts: Sequence[RunVerdict]) -> list[dict[str, Any]]:
     told: list[dict[str, list[str]]] = []
     for verdict in verdicts:
         lines: dict[str, list[str]] = {}
-        for line in in_words(verdict):
+        for line in in_words(verdict, verbose=True)[1:]:
             what, _, words = line.partition(" ")
             lines.setdefault(what, []).append(words.strip())
         told.append(lines)

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import functools
 import io
 import json
 import os
@@ -11,6 +12,7 @@ import threading
 from collections.abc import Callable, Generator
 from typing import Any
 
+from bridge import compiling
 from bridge.faults import Fault
 from bridge.plain import say
 from bridge.wire import realtime
@@ -80,10 +82,10 @@ def stopped_once() -> Generator[None]:
     """Ctrl-C, SIGTERM or SIGHUP raises KeyboardInterrupt in what is done here, once: what then stops and judges goes on."""
     came = threading.Event()
 
-    def on_signal(_number: int, _frame: Any) -> None:
+    def on_signal(number: int, _frame: Any) -> None:
         if not came.is_set():
             came.set()
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt("" if number == signal.SIGINT else signal.Signals(number).name)
 
     before = handle_endings(on_signal)
     try:
@@ -130,6 +132,41 @@ def left_on_ctrl_c(line: str, left: str, again: bool) -> Generator[None]:
             signal.signal(number, handler)
 
 
+@contextlib.contextmanager
+def _ended_at_once(as_json: bool) -> Generator[None]:
+    """Ctrl-C, SIGTERM or SIGHUP ends the process here and now, with status and line of INTERRUPTED.
+
+    A handler in Python has to wait for the compiler, seconds at a time, and an exception from it ends one function of
+    hundreds. So a thread reads the signal's number from a pipe, into which the interpreter writes it at once. No kernel is kept
+    half.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    endings = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+
+    def wait() -> None:
+        while number := os.read(read, 1):
+            if number[0] in endings:
+                name = "Ctrl-C" if number[0] == signal.SIGINT else signal.Signals(number[0]).name
+                status = report(Fault("INTERRUPTED", f"stopped by {name} while kernels were compiled"), as_json)
+                sys.stdout.flush()
+                os._exit(status)
+
+    watcher = threading.Thread(target=wait, name="endings", daemon=True)
+    watcher.start()
+    before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(write)
+        watcher.join()
+        os.close(read)
+
+
 def warn_without_priority() -> None:
     """Say on stderr where a process that keeps time would get no real-time priority."""
     if not realtime.may_claim():
@@ -147,6 +184,7 @@ def report(fault: Fault, as_json: bool) -> int:
 
 def guarded(work: Callable[[], int | None], as_json: bool = False) -> int:
     """Run a command's work; its exit status, faults and Ctrl-C included."""
+    compiling.guard = functools.partial(_ended_at_once, as_json)
     try:
         status = _status(work, as_json)
         sys.stdout.flush()  # here, where a closed pipe or a full disk can still be told

@@ -18,7 +18,7 @@ from controller.config import ControllerConfig
 from controller.core import step as controller_step
 from controller.records import build as controller_records
 from plant.config import RigConfig
-from plant.inputs import RigInputs
+from plant.inputs import InputsAhead, RigInputs
 from plant.records import TRUTH, guard_records
 from plant.records import build as plant_records
 from plant.step import step as plant_step
@@ -118,7 +118,7 @@ class ClosedLoop:
         self.controller_state: npt.NDArray[Any]
         samples = rig.solver.samples_per_block
         self._rig = rig
-        self._inputs = RigInputs(rig, seed)
+        self._inputs = InputsAhead(RigInputs(rig, seed))
         self._sensors = sensor_block(samples)
         self._plant_params, self._plant_state = plant_records(rig)
         self._guard_params, self._guard_state = guard_records(rig, 1, arm)

@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy.typing as npt
 
 from bridge.guard.config import wider
 from bridge.guard.tell import Teller, changes
 from bridge.log.runlog import RunLog
+from bridge.log.storage.chain import Chain
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import seal_all
 from bridge.wire.topics import (
@@ -32,6 +33,9 @@ from controller.telemetry import SNAPSHOT_EVERY, STATE_EVERY, plotted, snapshot
 from controller.trips import tell as trips
 from plant.node import no_number
 
+if TYPE_CHECKING:
+    from cockpit.judge.run_judge import RunJudge
+
 # Blocks that are stepped in one call and make one chunk of the log, 1 MB: a stretch ends with the controller's snapshot. A kill
 # loses one, 7 ms of work.
 _STRETCH_BLOCKS = SNAPSHOT_EVERY
@@ -52,21 +56,27 @@ def run_onboard(
     changes: Sequence[Change] = (),
     words: Sequence[Word] = (),
     stopped: Callable[[], bool] = lambda: False,
-) -> None:
+    judge: "RunJudge | None" = None,
+) -> Chain:
     """Run a scenario without faults and write its log, with a duration of 0 until it is stopped. Raises Fault LOG_WRITE.
+
+    Returns the hash chain of the log.
 
     Args:
         progress: called now and then with the simulated time [s].
         changes: of the controller's configuration during the run, in order of time.
         words: of an operator during the run, in order of time.
         stopped: asked before every stretch of blocks; the run then ends as it does at its full duration.
+        judge: takes every message as it is written, so that nothing is read back.
 
     """
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
     loop.warm_up()
     log = log_of(scenario, path, about)
     blocks = round(scenario.duration_s / scenario.rig.solver.block_s) if scenario.duration_s > 0 else 2**62
-    say = _Events(log)
+    if judge is not None:
+        judge.begin(log.tables)
+    say = _Events(log, judge)
     say("plant", 0, "START", "lockstep")
     if wide := wider(scenario.rig.guard):
         say("plant", 0, "WIDE_LIMITS", wide)
@@ -102,6 +112,7 @@ def run_onboard(
         say("controller", t_ns, "END", f"steps={loop.block} duplicates=0 dropped=0")
     finally:
         log.close()
+    return log.chain()
 
 
 def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:
@@ -121,15 +132,18 @@ def _first_step(loop: ClosedLoop, t_ns: int) -> int:
 class _Events:
     """The events of rig and controller, as their processes publish them."""
 
-    def __init__(self, log: RunLog) -> None:
-        self._log = log
+    def __init__(self, log: RunLog, judge: "RunJudge | None") -> None:
+        self._log, self.judge = log, judge
         self._said = {"plant": 0, "controller": 0}
         self._guard, self._trips = Teller(), trips.TripTeller()
 
     def __call__(self, source: str, t_ns: int, code: str, text: str) -> None:
         topic = PLANT_EVENT if source == "plant" else CONTROLLER_EVENT
         event = wire.Event(sequence=self._said[source], t_ns=t_ns, source=source, code=code, text=text)
-        self._log.write(topic, event.SerializeToString())
+        payload = event.SerializeToString()
+        self._log.write(topic, payload)
+        if self.judge is not None:
+            self.judge.add_others(topic.name, [payload])
         self._said[source] += 1
 
     def of(self, made: Blocks) -> dict[int, list[tuple[str, str, str]]]:
@@ -170,3 +184,6 @@ def _write(log: RunLog, say: _Events, end: int, block_ns: int, made: Blocks, mem
     if end % SNAPSHOT_EVERY == 0 and end > begin:
         log.write(SNAPSHOT, snapshot(memory, end, end * block_ns))
     log.flush()
+    if say.judge is not None:
+        for topic, table in tables.items():
+            say.judge.add(topic.name, table, table["t_ns"])

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from bridge.faults import Fault
 from bridge.units import quantity
+from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from bridge.wire.topics import APPLIED, OPERATOR, PLANT_EVENT
@@ -16,7 +17,11 @@ from bridge.wire.words import words
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received, stands_still
 
 _DIAL_S = 2.0  # a rig is there at once or not at all
-_ANSWER_S = 5.0  # the loop check takes 1.5 s, a ramp 0.1 s
+# Longest wait since the rig last did something for a word. A ramp takes 0.1 s; while a loop check goes on, of 1.7 s of the rig's
+# time, every block of it counts. Shorter: `arm` fails on a busy computer though the rig arms. Longer: the advice to stop by hand
+# comes later.
+_ANSWER_S = 5.0
+_HEARS_S = 0.05  # in which a word that is done is noticed
 _AGAIN_S = 0.5  # with twice as many busy processes as cores one word in 300 did not arrive
 _SILENT_S = 1.0  # after which what a rig said last is no longer what it does; it says a thousand things a second
 _NOTHING_M = 1e-12  # what is left of a ramp by rounding
@@ -45,6 +50,12 @@ class Obeyed(NamedTuple):
 
     def in_words(self) -> list[str]:
         """Lines for a person."""
+        if self.state == "NO_GUARD" and self.word in ("ARM", "ACCEPT_GAIN") and not self.alone:
+            return ["arm      this rig has no guard: nothing to arm; the controller vibrates already"]
+        if self.state == "NO_GUARD" and self.word == "DISARM":
+            return [
+                "disarm   NOT DONE: this rig has no guard: nothing to disarm; `stickslip stop` stops its controller"
+            ]
         done = "done" if self.done else "NOT DONE"
         lines = [
             f"{self.word.lower().replace('accept_gain', 'arm'):<8} {done} after {self.seconds:.2f} s",
@@ -53,8 +64,6 @@ class Obeyed(NamedTuple):
         ]
         if self.not_kept:
             lines.append(f"warning  {self.not_kept}")
-        if not (self.taken or self.done):
-            lines.append("warning  the rig did not say that it took this word: say it again")
         if self.alone:
             lines.append(
                 "warning  no controller is on the bus: nothing vibrates until one comes, `stickslip controller`"
@@ -71,7 +80,7 @@ class Obeyed(NamedTuple):
 def tell(bus_config: BusConfig, name: str) -> Obeyed:
     """Say a word until the rig has done it or refuses.
 
-    Raises Fault NO_PEER where no rig answers, it falls silent meanwhile, or goes on as before.
+    Raises Fault NO_PEER where no rig answers, it falls silent meanwhile, does not take the word, or goes on as before.
     """
     where = bus_config.endpoint
     action = wire.Operator.Action.Value(name)
@@ -119,6 +128,9 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         taken=exchange.taken,
         alone=alone,
     )
+    if not (obeyed.done or obeyed.taken) and last.guard_state != wire.NO_GUARD:
+        line = f"{where}: the rig did not say that it took {name} within {_ANSWER_S:g} s, and is {before}: must take it"
+        raise Fault("NO_PEER", f"{line}; {_BY_HAND if action in _QUIETENS else 'say it again'}")
     if action == wire.Operator.STOP and not obeyed.done:
         raise Fault("NO_PEER", f"{where}: the rig is {before} after a stop: must be at rest; {_BY_HAND}")
     return obeyed
@@ -145,7 +157,7 @@ class _Exchange:
         self._answer = f"{name} by {who}"
         self._after = False  # whether `applied` is of after the answer
         self._checked = False  # whether a loop check ran since
-        self._came_s = 0.0
+        self._came_s = self._until_s = 0.0
 
     @property
     def done(self) -> bool:
@@ -163,19 +175,29 @@ class _Exchange:
             return state != wire.FAULT
         if self._action == wire.Operator.DISARM:
             return state == wire.DISARMED and at_rest
+        if state == wire.NO_GUARD:  # nothing to arm
+            return True
         return state in (wire.ARMED, wire.ACTIVE) and applied.cause != wire.ARMED_BY_SCENARIO
 
     def until_done(self, send: Callable[[bytes], None]) -> None:
-        """Say the word until the rig takes it, and listen until it has done it, refuses it, or time is up."""
-        began_s = again_s = time.monotonic()
-        while (now_s := time.monotonic()) < began_s + _ANSWER_S:
+        """Say the word until the rig takes it, and listen until it has done it, refuses it, or does nothing for it any more."""
+        began_s = again_s = heard_s = time.monotonic()
+        self._until_s = began_s + _ANSWER_S
+        while True:
+            now_s = time.monotonic()
+            if realtime.was_paused(heard_s, heard_s + _HEARS_S):  # what the rig did meanwhile waits to be read
+                self._until_s = now_s + _ANSWER_S
+            if now_s >= self._until_s:
+                break
+            heard_s = now_s
             if now_s >= again_s and not self._after:
                 send(self._word)
                 again_s = now_s + _AGAIN_S
-            self._hear(0.05)
+            self._hear(_HEARS_S)
             refused = self._after and self._action in _ARMS and self._is_in(wire.FAULT)
             other_gain = self._checked and self._action == wire.Operator.ARM and self._is_in(wire.READY)
-            if self.done or other_gain or (refused and now_s > began_s + _REFUSED_S):
+            no_guard = self._action == wire.Operator.DISARM and self._is_in(wire.NO_GUARD)
+            if self.done or other_gain or no_guard or (refused and now_s > began_s + _REFUSED_S):
                 break
         now_s = time.monotonic()
         self.seconds, self.silent_s = now_s - began_s, now_s - self._came_s
@@ -199,6 +221,8 @@ class _Exchange:
         if received.topic is APPLIED:
             self.applied = parsed(wire.Applied, received.payload, APPLIED.name)
             self._came_s, self._after = time.monotonic(), self.taken
+            if self._after and self._is_in(wire.CHECKING):
+                self._until_s = self._came_s + _ANSWER_S
             self._checked = self._after and (self._checked or self._is_in(wire.CHECKING))
             return
         event = parsed(wire.Event, received.payload, PLANT_EVENT.name)

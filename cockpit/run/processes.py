@@ -12,8 +12,9 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
+from bridge.compiling import Progress, left_in
 from bridge.faults import FAULTS, Fault
-from bridge.plain import ANOTHER_COMPILES, COMPILED, COMPILING, LOADED, say
+from bridge.plain import ANOTHER_COMPILES, LOADED, say
 from cockpit.run.child_process import handle_endings
 
 _GRACE_S = 6.0  # to fade out, say goodbye on the bus and close the log
@@ -44,6 +45,7 @@ class Child:
         )
         self._lines: list[str] = []
         self.still = STARTS
+        self.left = (0, 0)  # kernels to compile, of how many
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -53,14 +55,15 @@ class Child:
                 for line in lines:
                     self._lines.append(line.rstrip())
                     words = line.removeprefix("stickslip: ")
-                    begins = words.startswith((COMPILING, ANOTHER_COMPILES))
-                    if begins:
+                    waits = words.startswith(ANOTHER_COMPILES)
+                    if left := left_in(line):
+                        self.left = left
+                        self.still = COMPILES if left[0] else STARTS
+                    elif waits:
                         self.still = COMPILES
-                    elif words.startswith(COMPILED):
-                        self.still = STARTS
                     elif words.rstrip() == LOADED:
                         self.still = READY
-                    if begins or line.startswith(_WARNING):
+                    if waits or line.startswith(_WARNING):
                         say(line.rstrip())
 
     def last_words(self) -> str:
@@ -130,10 +133,10 @@ def run_processes(
 @contextlib.contextmanager
 def _ctrl_c_afterwards() -> Generator[None]:
     """Ctrl-C, SIGTERM and SIGHUP wait for the end of the block: a child that is not noted yet would be left behind."""
-    came = threading.Event()
+    came: list[int] = []
 
-    def note(_number: int, _frame: Any) -> None:
-        came.set()
+    def note(number: int, _frame: Any) -> None:
+        came.append(number)
 
     before = handle_endings(note)
     try:
@@ -141,8 +144,8 @@ def _ctrl_c_afterwards() -> Generator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    if came.is_set():
-        signal.raise_signal(signal.SIGINT)
+    if came:
+        signal.raise_signal(came[0])
 
 
 class Beginning:
@@ -159,6 +162,7 @@ class Beginning:
         self._due_s = self._since_s + _TOLD_S
         self._wait_s = wait_s
         self._begun = False
+        self._progress = Progress()
 
     def _stamp(self) -> tuple[int, int] | None:
         if not self._log.is_file():
@@ -168,6 +172,7 @@ class Beginning:
 
     def look(self) -> None:
         """Tell what is waited for where it is due. Raises Fault NO_PEER after the longest time."""
+        self._progress.show(*(sum(counts) for counts in zip(*(child.left for child in self._children), strict=True)))
         now_s = time.monotonic()
         late = self._wait_s is not None and now_s > self._since_s + self._wait_s
         if self._begun or not (late or now_s > self._due_s):
@@ -181,7 +186,8 @@ class Beginning:
             raise Fault(
                 "NO_PEER", f"{what} after {waited_s:.0f} s; give the start longer: --wait S, or no --wait at all"
             )
-        say(f"waiting  {what}, since {waited_s:.0f} s; Ctrl-C ends it")
+        if not any(child.still == COMPILES for child in self._children):  # which the progress shows
+            say(f"waiting  {what}, since {waited_s:.0f} s; Ctrl-C ends it")
         self._due_s = now_s + _TOLD_S
 
     def _what_is_missing(self) -> str:

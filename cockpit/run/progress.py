@@ -96,7 +96,9 @@ def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
     for topic in (APPLIED, COMMAND):  # a thousand a second, of which the newest ten are looked at
         bus.listen(topic, lambda received: newest_of.__setitem__(received.topic.name, received))
     pauses, paused_ms = 0, 0.0
-    with Live(Text("starting"), console=Console(stderr=True), refresh_per_second=8, transient=True) as live:
+    # shown from the first state on: until then the terminal's line is that of the kernels
+    live = Live(console=Console(stderr=True), refresh_per_second=8, transient=True)
+    with contextlib.ExitStack() as shown:
         while not over.wait(_LOOK_S):
             newest = None
             while (received := inbox.get_nowait()) is not None:
@@ -114,4 +116,6 @@ def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
                     state = parsed(wire.State, newest.payload, STATE.name)
                     roles = [role for role in ("controller", "recorder") if bus.alive(role)]
                     line = progress_line(state, duration_s, pauses, paused_ms, watch.warnings(roles))
+                    if not live.is_started:
+                        shown.enter_context(live)
                     live.update(Text(plain(line)))

@@ -1,28 +1,33 @@
 """`stickslip replay`: is it the same, what if, and a log back on the bus."""
 
+import contextlib
 import json
 import math
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from bridge.config import validate, with_overrides
 from bridge.faults import Fault
 from bridge.log.damage import damage_findings
-from bridge.log.logfile import RunData, read_run
-from bridge.log.metadata import table_of, texts_of
+from bridge.log.log_reader import LogReader
+from bridge.log.logfile import Piece, RunData, check_log_file, iter_pieces, read_run
+from bridge.log.metadata import configuration_of, table_of, texts_of
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from cockpit.judge.verdict import judge_run
-from cockpit.run.in_process import Word, run_onboard
-from cockpit.run.run import about_run
-from cockpit.run.scenario import Scenario, header
+from bridge.wire.payloads import parsed
 from controller.codes import RESET, STOP
 from controller.config import ControllerConfig
-from controller.replay import Change, Difference, replay
+from controller.replay import Change, Difference, OutOfOrder, Replay, Replayer
 
+if TYPE_CHECKING:
+    from cockpit.run.in_process import Word
+
+Headers = dict[str, dict[str, str]]
+
+_REPLAYED = frozenset({"sensors", "command", "trace", "announce", "snapshot"})  # topics
 _LATEST_S = 1e9  # 32 years; a log counts nanoseconds in 64 bits, 1.8e10 s
 
 
@@ -40,17 +45,21 @@ def time_s(option: str, text: str, example: str) -> float:
 
 def changes_of(run: RunData, settings: list[str]) -> list[Change]:
     """The log's own configuration, then every `key=value[@TIMEs]` setting from its time on. Raises Fault CONFIG."""
-    recorded = table = run.configuration("controller")
-    validate(ControllerConfig, recorded, run.path.name)  # by itself: no setting is to blame
-    source = f"{run.path.name} with --set" if settings else run.path.name
+    return _changes_of(run.headers, run.path, settings, int(run.trace["t_ns"].max(initial=0)))
+
+
+def _changes_of(headers: Headers, path: Path, settings: list[str], end_ns: int | None) -> list[Change]:
+    """The same, of a log that ends at `end_ns`; None where this is not known yet."""
+    recorded = table = configuration_of(headers, "controller", path)
+    validate(ControllerConfig, recorded, path.name)  # by itself: no setting is to blame
+    source = f"{path.name} with --set" if settings else path.name
     timed: dict[int, list[str]] = {0: []}
-    for setting in [*_timed_then(run), *settings]:
+    for setting in [*_timed_then(headers, path), *settings]:
         plain, _, time = setting.rpartition("@")
         t_ns = 0
         if plain:
             t_ns = round(time_s(f"--set {setting}", time, "key=value@20s") * 1e9)
-            end_ns = int(run.trace["t_ns"].max(initial=0))
-            if t_ns > end_ns:
+            if end_ns is not None and t_ns > end_ns:
                 line = f"--set {setting}: the log ends at {1e-9 * end_ns:g} s: must be a time before"
                 raise Fault("CONFIG", line)
         timed.setdefault(t_ns, []).append((plain or setting).removeprefix("controller."))
@@ -65,13 +74,15 @@ def changes_of(run: RunData, settings: list[str]) -> list[Change]:
     return changes
 
 
-def _timed_then(run: RunData) -> list[str]:
+def _timed_then(headers: Headers, path: Path) -> list[str]:
     """What `--closed-loop` had set from a time on when it made this log; what it set from the start is in the header."""
-    return [setting for setting in texts_of(run.headers, "run", "settings", run.path) if "@" in setting]
+    return [setting for setting in texts_of(headers, "run", "settings", path) if "@" in setting]
 
 
-def _words_of(run: RunData) -> list[Word]:
+def _words_of(run: RunData) -> "list[Word]":
     """What persons said to controller and rig, and when."""
+    from cockpit.run.in_process import Word
+
     bits = ((STOP, wire.Operator.STOP), (RESET, wire.Operator.RESET))
     found = [Word(int(row["t_ns"]), action) for row in run.trace for bit, action in bits if int(row["events"]) & bit]
     causes: dict[int, int] = {
@@ -123,35 +134,87 @@ class Replayed(NamedTuple):
 
 def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
     """Replay one log from a time on; whether today's controller does the same. Raises Fault BAD_LOG and CONFIG."""
-    run = read_run(path)
-    if not len(run.trace):
+    check_log_file(path)
+    first = _Pass(path, from_s, settings)
+    if not first.steps:
         raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded, so nothing can be replayed")
-    result = replay(run, changes_of(run, settings), from_s)
-    if result.compared == 0:
+    reader = first.reader
+    changes = _changes_of(reader.metadata, path, settings, first.end_ns)
+    result = first.result
+    if result is None or first.changes != changes:  # a message or a configuration came late
+        result = _Pass(path, from_s, settings, changes).result
+    if result is None or result.compared == 0:
         line = f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
         raise Fault("BAD_LOG", f"{line}; use an earlier --from")
-    reason = "" if result.identical else likely_reason(run, settings)
-    damage = [f"{finding.kind}: {finding.text}" for finding in damage_findings(run.damage, path)]
     return Replayed(
-        str(run.path),
+        str(path),
         result.identical,
         result.compared,
         result.skipped,
         result.difference,
-        reason,
+        "" if result.identical else likely_reason(reader.metadata, path, settings),
         bool(settings),
-        damage,
+        [f"{finding.kind}: {finding.text}" for finding in damage_findings(reader.damage, path)],
     )
 
 
-def likely_reason(run: RunData, settings: list[str]) -> str:
+class _Pass:
+    """One pass over a log, with a replay as it goes.
+
+    Args:
+        path, from_s, settings: of the replay.
+        changes: of the whole log, where they are known: it is taken into memory, and its messages may be in any order. Else the
+            configuration is the one that the log holds before its first step, and the memory does not grow with the log.
+
+    """
+
+    def __init__(self, path: Path, from_s: float, settings: list[str], changes: list[Change] | None = None) -> None:
+        self.reader = LogReader(path)
+        self.changes = changes
+        self.result: Replay | None = None  # None where its messages are out of order, or its configuration comes late
+        self.steps = self.end_ns = 0
+        replayer = Replayer(changes, from_s, whole=True) if changes is not None else None
+        waiting: list[Piece] = []  # for the configuration
+        out_of_order = False
+        for piece in iter_pieces(self.reader):
+            if piece.topic == "trace" and len(piece.records):
+                self.steps += len(piece.records)
+                self.end_ns = max(self.end_ns, int(piece.records["t_ns"].max()))
+            if out_of_order or piece.topic not in _REPLAYED:
+                continue
+            waiting.append(piece)
+            try:
+                if replayer is None and (self.steps or "controller" in self.reader.metadata):
+                    self.changes = _changes_of(self.reader.metadata, path, settings, None)
+                    replayer = Replayer(self.changes, from_s)
+                if replayer is not None:
+                    for one in waiting:
+                        _add(replayer, one)
+                    waiting = []
+            except (OutOfOrder, Fault):  # a fault of the configuration may be no more one when all of it was read
+                out_of_order, replayer, waiting = True, None, []
+        if replayer is not None:
+            with contextlib.suppress(OutOfOrder):
+                self.result = replayer.result()
+
+
+def _add(replayer: Replayer, piece: Piece) -> None:
+    if piece.topic == "snapshot":
+        for payload in piece.payloads:
+            replayer.add_snapshot(parsed(wire.Snapshot, payload, "/snapshot"))
+    else:
+        replayer.add(piece.topic, piece.records)
+
+
+def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
     """Why a replay would differ, in words."""
+    from cockpit.run.scenario import Scenario, header
+
     if settings:
         return f"the configuration was changed: {', '.join(settings)}"
-    scenario = Scenario.model_construct(
-        controller=validate(ControllerConfig, run.configuration("controller"), run.path.name)
-    )
-    was = table_of(run.headers, "controller", "versions", run.path)
+    config = validate(ControllerConfig, configuration_of(headers, "controller", path), path.name)
+    scenario = Scenario.model_construct(controller=config)
+    was = table_of(headers, "controller", "versions", path)
     now = json.loads(header(scenario, "controller", lockstep=False).versions)
     changed = [f"{name} {was.get(name)} then, {now[name]} now" for name in now if was.get(name) != now[name]]
     if changed:
@@ -183,15 +246,16 @@ class RunFigures(NamedTuple):
 
 def outcome(run: RunData) -> RunFigures:
     """The figures of a run from its log."""
-    verdict = judge_run(run)
+    from cockpit.judge.judged import judge_tables
+
+    verdict, _ = judge_tables(run)
+    swing_N = verdict.after.swing_N if verdict.after else 0.0
     trace = run.trace
     block_s = float(run.configuration("controller")["block_s"])
     power_W = trace["drive_force_N"] * trace["drive_velocity_mps"]
     work_J = float(power_W[np.isfinite(power_W)].sum()) * block_s  # the verdict counts the blocks that are no number
     dose = float((trace["vibration_velocity_mps"] ** 2).sum()) * block_s * 1e6
-    slips = int(trace["slips"][-1])
-    swing_N = verdict.after.swing_N if verdict.after else 0.0
-    return RunFigures(slips, swing_N, verdict.velocity_ratio_min, work_J, dose)
+    return RunFigures(int(trace["slips"][-1]), swing_N, verdict.velocity_ratio_min, work_J, dose)
 
 
 class Compared(NamedTuple):
@@ -212,6 +276,10 @@ class Compared(NamedTuple):
 
 def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
     """Simulate a log's run again, from its own plant and seed, with the changed controller, and compare both."""
+    from cockpit.run.in_process import run_onboard
+    from cockpit.run.run import about_run
+    from cockpit.run.scenario import Scenario
+
     run = read_run(path)
     changes = changes_of(run, settings)
     plant = run.configuration("plant")
@@ -229,7 +297,7 @@ def closed_loop(path: Path, settings: list[str], log: Path) -> Compared:
     scenario = validate(Scenario, table, path.name)
     about = about_run(scenario, lockstep=True) | {
         "closed_loop_of": str(path),
-        "settings": [*_timed_then(run), *settings],
+        "settings": [*_timed_then(run.headers, path), *settings],
     }
     run_onboard(scenario, log, about, changes=changes[1:], words=_words_of(run))
     return Compared(outcome(run), outcome(read_run(log)), str(log))

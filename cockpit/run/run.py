@@ -23,8 +23,10 @@ from cockpit.run.scenario import (
 from cockpit.run.writable import LOG, check_output
 
 if TYPE_CHECKING:
+    from bridge.log.storage.chain import Chain
     from cockpit.judge.margins import Margins
     from cockpit.judge.phases import Phase
+    from cockpit.judge.run_judge import RunJudge
     from cockpit.judge.verdict import RunVerdict
 
 
@@ -92,14 +94,20 @@ class RunOutcome(NamedTuple):
             table["without"] = self.without.as_dict()
         return table | {"effects": self.effects, "loop": self.loop} if self.loop is not None else table
 
-    def in_words(self) -> list[str]:
-        """The verdict in one line, then in lines for a person."""
+    def in_words(self, verbose: bool) -> list[str]:
+        """The verdict in six lines; with `verbose` all figures."""
         from cockpit.judge.margins import margins_in_words
-        from cockpit.judge.verdict_words import headline, in_words
+        from cockpit.judge.verdict_words import in_words
 
-        rig = f"rig      {self.rig}" + (f", with {', '.join(self.effects)}" if self.effects else "")
+        lines = in_words(self.verdict, verbose, self.without)
+        if not verbose:
+            return lines
         margins = margins_in_words(self.loop) if self.loop is not None else []
-        return [headline(self.verdict), rig, *margins, *in_words(self.verdict, self.without)]
+        return [
+            *lines,
+            f"rig      {self.rig}" + (f", with {', '.join(self.effects)}" if self.effects else ""),
+            *margins,
+        ]
 
 
 def run_scenario(
@@ -117,7 +125,8 @@ def run_scenario(
         wait_s: longest time until the log of a run of several processes begins; None: as long as they need.
         without: simulate the same run without the controller as well, once it is judged.
 
-    Raises Fault INTERRUPTED where one with an end was stopped before, with its verdict on stderr first.
+    Raises Fault INTERRUPTED where one with an end was stopped before, and what ended a run in one process early, each with the
+    verdict on what was recorded on stderr first.
 
     """
     scenario = load_scenario(name, settings)
@@ -137,10 +146,11 @@ def run_scenario(
         _refuse_little_room(path)
     if endless:
         say(f"{'simulating' if in_process else 'running'} until Ctrl-C; log {path}")
-    interrupted, told = False, []
+    interrupted, by, came = False, "Ctrl-C", _Came(None, None, [], stopped=False)
     try:
         if in_process:
-            told = _in_process(scenario, path)
+            came = _in_process(scenario, path)
+            interrupted = came.stopped
         else:
             from cockpit.run.processes import run_processes
             from cockpit.run.progress import follower
@@ -148,41 +158,63 @@ def run_scenario(
             arguments = ["--scenario", name, *(part for setting in settings for part in ("--set", setting))]
             follow = follower(scenario.bus, scenario.duration_s)
             run_processes(arguments, scenario.bus.endpoint, path, lockstep, follow, wait_s)
-    except KeyboardInterrupt:
-        interrupted = True
+    except KeyboardInterrupt as ended:
+        interrupted, by = True, str(ended) or by
+    except Fault:
+        if in_process and _stamp(path) != before:
+            _say_verdict(path)
+        raise
     if interrupted and _stamp(path) == before:
-        raise Fault("INTERRUPTED", "stopped by Ctrl-C before anything was recorded")
-    closed = f"stopped by Ctrl-C; {path} is closed"
+        raise Fault("INTERRUPTED", f"stopped by {by} before anything was recorded")
+    closed = f"stopped by {by}; {path} is closed"
     left = f"{closed} and not judged; `stickslip log info {path}` judges it"
     line = f"judging the log; Ctrl-C {'again ' if interrupted else ''}to leave it unjudged"
     with left_on_ctrl_c(line, left, again=interrupted):
-        return _judged(scenario, path, closed if interrupted else "", without, told)
+        return _judged(scenario, path, closed if interrupted else "", without, came)
 
 
-def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, told: list[str]) -> RunOutcome:
-    """What came of a run; `told` is what its log does not say.
+class _Came(NamedTuple):
+    """What a run in one process left besides its log."""
+
+    judge: "RunJudge | None"  # that took every message; None where the log is to be read
+    chain: "Chain | None"
+    told: list[str]  # what the log does not hold
+    stopped: bool  # by Ctrl-C or a signal
+
+
+def _say_verdict(path: Path) -> None:
+    """The verdict on what was recorded, on stderr; nothing where a log of a moment holds nothing to judge."""
+    from cockpit.judge.judged import judge
+    from cockpit.judge.verdict_words import in_words
+
+    with contextlib.suppress(Fault):
+        say("\n".join(in_words(judge(path), verbose=False)))
+
+
+def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, came: _Came) -> RunOutcome:
+    """What came of a run.
 
     Raises Fault INTERRUPTED with the line `interrupted`, if any, for a run that did not reach its end.
     """
-    from bridge.log.logfile import read_run
+    from bridge.log.damage import Damage
     from bridge.log.storage.afterwards import note_afterwards
-    from cockpit.judge.verdict import judge, judge_run, settled_from_s
-    from cockpit.judge.verdict_words import VERDICT, in_words, noted
+    from cockpit.judge.judged import judge_log
+    from cockpit.judge.setup import settled_from_s
+    from cockpit.judge.verdict_words import VERDICT, noted
 
     if interrupted and scenario.duration_s:
-        with contextlib.suppress(Fault):  # a log of a moment may hold nothing to judge
-            say("\n".join(in_words(judge(path))))
+        _say_verdict(path)
         raise Fault("INTERRUPTED", interrupted)
-    run = read_run(path)
-    if interrupted and not len(run.sensors):
-        raise Fault("INTERRUPTED", f"stopped by Ctrl-C before the first block; {path} is closed")
-    margins = None
-    if scenario.rig.effects:
-        from cockpit.judge.margins import loop_margins
-
-        margins = loop_margins(run)
-    verdict = judge_run(run)
-    verdict = verdict._replace(told=[*verdict.told, *told])
+    effects = list(scenario.rig.effects)
+    if came.judge is not None and came.chain is not None:
+        judge = came.judge
+        verdict = judge.result(Damage(0, 0, closed=True), came.chain, {})
+    else:
+        verdict, _, judge = judge_log(path, margins=bool(effects))
+    if interrupted and not verdict.blocks:
+        raise Fault("INTERRUPTED", f"{interrupted} and holds no block")
+    margins = judge.margins() if effects else None
+    verdict = verdict._replace(told=[*verdict.told, *came.told])
     alone = None
     if without and verdict.after is not None:
         from cockpit.run.without import without_controller
@@ -190,7 +222,7 @@ def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, tol
         alone = without_controller(scenario, settled_from_s(verdict.enabled_from_s), verdict.seconds)
     fields = noted(verdict) | ({"without": alone.as_dict()} if alone is not None else {})
     verdict = verdict._replace(chain=note_afterwards(path, VERDICT, fields, verdict.chain))
-    return RunOutcome(verdict, scenario.rig.name, list(scenario.rig.effects), margins, alone)
+    return RunOutcome(verdict, scenario.rig.name, effects, margins, alone)
 
 
 def _free_bytes(path: Path) -> int:
@@ -223,14 +255,15 @@ class _Room:
         return self.is_over
 
 
-def _in_process(scenario: Scenario, path: Path) -> list[str]:
-    """Simulate, with a bar on a terminal; without an end show the simulated time, until a person or the disk ends it.
+def _in_process(scenario: Scenario, path: Path) -> _Came:
+    """Simulate, with a bar on a terminal; without an end show the simulated time, until the operator or the disk ends it.
 
-    Returns a line that says so where the disk did.
+    A run without faults is judged while it is written.
     """
     from rich.console import Console
     from rich.progress import Progress, TextColumn
 
+    from cockpit.judge.run_judge import RunJudge
     from cockpit.run.in_process import run_onboard
     from cockpit.run.simulated.log import run_with_faults
 
@@ -238,21 +271,22 @@ def _in_process(scenario: Scenario, path: Path) -> list[str]:
         Progress.get_default_columns() if scenario.duration_s else (TextColumn("{task.completed:.1f} s simulated"),)
     )
     console = Console(stderr=True)
+    judge, chain = RunJudge(path, {}, margins=bool(scenario.rig.effects)), None
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task("simulating", total=scenario.duration_s or None)
         stop = stop_event()
         about = about_run(scenario, lockstep=True)
-        simulate = run_with_faults if scenario.fault else run_onboard
         no_room = _Room(path)
 
         def stopped() -> bool:
             return stop.is_set() or (scenario.duration_s == 0.0 and no_room())
 
-        simulate(scenario, path, about, lambda t_s: bar.update(task, completed=t_s), stopped=stopped)
-    if stop.is_set():
-        raise KeyboardInterrupt
-    return (
-        [f"LOG_WRITE: ended, as less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}"]
-        if no_room.is_over
-        else []
-    )
+        def progress(t_s: float) -> None:
+            bar.update(task, completed=t_s)
+
+        if scenario.fault:
+            run_with_faults(scenario, path, about, progress, stopped)
+        else:
+            chain = run_onboard(scenario, path, about, progress, stopped=stopped, judge=judge)
+    told = [f"LOG_WRITE: ended, as less than {_LEAST_FREE_BYTES / 1e6:.0f} MB are free for {path}"]
+    return _Came(judge if chain is not None else None, chain, told if no_room.is_over else [], stop.is_set())

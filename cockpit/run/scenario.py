@@ -1,7 +1,6 @@
 """A scenario: one rig, one controller, one duration."""
 
 import json
-import math
 import platform
 from importlib.metadata import version
 from pathlib import Path
@@ -16,10 +15,10 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import SCHEMA_VERSION
 from bridge.wire.zenoh_link import BusConfig
 from cockpit.run.scenario_file import RIG_FILE, find, rig_table, with_rig
+from cockpit.run.sensor_needs import refuse_blind_sensors, refuse_out_of_travel
 from controller.config import ControllerConfig, candidate_frequencies_Hz
 from plant.config import RigConfig
 from plant.config_limits import refuse_what_no_rig_does
-from plant.drive_motion import lowest_mps, reach_m
 from plant.faults.kinds import PROCESS
 from plant.faults.table import FaultTable
 
@@ -91,7 +90,7 @@ class Scenario(Strict):
                         f"controller.limits.forbidden_Hz: the controller would command {candidate_Hz:g} Hz, which "
                         f"rig.guard.forbidden_Hz = [{low_Hz:g}, {high_Hz:g}] ends in FAULT; forbid it to the controller as well"
                     )
-        _stays_in_range(self.rig, self.duration_s)
+        refuse_out_of_travel(self.rig, self.duration_s)
         for table in self.fault:
             if 0.0 < self.duration_s <= table.from_s:
                 line = f"fault: {table.in_words()}: from_s = {table.from_s:g}: must be before the end of the run"
@@ -99,38 +98,13 @@ class Scenario(Strict):
         return self
 
 
-def _stays_in_range(rig: RigConfig, duration_s: float) -> None:
-    """Raise ValueError for a drive that leaves the ranges of the sensors within the run."""
-    sensors = rig.sensors
-    motion = rig.drive.motion()
-    # of a run without an end, what is sure to come: moves to their last, and one cycle
-    until_s = duration_s or (float(motion.start_s[-1]) if rig.drive.moves else 0.0)
-    if motion.drift_m != 0.0 and not duration_s:
-        raise ValueError(
-            f"rig.drive.repeat_every_s = {rig.drive.repeat_every_s:g}: each cycle ends {motion.drift_m * 1e3:.3g} mm from where "
-            "it began, and a run without an end leaves every range: must end where it began; change the way back, or give "
-            "duration_s"
-        )
-    if math.isfinite(motion.period_s):
-        until_s = duration_s or motion.period_s
-    lowest_m, highest_m = reach_m(motion, until_s)
-    if highest_m > sensors.position_range_m:
-        raise ValueError(
-            f"duration_s = {duration_s:g}: the drive would travel to {highest_m * 1e3:.1f} mm, beyond the transducers' "
-            f"{sensors.position_range_m * 1e3:g} mm; shorten the run, slow the drive or raise "
-            "rig.sensors.position_range_m"
-        )
-    if lowest_m < sensors.position_lowest_m:
-        raise ValueError(
-            f"duration_s = {duration_s:g}: the drive would travel to {lowest_m * 1e3:.4g} mm, below the transducers' "
-            f"{sensors.position_lowest_m * 1e3:g} mm; shorten the run, let the drive go forward first or lower "
-            f"rig.sensors.position_lowest_m to {lowest_m:.3g}"
-        )
-    if lowest_mps(motion, until_s) < 0.0 and sensors.force_lowest_N == 0.0:
-        raise ValueError(
-            "rig.sensors.force_lowest_N = 0: the drive goes back within the run, and pushes with a force that this sensor "
-            f"shows as 0; set it to {-sensors.force_range_N:g}"
-        )
+class _Runnable(Scenario):
+    """A scenario whose sensors can show its motion; one of the bank, or of a log that is replayed, need not."""
+
+    @model_validator(mode="after")
+    def _sensors_see(self) -> "_Runnable":
+        refuse_blind_sensors(self.rig, self.controller, self.duration_s)
+        return self
 
 
 def refuse_what_takes_no_clock(scenario: Scenario) -> None:
@@ -183,10 +157,10 @@ def load_scenario(name: str, settings: list[str]) -> Scenario:
     of_rig = [setting for setting in settings if setting.startswith(RIG_FILE)]
     table, source = with_rig(path, with_overrides({"name": path.stem} | given, settings))
     try:
-        return validate(Scenario, table, source)
+        return validate(_Runnable, table, source)
     except Fault as fault:
         table, source = with_rig(path, with_overrides({"name": path.stem} | given, of_rig))
-        validate(Scenario, table, source)  # the files by themselves
+        validate(_Runnable, table, source)  # the files by themselves
         raise blamed(fault, source, [setting for setting in settings if setting not in of_rig]) from None
 
 

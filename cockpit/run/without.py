@@ -3,9 +3,10 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bridge.log.logfile import read_run
+from bridge.log.damage import Damage
+from cockpit.judge.judged import judge_log
 from cockpit.judge.phases import Phase
-from cockpit.judge.verdict import stretch_of
+from cockpit.judge.run_judge import RunJudge
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import LogTable, Scenario
 from cockpit.run.simulated.log import run_with_faults
@@ -24,8 +25,11 @@ def without_controller(scenario: Scenario, from_s: float, seconds: float) -> Pha
     controller = scenario.controller.model_copy(update={"policy": policy})
     log = LogTable(file_MB=0.0, file_s=0.0)
     alone = scenario.model_copy(update={"controller": controller, "duration_s": seconds, "log": log})
-    simulate = run_with_faults if scenario.fault else run_onboard
     with TemporaryDirectory() as folder:
         path = Path(folder) / "without.mcap"
-        simulate(alone, path, {})
-        return stretch_of(read_run(path), from_s, seconds)
+        if scenario.fault:
+            run_with_faults(alone, path, {})
+            return judge_log(path, stretch_from_s=from_s).judge.stretch
+        judge = RunJudge(path, {}, stretch_from_s=from_s)
+        judge.result(Damage(0, 0, closed=True), run_onboard(alone, path, {}, judge=judge), {})
+        return judge.stretch

@@ -1,4 +1,4 @@
-"""How old the blocks are when they come, against the youngest that ever came: a link or a rig that became slow.
+"""How old the blocks are when they are answered, against the youngest ever: a computer, a link or a rig that became slow.
 
 The clocks of rig and controller are two: what they drift apart is forgotten, and with it a delay that has been there for minutes.
 """
@@ -22,21 +22,21 @@ class Age:
         """Whether every block of the last HOLD_NS was older than the margin."""
         return self._since_ns is not None and self._last_ns is not None and self._last_ns - self._since_ns >= HOLD_NS
 
-    def note(self, arrival_ns: int, t_ns: int) -> None:
-        """Take a block: when it came by the controller's clock, and its time by the rig's."""
-        if arrival_ns <= 0:  # in one process there is no clock
+    def note(self, answered_ns: int, t_ns: int) -> None:
+        """Take a block: when it is answered by the controller's clock, and its time by the rig's."""
+        if answered_ns <= 0:  # in one process there is no clock
             return
-        age_ns = float(arrival_ns - t_ns)
+        age_ns = float(answered_ns - t_ns)
         if self._last_ns is None:
             self._youngest_ns = age_ns
         else:
-            self._youngest_ns = min(age_ns, self._youngest_ns + _DRIFT * (arrival_ns - self._last_ns))
-        self._last_ns = arrival_ns
+            self._youngest_ns = min(age_ns, self._youngest_ns + _DRIFT * (answered_ns - self._last_ns))
+        self._last_ns = answered_ns
         self.late_ns = round(age_ns - self._youngest_ns)
         if self.late_ns <= MARGIN_NS:
             self._since_ns = None
         elif self._since_ns is None:
-            self._since_ns = arrival_ns
+            self._since_ns = answered_ns
 
     def forget(self) -> None:
         """Begin anew, as the rig's clock jumped or began anew."""

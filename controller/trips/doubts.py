@@ -11,6 +11,7 @@ from bridge.kernel import Record, kernel
 from controller.codes import CHECKING, RESET
 from controller.trips.anew import forget_motion, forget_needs
 from controller.trips.band import begin_known, forget_check
+from controller.trips.stall import is_judged
 
 ACCELEROMETER, CONTACT, DRIVE = 1, 2, 4  # bits of `s.doubted`
 OF_FORCE, OF_SLIDE, OF_DRIVE, OF_BASE = range(4)  # channels, in `s.same_steps`
@@ -19,7 +20,12 @@ CHANNELS = 4
 
 @kernel
 def trip(s: Record, reason: int, doubts: int) -> None:
-    """Doubt signals; the first trip is the one that is told until it ends, unless a later one ends the vibration."""
+    """Doubt signals; the first trip is the one that is told until it ends, unless a later one ends the vibration.
+
+    After a stall of the computer a doubt waits: what is true of a signal is still there when that is over.
+    """
+    if not is_judged(s):
+        return
     if s.trip == 0 or (doubts == DRIVE and s.doubted & DRIVE == 0):
         s.trip = reason
     s.doubted |= doubts

@@ -11,6 +11,7 @@ from bridge.wire.words import words
 
 _LIMITS: dict[int, str] = {wire.RANGE: "STROKE_MAX", wire.GAIN_LIMIT: "GAIN_LIMIT"}
 _HELD_S = 0.2  # of a limit until it is told: every start of a vibration passes some
+_STALLED = "; but the computer or the link stalled within the last second: look at that first"
 _AGAIN_S = 1.0  # the same is told at most once in so long
 
 
@@ -37,8 +38,14 @@ class TripTeller:
         self._limit_told = True
         self._told_ns: dict[str, int] = {}
 
-    def news(self, trace: Any) -> list[tuple[str, str]]:
-        """Codes and texts of what is new in a record of `Trace` since the last one."""
+    def news(self, trace: Any, stalled: bool = False) -> list[tuple[str, str]]:
+        """Codes and texts of what is new in a record of `Trace` since the last one.
+
+        Args:
+            trace: the record.
+            stalled: whether computer or link stalled within the last second, which may be the cause of all that is new.
+
+        """
         reason, limit = int(trace.reason), int(trace.limit)
         if reason == self._reason and limit == self._limit and self._limit_told:
             return []
@@ -53,7 +60,7 @@ class TripTeller:
                 found.append(("CLEARED", f"{' and '.join(self._open)} {'is' if len(self._open) == 1 else 'are'} over"))
                 self._open = []
             if name:
-                found += self._once(name, text, t_ns)
+                found += self._once(name, f"{text}{_STALLED if stalled else ''}", t_ns)
         if limit != self._limit:
             self._limit, self._limit_since_ns, self._limit_told = limit, t_ns, limit not in self._limits
         elif not self._limit_told and t_ns - self._limit_since_ns >= _HELD_S * 1e9:

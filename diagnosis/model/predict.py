@@ -130,22 +130,27 @@ def _predict(
     out: Floats,
 ) -> None:
     p: Record = params[0]
+    channels, truths = analogue.shape[0], truth.shape[0]
     for block in range(drive.shape[0]):
         samples = steps[block]
         p.samples_per_block = samples
         p.steps_per_sample = 1
         p.dt_s = BLOCK_S / samples
-        advance_disturbed(params, state, drive[block], frequency_Hz[block], amplitude_m[block],
-                          analogue[:, :samples], truth[:, :samples])  # fmt: skip
-        for row in range(analogue.shape[0]):
+        # contiguous, as everyone calls it: for other arrays it would be compiled again
+        block_analogue = analogue.ravel()[: channels * samples].reshape((channels, samples))
+        block_truth = truth.ravel()[: truths * samples].reshape((truths, samples))
+        advance_disturbed(
+            params, state, drive[block], frequency_Hz[block], amplitude_m[block], block_analogue, block_truth
+        )
+        for row in range(channels):
             total = 0.0
             for i in range(samples):
-                total += analogue[row, i]
+                total += block_analogue[row, i]
             out[row, block] = total / samples
         for row in range(1, 3):
             total = 0.0
             for i in range(samples):
-                about = analogue[row, i] - out[row, block]
+                about = block_analogue[row, i] - out[row, block]
                 total += about * about
             out[4 + row, block] = math.sqrt(total / samples)
 

@@ -68,16 +68,16 @@ def _real_time(log: Path, seconds: float, pings: int) -> dict[str, float]:
 
 
 def _on_time(verdict: dict[str, Any]) -> list[bool]:
-    """Print which commands were late, and whether the machine stood still then."""
+    """Print which commands were late, and whether the computer stalled then."""
     print(f"  {'commands within 1 ms [%]':<44} {100 * verdict['latency']['within_1_ms']:8.3f}")
     pauses = verdict["pauses"]
     if pauses is None:
-        print(f"  pauses of the machine not watched: {verdict['not_watched']}; their bar is not judged")
+        print(f"  stalls of the computer were not watched: {verdict['not_watched']}; their bar is not judged")
         return []
     print(
-        f"  the machine stood still {pauses['number']} times, {pauses['total_ms']:.1f} ms in all, the longest "
+        f"  the computer stalled {pauses['number']} times, {pauses['total_ms']:.1f} ms in all, the longest "
         f"{pauses['longest_ms']:.1f} ms; late commands: {pauses['late_inside']} in its pauses, {pauses['late_outside']} outside, "
-        f"{pauses['late_one_core']} of these while one core stood still alone"
+        f"{pauses['late_one_core']} of these while one core stalled alone"
     )
     share = pauses["within_1_ms_outside"]
     return [bar("commands within 1 ms outside of pauses [%]", 100 * share, share >= 0.9999, "at least 99.99")]

@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 from bridge.log.logfile import RunData, read_run
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 TABLES = ("sensors", "applied", "command", "trace", "state")
@@ -64,7 +65,7 @@ def test_twice_over_the_bus_and_in_one_process_are_the_same_bytes(tmp_path: Path
         shorter = ["--set", "duration_s=6.0", "--set", "controller.policy.enabled_from_s=2.0"]
         arguments = ["--lockstep", "--scenario", "paper-c45-c45", "--seed", "1", *shorter, *more, "--log", str(log)]
         subprocess.run(
-            [sys.executable, "-m", "cockpit", "run", *arguments], check=True, timeout=120, capture_output=True
+            [sys.executable, "-m", "cockpit", "run", *arguments], check=True, timeout=PATIENCE_S, capture_output=True
         )
     first, second, alone = (topics(log) for log in logs)
     assert set(first) == {
@@ -85,7 +86,7 @@ def test_compiled_equals_interpreted(tmp_path: Path, settings: tuple[str, ...]) 
     subprocess.run(
         [sys.executable, "-m", "cockpit", "run", "--in-process", *changes, "--log", str(log)],
         check=True,
-        timeout=120,
+        timeout=PATIENCE_S,
         capture_output=True,
         env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
     )

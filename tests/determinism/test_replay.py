@@ -16,7 +16,6 @@ from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.topics import SENSORS
 from cockpit.cli import app
-from cockpit.judge.verdict import judge_run
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import Word, run_onboard
 from cockpit.run.replay import changes_of
@@ -24,7 +23,8 @@ from cockpit.run.scenario import Scenario, header, load_scenario
 from controller.node import ControllerNode
 from controller.replay import replay
 from plant.node import PlantNode
-from tests.logs import empty_log, tables_of, write
+from tests.logs import empty_log, tables_of, verdict_of, write
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 COMMAND = [sys.executable, "-m", "cockpit"]
@@ -214,7 +214,7 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
         Word(9_100_000_000, wire.Operator.ARM),
     ]
     run_onboard(run, stopped, {}, words=words)
-    slips = judge_run(read_run(stopped))
+    slips = verdict_of(read_run(stopped))
     assert (slips.before, slips.good) == (None, True)
     assert slips.after is not None
     assert slips.after.seconds == pytest.approx(6.4, abs=0.1)
@@ -222,7 +222,7 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     assert slips.stopped_slips > 0
     then = f"{slips.stopped_slips} slips"
     told = f"stopped  by an operator, or not armed, for 6.6 s, which is no part of what came after; {then} then"
-    assert told in in_words(slips)
+    assert told in in_words(slips, verbose=True)
     assert headline(slips) == f"no stick-slip with the controller in charge; {then} while it was stopped or not armed"
     assert int(read_run(stopped).trace["slips"][-1]) >= 3
     figures = CliRunner().invoke(app, ["replay", str(stopped), "--closed-loop", "--json", "--log", str(again)])
@@ -263,7 +263,7 @@ def to_a_live_controller(log: Path, again: Path) -> list[int]:
         )
     ]
     try:
-        return [process.wait(120) for process in started]
+        return [process.wait(PATIENCE_S) for process in started]
     finally:
         for process in started:
             if process.poll() is None:

@@ -12,7 +12,7 @@ import pytest
 from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.tables.export import export
-from cockpit.judge.verdict import judge
+from cockpit.judge.judged import judge
 from cockpit.run.replay import changes_of
 from controller.replay import replay
 from diagnosis.evidence.run_log import columns_of_log

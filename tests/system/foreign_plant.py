@@ -116,7 +116,7 @@ class Rig:
             self.session.declare_subscriber(self._key("command"), self._on_command),
             self.session.declare_queryable(self._key("header/plant"), self._on_header),
         ]
-        self.send_sensors = self._publisher("sensors", first=True)
+        self.send_sensors = self._publisher("sensors")
         self.send_applied = self._publisher("applied")
         self._send_event = self._publisher("event/plant")
         self._token = self.session.liveliness().declare_token(self._key("alive/plant"))
@@ -124,13 +124,8 @@ class Rig:
     def _key(self, name: str) -> str:
         return f"{self._prefix}/{name}"
 
-    def _publisher(self, name: str, first: bool = False) -> zenoh.Publisher:
-        return self.session.declare_publisher(
-            self._key(name),
-            priority=zenoh.Priority.REAL_TIME if first else zenoh.Priority.DATA,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            express=first,
-        )
+    def _publisher(self, name: str) -> zenoh.Publisher:
+        return self.session.declare_publisher(self._key(name), congestion_control=zenoh.CongestionControl.BLOCK)
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
         role = str(sample.key_expr).rsplit("/", 1)[-1]

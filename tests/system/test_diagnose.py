@@ -110,6 +110,7 @@ def one(damped):
     return diagnosed(damped, 2)
 
 
+@pytest.mark.nightly  # 37 s of CPU
 def test_nothing_leaks_from_the_held_out_run(damped, one, short, tmp_path):
     """A held-out run of another rig refutes the name, and changes not a digit of what was fitted."""
     other = tmp_path / "other"

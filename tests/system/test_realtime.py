@@ -31,6 +31,7 @@ def await_size(log: Path, size: int) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.smoke
 def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     log = tmp_path / "run.mcap"
     arguments = ["--set", "duration_s=6.0", "--set", "controller.policy.enabled_from_s=0.0"]
@@ -55,6 +56,7 @@ def test_every_block_arrives_and_is_answered(tmp_path: Path) -> None:
     assert (verdict["pauses"] is None) == ("not watched: " in told[0]) == bool(verdict["not_watched"])
 
 
+@pytest.mark.smoke
 def test_a_recorder_that_comes_last_misses_nothing(tmp_path: Path) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
     roles = {"plant": ["--wait-for", "controller,recorder"], "controller": [], "recorder": ["--log", str(log)]}
@@ -106,10 +108,11 @@ def test_of_two_controllers_that_wait_for_one_rig_one_stays() -> None:
             controller.communicate()
 
 
+@pytest.mark.smoke
 def test_operator_stop_and_reset(tmp_path: Path) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
     # without an end: three processes start during the run, and take 12 s on a busy machine
-    arguments = ["--set", "duration_s=0", "--set", "controller.policy.enabled_from_s=0.0"]
+    arguments = ["--set", "duration_s=99", "--set", "controller.policy.enabled_from_s=0.0"]
     run = subprocess.Popen(
         [*COMMAND, "run", *arguments, "--endpoint", endpoint, "--log", str(log)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

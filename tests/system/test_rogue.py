@@ -66,7 +66,7 @@ def attack(session: zenoh.Session, now: int) -> None:
 
 def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None:
     log, endpoint = tmp_path / "run.mcap", free_endpoint()
-    settings = ["--set", "duration_s=0", "--set", "controller.policy.enabled_from_s=0.0"]
+    settings = ["--set", "duration_s=99", "--set", "controller.policy.enabled_from_s=0.0"]
     run = subprocess.Popen(
         [*COMMAND, "run", *settings, "--insecure", "--endpoint", endpoint, "--log", str(log), "--json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

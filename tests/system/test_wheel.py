@@ -53,7 +53,7 @@ def test_what_the_wheel_holds_runs_in_an_empty_folder(wheel: Path, tmp_path: Pat
         sys.executable, "-P", "-m", "cockpit", "run", "--in-process", "--scenario", "from-the-start", "--set", "duration_s=0.05",
         cwd=empty, PYTHONPATH=str(unpacked), NUMBA_DISABLE_JIT="1",
     )  # fmt: skip
-    assert "blocks   50, none lost" in said
+    assert "data     whole: 50 blocks" in said
     where = run(
         sys.executable, "-P", "-c", "import cockpit; print(cockpit.__file__)", cwd=empty, PYTHONPATH=str(unpacked)
     )
@@ -77,7 +77,7 @@ def test_a_fresh_installation_is_small_and_runs(wheel: Path, tmp_path: Path) -> 
         at / "stickslip", "run", "--lockstep", "--scenario", "from-the-start", "--set", "duration_s=1",
         "--endpoint", free_endpoint(), cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path),
     )  # fmt: skip
-    assert "blocks   1000, none lost" in said
+    assert "data     whole: 1000 blocks" in said
 
 
 @pytest.mark.nightly

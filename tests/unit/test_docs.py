@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from docs import generate, zenoh_files
+from docs import generate, readme, zenoh_files
 
 ROOT = Path(__file__).parent.parent.parent
 _OUTSIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "bridge/wire/PROTOCOL.md")
@@ -76,8 +76,31 @@ def test_the_configurations_of_zenoh_are_those_of_the_code() -> None:
 
 def test_readme_is_a_landing_page() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 60
-    assert len(text.split()) <= 600
+    assert len(text.splitlines()) <= 66
+    assert len(text.split()) <= 700
+
+
+def test_readme_shows_what_its_commands_print() -> None:
+    text = readme.README.read_text(encoding="utf-8")
+    kept = readme.KEPT.read_text(encoding="utf-8")
+    assert re.findall(r"^\$ (.*)$", kept, re.MULTILINE) == readme.commands(text)
+    assert f"\n\n{readme.block(kept)}\n\n" in text, "make readme"
+    (number,) = re.findall(r"^candidates .* (damping .*)$", kept, re.MULTILINE)
+    assert number in (ROOT / "docs/start/first-diagnosis.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("package", ["bridge", "controller", "plant", "diagnosis", "cockpit", "deploy"])
+def test_readme_names_the_folders_that_there_are(package: str) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^    {package}/ (.*(?:\n     .*)*)", text, re.MULTILINE)
+    there = {path.parent.name for path in (ROOT / package).glob("*/*") if path.parent.name != "__pycache__"}
+    assert set(re.findall(r"(\w+)/", row)) == there
+
+
+def test_contributing_names_commands_that_there_are() -> None:
+    named = set(re.findall(r"`make ([a-z-]+)`", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")))
+    made = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert named <= set(made)
 
 
 def test_every_decision_has_its_four_headings() -> None:

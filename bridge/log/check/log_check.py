@@ -3,7 +3,8 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,15 +15,16 @@ from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.in_charge import ChargeWatch
 from bridge.log.log_reader import LogReader
-from bridge.log.logfile import STREAMING, Piece, block_period_ns, check_log_file, iter_pieces
+from bridge.log.logfile import STREAMING, block_period_ns, check_log_file, iter_pieces
 from bridge.log.metadata import configuration_of, is_number, number_of
 from bridge.log.storage.chain import Chain, chain_findings
 from bridge.log.storage.parts import chain_of_log
 from bridge.log.topic_watch import TopicWatch
+from bridge.log.watches.arrays import Integers
+from bridge.log.watches.event_watch import EventWatch, is_weighty
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.event_codes import EVENTS, FAILURE, MAINTENANCE, OUTSIDE
-from bridge.wire.messages import CHANNELS
+from bridge.wire.messages import CHANNELS, Records
 from bridge.wire.payloads import READABLE_VERSIONS, parsed
 from bridge.wire.topics import BY_NAME
 
@@ -30,7 +32,7 @@ LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the nex
 # Share of late messages from which a rig does not keep up. Smaller: every desktop is late now and then; larger: a slow controller
 # passes.
 LATE_SHARE = 0.01
-_MOST_EVENTS = 10  # of one source and code that are told one by one: a storm of them must not fill the memory
+_MOST_EVENTS = 10  # of one source and code that are listed one by one
 _DEAD_S = 1.0  # a longer stretch of equal values is a dead sensor, as a live one has noise
 _OF_EVERY_BLOCK = {"plant": ("applied",), "controller": ("command", "trace")}  # topics by who sends them
 # the ends of a sensor's range in the rig's configuration; an acceleration's is the same both ways
@@ -60,8 +62,8 @@ class LogCheck(NamedTuple):
         return self._asdict() | {"findings": findings, "chain": self.chain.as_dict()}
 
 
-class _Pass:
-    """State of one pass over a log."""
+class LogWatch:
+    """Looks at one log, piece by piece, in file order; the memory does not grow with the log."""
 
     def __init__(self) -> None:
         self.topics = {name: TopicWatch(name) for name in STREAMING}
@@ -70,33 +72,57 @@ class _Pass:
         self.period_ns = 0.0
         self.samples_per_block = 1
         self.charge = ChargeWatch()
-        self.events: list[wire.Event] = []  # at most 10 of a source and a code
-        self.event_counts: Counter[tuple[str, str]] = Counter()
+        self.events = EventWatch()
         self.unknown: dict[str, int] = {}
 
-    def add(self, piece: Piece) -> None:
-        if piece.topic in STREAMING:
-            records = piece.records
-            if piece.topic == "sensors":
-                self.period_ns = self.period_ns or block_period_ns(records)
-                self.samples_per_block = records["drive_force_N"].shape[1]
-                for name, signal in self.signals.items():
-                    signal.add(records[name].ravel())
-            counted = piece.topic in {"sensors", "applied"}
-            self.topics[piece.topic].add(records, piece.log_time_ns, self.period_ns if counted else 0.0)
-            if piece.topic in {"applied", "command", "trace"}:
-                getattr(self.charge, piece.topic)(records)
-            if piece.topic in self.late:
-                field = "late_ns" if piece.topic == "applied" else "lateness_ns"
-                self.late[piece.topic] += int((records[field] > LATE_NS).sum())
-        elif piece.topic.startswith("event/"):
-            for payload in piece.payloads:
-                event = parsed(wire.Event, payload, "/" + piece.topic)
-                self.event_counts[event.source, event.code] += 1
-                if self.event_counts[event.source, event.code] <= _MOST_EVENTS:
-                    self.events.append(event)
-        elif piece.topic not in BY_NAME:
-            self.unknown[piece.topic] = self.unknown.get(piece.topic, 0) + len(piece.payloads)
+    def add(self, topic: str, records: Records, log_time_ns: Integers) -> None:
+        """Take messages of a streaming topic, [messages]."""
+        if not len(records):
+            return
+        if topic == "sensors":
+            self.period_ns = self.period_ns or block_period_ns(records)
+            self.samples_per_block = records["drive_force_N"].shape[1]
+            for name, signal in self.signals.items():
+                signal.add(records[name].ravel())
+        counted = topic in {"sensors", "applied"}
+        self.topics[topic].add(records, log_time_ns, self.period_ns if counted else 0.0)
+        if topic in {"applied", "command", "trace"}:
+            getattr(self.charge, topic)(records)
+        if topic in self.late:
+            field = "late_ns" if topic == "applied" else "lateness_ns"
+            self.late[topic] += int((records[field] > LATE_NS).sum())
+
+    def add_others(self, topic: str, payloads: Sequence[bytes]) -> None:
+        """Take messages of another topic."""
+        if topic.startswith("event/"):
+            self.events.add(parsed(wire.Event, payload, "/" + topic) for payload in payloads)
+        elif topic not in BY_NAME:
+            self.unknown[topic] = self.unknown.get(topic, 0) + len(payloads)
+
+    def result(self, reader: LogReader, chain: Chain) -> LogCheck:
+        """All findings, once the reader is at the end of the log."""
+        path = reader.path
+        findings = chain_findings(chain, path.name)
+        findings += _of_file(path, reader, self)
+        findings += schema_findings(reader)
+        findings += self.charge.result().findings()
+        for watch in self.topics.values():
+            findings += watch.findings()
+        findings += _of_configurations(reader)
+        absent = reader.metadata.get("import", {}).get("missing", "")
+        for name, signal in self.signals.items():
+            if self.topics["sensors"].messages and name not in absent:
+                findings += _of_signal(
+                    "/sensors " + name, signal.result(), _sample_s(self), _ends(reader, *_RANGES[name])
+                )
+        shares = {f"/{name}": late / max(self.topics[name].messages, 1) for name, late in self.late.items()}
+        for where, share in shares.items():
+            if share > LATE_SHARE:
+                text = f"{100 * share:.1f} % of the messages were later than 1 ms: must be below {100 * LATE_SHARE:g} %"
+                findings.append(Finding("late", where, text, self.late[where[1:]]))
+        messages = {name: watch.messages for name, watch in self.topics.items()}
+        seconds = messages["sensors"] * self.period_ns / 1e9
+        return LogCheck(str(path), findings, messages, seconds, shares, chain, reader.foreign)
 
 
 def check_log(path: Path, progress: Callable[[float], None] | None = None) -> LogCheck:
@@ -106,34 +132,20 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
     """
     check_log_file(path)
     reader = LogReader(path)
-    seen = _Pass()
-    for piece in iter_pieces(reader):
-        seen.add(piece)
-        if progress is not None:
-            progress(reader.position_bytes / max(reader.size_bytes, 1))
-    chain = chain_of_log(path)
-    findings = chain_findings(chain, path.name)
-    findings += _of_file(path, reader, seen)
-    findings += schema_findings(reader)
-    findings += seen.charge.result().findings()
-    for watch in seen.topics.values():
-        findings += watch.findings()
-    findings += _of_configurations(reader)
-    absent = reader.metadata.get("import", {}).get("missing", "")
-    for name, signal in seen.signals.items():
-        if seen.topics["sensors"].messages and name not in absent:
-            findings += _of_signal("/sensors " + name, signal.result(), _sample_s(seen), _ends(reader, *_RANGES[name]))
-    shares = {f"/{name}": late / max(seen.topics[name].messages, 1) for name, late in seen.late.items()}
-    for where, share in shares.items():
-        if share > LATE_SHARE:
-            text = f"{100 * share:.1f} % of the messages were later than 1 ms: must be below {100 * LATE_SHARE:g} %"
-            findings.append(Finding("late", where, text, seen.late[where[1:]]))
-    messages = {name: watch.messages for name, watch in seen.topics.items()}
-    seconds = messages["sensors"] * seen.period_ns / 1e9
-    return LogCheck(str(path), findings, messages, seconds, shares, chain, reader.foreign)
+    seen = LogWatch()
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        chain = beside.submit(chain_of_log, path)
+        for piece in iter_pieces(reader):
+            if piece.topic in STREAMING:
+                seen.add(piece.topic, piece.records, piece.log_time_ns)
+            else:
+                seen.add_others(piece.topic, piece.payloads)
+            if progress is not None:
+                progress(reader.position_bytes / max(reader.size_bytes, 1))
+        return seen.result(reader, chain.result())
 
 
-def _sample_s(seen: _Pass) -> float:
+def _sample_s(seen: LogWatch) -> float:
     return seen.period_ns / 1e9 / max(seen.samples_per_block, 1)
 
 
@@ -167,7 +179,7 @@ def _of_configurations(reader: LogReader) -> list[Finding]:
     return found
 
 
-def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
+def _of_file(path: Path, reader: LogReader, seen: LogWatch) -> list[Finding]:
     found = damage_findings(reader.damage, path)
     for role, table in reader.metadata.items():
         version = table.get("schema_version")
@@ -187,29 +199,29 @@ def _of_file(path: Path, reader: LogReader, seen: _Pass) -> list[Finding]:
         found.append(Finding("empty", path.name, "holds no sensor block"))
     else:
         found += _of_absent_topics(reader, seen)
-    for event in seen.events:
+    listed: Counter[tuple[str, str]] = Counter()
+    for event in seen.events.kept:
+        listed[event.source, event.code] += 1
+        if listed[event.source, event.code] > _MOST_EVENTS:
+            continue
         dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
         # a gap is a finding of its topic already
-        if (
-            event.code in EVENTS
-            and event.code != "GAP"
-            and EVENTS[event.code].letter in {FAILURE, OUTSIDE, MAINTENANCE}
-        ):
+        if event.code != "GAP" and is_weighty(event.code):
             found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", event.text))
         elif dropped and int(dropped[1]):
             text = f"the {event.source} dropped {counted(int(dropped[1]), 'message')} because it was too slow"
             found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
-    for (source, code), times in seen.event_counts.items():
-        if times > _MOST_EVENTS and code in EVENTS and EVENTS[code].letter in {FAILURE, OUTSIDE, MAINTENANCE}:
+    for (source, code), times in seen.events.counts.items():
+        if times > _MOST_EVENTS and is_weighty(code):
             text = f"{counted(times - _MOST_EVENTS, 'more event', 'more events')} of this kind"
             found.append(Finding(code.lower().replace("_", "-"), f"/event/{source}", text, times - _MOST_EVENTS))
-    plant_codes = [event.code for event in seen.events if event.source == "plant"]
-    if reader.damage.closed and "START" in plant_codes and "END" not in plant_codes:
+    events = seen.events
+    if reader.damage.closed and events.has("plant", "START") and not events.has("plant", "END"):
         found.append(Finding("no-end", "/event/plant", "the plant began its run and never ended it"))
     return found
 
 
-def _of_absent_topics(reader: LogReader, seen: _Pass) -> list[Finding]:
+def _of_absent_topics(reader: LogReader, seen: LogWatch) -> list[Finding]:
     """A finding for each topic without a message that a process of the run sends for every block; an imported log has none."""
     if "import" in reader.metadata:
         return []

@@ -1,12 +1,14 @@
-"""Range, clipping and dead stretches of a signal, found sample by sample with a memory of a few numbers."""
+"""Range, clipping and dead stretches of a signal, found piece by piece with a memory of a few numbers."""
 
 import math
+from copy import copy
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.kernel import kernel
+Floats = npt.NDArray[np.floating[Any]]
 
 # A clipped signal meets its limit at full slope; a real peak slows down. A parabola that leaves a run of L equal samples with the
 # slope s would rise by s L / 4 above them. A signal is clipped when this rise is more than the following share of its range.
@@ -15,14 +17,6 @@ _OVERSHOOT_SHARE = 1e-3
 _LONGEST_DWELL = 40.0  # samples that a run of a position counts at most, as a position may rest at an end of its range
 _SHORTEST_RUN = 3.0  # equal samples at the limit; noise alone hardly ever makes three
 _STEPS_OF_RESOLUTION = 2.5  # smallest step into a clipped run, in resolutions; a real peak ends in steps of 1 or 2
-
-# state: 0 samples, 1 last value, 2 run of equal values, 3 longest such run, 4 its end, 5 smallest step, 6 not finite,
-# 7 first sample not finite; then for the top and, mirrored, for the bottom: 8 extreme, 9 run, 10 step into the run,
-# 11 samples in runs, 12 largest overshoot, 13 run that the signal begins with, 14 step out of it; 22 longest run that counts
-_SIDE = 8
-_PER_SIDE = 7
-_LONGEST = _SIDE + 2 * _PER_SIDE
-_STATE_SIZE = _LONGEST + 1
 
 
 class SignalLook(NamedTuple):
@@ -37,6 +31,9 @@ class SignalLook(NamedTuple):
     clipped_low: int
     longest_run: int  # of equal samples
     longest_run_end: int  # index of its last sample
+    longest_run_value: float
+    at_highest: int  # samples that equal the largest one; many, of a live signal with noise, are clipped
+    at_lowest: int
 
     @property
     def constant(self) -> bool:
@@ -44,68 +41,70 @@ class SignalLook(NamedTuple):
         return self.samples - self.not_finite > 1 and self.lowest == self.highest
 
 
-@kernel
-def _count(state: npt.NDArray[np.float64], side: int, run: float, step: float, length: float) -> None:
-    if run >= _SHORTEST_RUN and step >= _STEPS_OF_RESOLUTION * state[5]:
-        if math.isfinite(step):
-            state[side + 4] = max(state[side + 4], step * length / 4.0)
-        state[side + 3] += run
+class _Side:
+    """The runs of equal samples at one extreme of a signal; a lower one is seen mirrored."""
 
+    def __init__(self, longest: float) -> None:
+        self.extreme = -math.inf
+        self.at_extreme = 0  # samples
+        self._longest = longest
+        self.runs = self.overshoot = 0.0  # samples in runs that count; the largest overshoot
+        self.begin: tuple[float, float] | None = (
+            None  # length of the run that the signal begins with, and the step out of it
+        )
+        self._open: tuple[float, float] | None = None  # length of the run that goes on, and the step into it
 
-@kernel
-def _end_run(state: npt.NDArray[np.float64], side: int, step_out: float) -> None:
-    run, step_in = state[side + 1], state[side + 2]
-    # a run at the very beginning or end of the signal has one flank only, and is counted by its step alone
-    if math.isinf(step_in) and math.isfinite(step_out):
-        # at the beginning the resolution is not known yet: the run is judged when the signal has ended
-        state[side + 5] = run
-        state[side + 6] = step_out
-    else:
+    def add(self, values: Floats, before: float | None, resolution: float) -> None:
+        """The next finite samples, at least one; `before` is the sample before them, `resolution` their smallest step so far."""
+        highest = float(values.max())
+        if highest > self.extreme:
+            self.extreme = highest
+            self.at_extreme = 0
+            self.runs = self.overshoot = 0.0
+            self.begin = self._open = None
+        elif highest < self.extreme:
+            self.end_run(self.extreme - float(values[0]), resolution)
+            return
+        at = values == self.extreme
+        self.at_extreme += int(np.count_nonzero(at))
+        edges = np.flatnonzero(at[1:] != at[:-1]) + 1
+        limits = np.concatenate([[0], edges, [len(values)]])
+        for first, end in pairwise(limits.tolist()):
+            if not at[first]:
+                self.end_run(self.extreme - float(values[first]), resolution)
+            elif first == 0 and self._open is not None:
+                self._open = self._open[0] + end, self._open[1]
+            else:
+                last = before if first == 0 else float(values[first - 1])
+                self._open = float(end - first), math.inf if last is None else self.extreme - last
+
+    def end_run(self, step_out: float, resolution: float) -> None:
+        """The run that goes on, if any, ends with this step."""
+        if self._open is None:
+            return
+        (length, step_in), self._open = self._open, None
+        # a run at the very beginning or end of the signal has one flank only, and is counted by its step alone
+        if math.isinf(step_in) and math.isfinite(step_out):
+            # at the beginning the resolution is not known yet: the run is judged when the signal has ended
+            self.begin = length, step_out
+            return
         one_flank = math.isinf(step_in) or math.isinf(step_out)
-        _count(state, side, run, min(step_in, step_out), 4.0 if one_flank else min(run, state[_LONGEST]))
-    state[side + 1] = 0.0
+        self.count(length, min(step_in, step_out), 4.0 if one_flank else min(length, self._longest), resolution)
 
+    def count(self, length: float, step: float, flank: float, resolution: float) -> None:
+        """Count a run if it is long and its step is large enough."""
+        if length >= _SHORTEST_RUN and step >= _STEPS_OF_RESOLUTION * resolution:
+            if math.isfinite(step):
+                self.overshoot = max(self.overshoot, step * flank / 4.0)
+            self.runs += length
 
-@kernel
-def _look(values: npt.NDArray[Any], state: npt.NDArray[np.float64]) -> None:
-    for i in range(values.shape[0]):
-        value = float(values[i])
-        at = state[0]
-        state[0] += 1.0
-        if not math.isfinite(value):
-            if state[6] == 0.0:
-                state[7] = at
-            state[6] += 1.0
-            continue
-        first = at == state[6]
-        last = state[1]
-        if not first and value == last:
-            state[2] += 1.0
-        else:
-            state[2] = 1.0
-            if not first:
-                state[5] = min(state[5], abs(value - last))
-        if state[2] > state[3]:
-            state[3] = state[2]
-            state[4] = at
-        for mirrored in range(2):
-            side = _SIDE + _PER_SIDE * mirrored
-            sign = 1.0 - 2.0 * mirrored
-            v = sign * value
-            if first or v > state[side]:
-                state[side] = v
-                state[side + 1] = 1.0
-                state[side + 2] = math.inf if first else v - sign * last
-                state[side + 3] = 0.0
-                state[side + 4] = 0.0
-                state[side + 5] = 0.0
-            elif v == state[side]:
-                if state[side + 1] == 0.0:
-                    state[side + 2] = v - sign * last
-                state[side + 1] += 1.0
-            elif state[side + 1] > 0.0:
-                _end_run(state, side, state[side] - v)
-        state[1] = value
+    def clipped(self, resolution: float, begins: bool, limit: float) -> int:
+        """Samples in runs at the end of the signal's range; `begins`: the run that it begins with counts."""
+        side = copy(self)
+        side.end_run(math.inf, resolution)
+        if begins and side.begin is not None:
+            side.count(*side.begin, 4.0, resolution)
+        return int(side.runs) if side.overshoot > limit else 0
 
 
 class Signal:
@@ -113,33 +112,77 @@ class Signal:
 
     def __init__(self, dwells: bool) -> None:
         self._dwells = dwells
-        self._state = np.zeros(_STATE_SIZE)
-        self._state[5] = np.inf
-        self._state[7] = -1.0
-        self._state[_LONGEST] = _LONGEST_DWELL if dwells else np.inf
+        longest = _LONGEST_DWELL if dwells else math.inf
+        self._sides = _Side(longest), _Side(longest)  # the top, and mirrored the bottom
+        self._samples = self._not_finite = 0
+        self._first_not_finite = -1
+        self._last: float | None = None
+        self._resolution = math.inf
+        self._run = self._longest_run = self._longest_run_end = 0
+        self._longest_run_value = math.nan
 
     def add(self, values: npt.NDArray[Any]) -> None:
         """Check the next samples, [samples]."""
-        _look(values, self._state)
+        at = self._samples
+        self._samples += len(values)
+        finite = np.isfinite(values)
+        places: npt.NDArray[np.int64] | None = None
+        if not finite.all():
+            self._not_finite += int(np.count_nonzero(~finite))
+            if self._first_not_finite < 0:
+                self._first_not_finite = at + int(np.argmin(finite))
+            places = np.flatnonzero(finite)
+            values = values[places]
+        if not len(values):
+            return
+        self._runs_of_equals(values, at, places)
+        self._sides[0].add(values, self._last, self._resolution)
+        self._sides[1].add(-values, None if self._last is None else -self._last, self._resolution)
+        self._last = float(values[-1])
+
+    def _runs_of_equals(self, values: Floats, at: int, places: npt.NDArray[np.int64] | None) -> None:
+        """The longest run of equal samples and the smallest step; `places` of the samples where some of a piece are left out."""
+        steps = np.abs(np.diff(values, prepend=values[:1] if self._last is None else values.dtype.type(self._last)))
+        changes = np.flatnonzero(steps)
+        if len(changes):
+            self._resolution = min(self._resolution, float(steps[changes].min()))
+        begins = changes if self._last is not None else np.concatenate([[0], changes])
+        lengths = np.diff(begins, append=len(values))
+        before = int(begins[0]) if len(begins) else len(values)  # samples that go on with the run of the piece before
+        runs = np.concatenate([[self._run + before], lengths]) if self._last is not None else lengths
+        ends = np.concatenate([[before], begins[1:], [len(values)]])[-len(runs) :] - 1
+        longest = int(np.argmax(runs))
+        if runs[longest] > self._longest_run:
+            self._longest_run = int(runs[longest])
+            end = int(ends[longest])
+            self._longest_run_value = float(values[end]) if end >= 0 or self._last is None else self._last
+            self._longest_run_end = at + (end if places is None else int(places[end]))
+        self._run = int(runs[-1])
 
     def result(self) -> SignalLook:
         """Range and faults of all samples so far."""
-        state = self._state.copy()
-        sides = (_SIDE, _SIDE + _PER_SIDE)
-        for side in sides:
-            _end_run(state, side, math.inf)
-            if not self._dwells:  # a position rests before it moves, so its first run is not clipping
-                _count(state, side, float(state[side + 5]), float(state[side + 6]), 4.0)
-        high, low = float(state[_SIDE]), -float(state[_SIDE + _PER_SIDE])
+        high, low = self._sides[0].extreme, -self._sides[1].extreme
         limit = max(_OVERSHOOT_SHARE * (high - low), 0.0)
-        clipped = [int(state[side + 3]) if high > low and state[side + 4] > limit else 0 for side in sides]
+        # a position rests before it moves, so its first run is not clipping
+        clipped = [side.clipped(self._resolution, not self._dwells, limit) if high > low else 0 for side in self._sides]
         # a unipolar sensor at rest clips its noise at 0: the end of its scale, but no signal is lost
         if low == 0.0:
             clipped[1] = 0
         if high == 0.0:
             clipped[0] = 0
         return SignalLook(
-            int(state[0]), low, high, int(state[6]), int(state[7]), clipped[0], clipped[1], int(state[3]), int(state[4])
+            self._samples,
+            low,
+            high,
+            self._not_finite,
+            self._first_not_finite,
+            clipped[0],
+            clipped[1],
+            self._longest_run,
+            self._longest_run_end,
+            self._longest_run_value,
+            self._sides[0].at_extreme,
+            self._sides[1].at_extreme,
         )
 
 

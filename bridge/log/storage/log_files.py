@@ -66,7 +66,9 @@ class LogFiles:
         self.whole_t_ns: int | None = None  # of the latest message in a chunk that is whole in a file
         self._owner, self._rotation, self._patient = owner, rotation, patient
         self._number = 0
-        self._begins = ""  # first link of the first file
+        self.begins = ""  # first link of the first file
+        self.links = 0  # of the hash chains of all files that were closed
+        self.last_link = ""  # of these
         self._follows = ""  # last link of the file before
         self._began_ns = 0
         self._wait_s = _LOOK_S
@@ -100,7 +102,7 @@ class LogFiles:
         except OSError as error:
             self._give_up(part, error)
             return
-        self._begins = self._begins or part.writer.first_link
+        self.begins = self.begins or part.writer.first_link
         if self._owner.t_ns and not part.writer.open_bytes:
             self.whole_t_ns = self._owner.t_ns
 
@@ -151,6 +153,8 @@ class LogFiles:
     def _end(self, part: PartFile) -> None:
         try:
             part.close()
+            self.links += part.writer.links
+            self.last_link = part.writer.last_link
             if self._owner.t_ns:
                 self.whole_t_ns = self._owner.t_ns
         except OSError as error:
@@ -212,7 +216,7 @@ class LogFiles:
         if before is not None:
             self._follows = before.writer.last_link
         number = self._number + 1
-        self._begins = self._begins or uuid.uuid4().hex  # the first file was lost before its first chunk
+        self.begins = self.begins or uuid.uuid4().hex  # the first file was lost before its first chunk
         part: PartFile | None = None
         try:
             while part is None:
@@ -221,7 +225,7 @@ class LogFiles:
                 except FileExistsError:  # of another log
                     number += 1
             writer = part.writer
-            part.guarded(lambda: self._owner.begin(writer, number, self._begins, self._follows))
+            part.guarded(lambda: self._owner.begin(writer, number, self.begins, self._follows))
         except (OSError, Fault) as error:
             if part is not None:
                 part.abandon()

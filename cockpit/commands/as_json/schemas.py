@@ -213,36 +213,42 @@ def _fault() -> dict[str, Any]:
     return schema_of(objects("Fault", {"fault": str, "line": str, "exit_status": int}))
 
 
+def _verdict(**more: Any) -> Any:
+    """The type of a verdict, with more fields."""
+    from cockpit.commands.as_json.types import table
+    from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, OK, RunVerdict
+
+    words = dict.fromkeys(("headline", "reason", "data"), str)
+    lists = dict.fromkeys(("trips", "injected", "warnings"), list[str])
+    return table(RunVerdict, {"good": bool, "control": Literal[OK, NOT_OK, NOT_JUDGED]} | words | lists | more)
+
+
 def _run() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of, table
+    from cockpit.commands.as_json.types import schema_of
     from cockpit.judge.margins import Margins
     from cockpit.judge.phases import Phase
-    from cockpit.judge.verdict import RunVerdict
 
-    more = {"good": bool, "rig": str, "effects": NotRequired[list[str]], "loop": NotRequired[Margins]}
-    more |= {"without": NotRequired[Phase]}
-    return schema_of(table(RunVerdict, more))
+    more = {"effects": NotRequired[list[str]], "loop": NotRequired[Margins], "without": NotRequired[Phase]}
+    return schema_of(_verdict(rig=str, **more))
 
 
 def _log_info() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of, table
-    from cockpit.judge.verdict import RunVerdict
+    from bridge.log.finding import Finding
+    from cockpit.commands.as_json.types import schema_of
 
-    return schema_of(table(RunVerdict, {"good": bool}))
+    return schema_of(_verdict(findings=list[Finding]))
 
 
 def _plot() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of, table
-    from cockpit.judge.verdict import RunVerdict
+    from cockpit.commands.as_json.types import schema_of
 
-    return schema_of(table(RunVerdict, {"good": bool, "picture": str, "data": str | None}))
+    return schema_of(_verdict(picture=str, data=str | None))
 
 
 def _review() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import objects, schema_of, table
-    from cockpit.judge.verdict import RunVerdict
+    from cockpit.commands.as_json.types import objects, schema_of
 
-    return schema_of(objects("Review", {"page": str, "logs": list[table(RunVerdict, {"good": bool})]}))
+    return schema_of(objects("Review", {"page": str, "logs": list[_verdict()]}))
 
 
 def _look() -> dict[str, Any]:

@@ -9,11 +9,13 @@ import numpy.typing as npt
 
 from bridge.faults import Fault
 from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.inbox import WAITING
+from bridge.wire.session import LEASE_S
 from bridge.wire.topics import OPERATOR, TOPICS, Outgoing
 from cockpit.run.scenario import Scenario
 from cockpit.run.simulated.bus import Hub, Receive, Session
 from cockpit.run.simulated.stage import Player, Stage, WaitingInbox
-from controller.app import INBOX_LIMIT, ControllerProcess
+from controller.app import ControllerProcess
 from controller.node import ControllerNode
 from plant.app import PlantProcess
 from plant.faults.kinds import PROCESS
@@ -21,7 +23,6 @@ from plant.faults.table import FaultTable
 from plant.node import PlantNode
 from plant.records import TRUTH
 
-LEASE_S = 0.1  # after which the link of a process that stands still is down, as that of the bus in real time
 _LINKED_S = 0.05  # in which a process that goes on has its link again
 _LONGEST_AFTER_S = 2.0  # for the fade and the goodbyes after the last block
 _POSITION, _VELOCITY = TRUTH.index("true_drive_position_m"), TRUTH.index("true_velocity_mps")
@@ -154,7 +155,7 @@ class SimulatedRun:
 
     def _begin_controller(self) -> None:
         scenario, stage = self._scenario, self._stage
-        inbox = WaitingInbox(INBOX_LIMIT, stage)
+        inbox = WaitingInbox(WAITING, stage)
         session = cast(Any, Session(self._hub, "controller"))
         self._hub.down.discard("controller")
         process = ControllerProcess(

@@ -10,7 +10,7 @@ from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.recover import recover
 from bridge.log.storage.chain import chain_in_words, chain_of
-from cockpit.judge.verdict import judge
+from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import in_words
 from tests.logs import short_log
 
@@ -32,7 +32,7 @@ def test_a_log_as_it_was_written(tmp_path: Path) -> None:
     assert (chain.changes, chain.ended, chain.closed) == (0, True, True)
     assert chain.links == 12  # ten chunks of blocks, one of the events, and the end
     assert chain.last in chain_in_words(chain)
-    assert chain.last in "\n".join(in_words(judge(path)))
+    assert chain.last in "\n".join(in_words(judge(path), verbose=True))
 
 
 def places() -> list[int]:

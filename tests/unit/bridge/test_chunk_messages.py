@@ -2,7 +2,6 @@
 
 import struct
 
-import numpy as np
 import pytest
 
 from bridge.log.chunk_messages import Chunked, messages_of
@@ -68,8 +67,12 @@ def test_a_message_does_not_go_on_in_the_next_chunk() -> None:
 
 
 def test_messages_of_one_channel_keep_their_order() -> None:
-    mine = messages_of([Chunked(DATA, INDEXES)] * 2).of([1])
-    assert mine.heads["sequence"].tolist() == [0, 2, 4] * 2
-    assert mine.payloads(2) == [b"a" * 20, b"c" * 20]
-    assert mine.stacked(20).tobytes() == 2 * (b"a" * 20 + b"c" * 20 + b"d" * 20)
-    assert np.array_equal(mine.payload_bytes(), [20] * 6)
+    found = messages_of([Chunked(DATA, INDEXES)] * 2)
+    assert sorted(found.by_channel) == [1, 2, 3]
+    for mine in (found.of([1]), found.by_channel[1]):
+        assert mine.heads["sequence"].tolist() == [0, 2, 4] * 2
+        assert mine.payloads(2) == [b"a" * 20, b"c" * 20]
+        assert mine.stacked is not None
+        assert mine.stacked.tobytes() == 2 * (b"a" * 20 + b"c" * 20 + b"d" * 20)
+    assert found.of([1, 2]).heads["sequence"].tolist() == [0, 1, 2, 4] * 2
+    assert found.stacked is None

@@ -10,7 +10,7 @@ from bridge.log.in_charge import NO_COMMAND, in_charge
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_told
-from cockpit.judge.verdict import judge
+from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
@@ -49,8 +49,8 @@ def test_a_controller_that_died_is_told_and_was_not_in_charge(long_run: Path, tm
     assert headline(verdict).startswith("the controller was in charge for 0.95 of 2.00 s only, then it was gone")
     assert verdict.alone is not None
     assert verdict.alone.seconds == pytest.approx(1.05)
-    words = "\n".join(in_words(verdict))
-    for said in ("with nobody in charge", "FALLBACK: ", "CONTROLLER_LOST: ", "UNANSWERED: 1099 blocks of 1999"):
+    words = "\n".join(in_words(verdict, verbose=True))
+    for said in ("without a controller", "FALLBACK: ", "CONTROLLER_LOST: ", "UNANSWERED: 1099 blocks of 1999"):
         assert said in words
     assert {"fallback", "controller-lost", "unanswered"} <= {finding.kind for finding in check_log(path).findings}
 

@@ -46,3 +46,33 @@ def test_two_processes_keep_kernels_for_two_lengths_of_a_block(tmp_path: Path) -
     assert lasts(100) == [200.0]
     assert lasts(40) == [80.0]
     assert lasts(100, 40) == [200.0, 80.0]
+
+
+SHARED = """
+from bridge.kernel import kernel, shared_kernel
+
+@shared_kernel
+def longer(x, by):
+    return x + 1.0 / by
+
+@kernel
+def twice(x):
+    return longer(longer(x, 2), 4)
+"""
+CALLED = (
+    "import shared_code as code; print(code.twice(1.0), len(code.longer.overloads), sum({one}._cache_hits.values()))"
+)
+
+
+def test_a_shared_kernel_is_compiled_once_and_loaded_before_its_callers(tmp_path: Path) -> None:
+    (tmp_path / "shared_code.py").write_text(SHARED)
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path]),
+    }
+    for hits, one in (("0", "code.twice"), ("1", "code.twice"), ("1", "code.longer")):
+        command = [sys.executable, "-c", CALLED.replace("{one}", one)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        # one compilation for both values in the source
+        assert done.stdout.split() == ["1.75", "1", hits]

@@ -11,6 +11,7 @@ import pytest
 
 from bridge import kernel_cache
 from bridge.kernel_cache import ROOT, compile_once, mark_of, sources_digest
+from tests.patience import PATIENCE_S
 
 
 def digest(root: Path) -> str:
@@ -91,11 +92,11 @@ compile_once("a test", compiles)
 
     def slowly() -> None:
         begun.set()
-        assert go_on.wait(60)
+        assert go_on.wait(PATIENCE_S)
 
     first = threading.Thread(target=compile_once, args=("a test", slowly))
     first.start()
-    assert begun.wait(60)
+    assert begun.wait(PATIENCE_S)
     with subprocess.Popen(
         [sys.executable, "-c", code % tmp_path], cwd=ROOT, env=os.environ, stderr=subprocess.PIPE, text=True
     ) as other:
@@ -103,6 +104,6 @@ compile_once("a test", compiles)
         assert "another process compiles the kernels of a test: waiting for it" in other.stderr.readline()
         assert not (tmp_path / "compiled").exists()
         go_on.set()
-        assert other.wait(60) == 0
+        assert other.wait(PATIENCE_S) == 0
     first.join()
     assert (tmp_path / "compiled").read_text() == "by the other"

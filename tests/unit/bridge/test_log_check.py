@@ -15,7 +15,7 @@ from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
 from bridge.log.recover import recover
 from cockpit.commands.log import log_app
-from cockpit.judge.verdict import judge
+from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
@@ -119,7 +119,9 @@ def test_the_lower_end_of_a_range_is_known(tmp_path: Path) -> None:
     """A sensor that ends at -8 N, on a stroke back that pushes harder, and one that measures the whole of it."""
     back = ["duration_s=0.4", "rig.drive.profile=[[0.0, -0.01]]", "rig.sensors.position_lowest_m=-0.01"]
     for lowest_N, found in ((-8.0, "clipped"), (-50.0, None)):
-        scenario = load_scenario("from-the-start", [*back, f"rig.sensors.force_lowest_N={lowest_N}"])
+        scenario = load_scenario("from-the-start", [*back, "rig.sensors.force_lowest_N=-50.0"])
+        sensors = scenario.rig.sensors.model_copy(update={"force_lowest_N": lowest_N})  # a file with -8 N is refused
+        scenario = scenario.model_copy(update={"rig": scenario.rig.model_copy(update={"sensors": sensors})})
         path = tmp_path / f"{-lowest_N:g}.mcap"
         run_onboard(scenario, path, {})
         assert kinds(path).get("clipped", "").startswith("/sensors drive_force_N" if found else "")
@@ -189,7 +191,7 @@ def test_the_verdict_on_a_cut_log_says_what_was_lost(tmp_path: Path) -> None:
     path.write_bytes(short_log()[: len(short_log()) * 2 // 3])
     result = CliRunner().invoke(log_app, ["info", str(path), "--json"])
     told = json.loads(result.stdout)
-    assert (result.exit_code, told["good"]) == (1, False)
+    assert (result.exit_code, told["good"], told["control"]) == (14, False, "not judged")
     assert "bytes of an open chunk were lost" in " ".join(told["faults"])
     assert told["all_losses_known"] is False
 
@@ -205,8 +207,8 @@ def test_the_verdict_counts_the_blocks_of_a_damaged_chunk(tmp_path: Path, chunk:
     path.write_bytes(data)
     told = judge(path)
     assert (told.lost_blocks, told.all_losses_known) == (lost, known)
-    expected = f"{lost} LOST" if known else "how many are lost is not known"
-    assert f"blocks   {400 - lost}, {expected}" in "\n".join(in_words(told))
+    expected = f"{lost} of 400 blocks missing in the log" if known else "400 blocks; how many are missing is not known"
+    assert f"data     {expected}" in "\n".join(in_words(told, verbose=False))
 
 
 def test_a_log_that_was_saved_says_what_had_been_lost(tmp_path: Path) -> None:

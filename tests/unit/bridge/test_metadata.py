@@ -7,7 +7,7 @@ import pytest
 from bridge.faults import Fault
 from bridge.log.check.log_check import check_log
 from bridge.log.logfile import read_run
-from cockpit.judge.verdict import judge
+from cockpit.judge.judged import judge
 from cockpit.run.replay import replay_log
 from tests.logs import short_log, tables_of, write
 

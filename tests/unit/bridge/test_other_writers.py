@@ -19,7 +19,7 @@ from bridge.log.library import LIBRARY
 from bridge.log.logfile import STREAMING, RunData, read_run
 from bridge.log.recover import recover
 from bridge.log.storage.chain import CHAIN, chain_in_words, chain_of
-from cockpit.judge.verdict import judge
+from cockpit.judge.judged import judge
 from cockpit.run.replay import changes_of
 from controller.replay import replay
 from tests.logs import short_log

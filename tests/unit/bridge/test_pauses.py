@@ -127,7 +127,7 @@ def test_a_watch_that_is_refused_or_ends_is_told_and_no_pause_is_claimed(tmp_pat
     log.close()
     events = read_run(log.path).events
     assert not_watched(events) == "a timer ended"
-    assert events[-1].text == "pauses of the machine not watched: a timer ended"
+    assert events[-1].text == "stalls of the computer not watched: a timer ended"
 
 
 def test_without_a_priority_nothing_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:

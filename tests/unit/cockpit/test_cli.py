@@ -15,10 +15,9 @@ from bridge.log.logfile import read_run
 from bridge.log.runlog import RunLog
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
-from cockpit.judge.verdict import judge_run
 from cockpit.run.progress import progress_line
 from cockpit.run.run import keep_aside
-from tests.logs import doctored, short_log
+from tests.logs import doctored, short_log, verdict_of
 
 PNG = b"\x89PNG"
 
@@ -200,10 +199,10 @@ def test_what_is_made_of_a_damaged_log_says_so(log: Path, tmp_path: Path) -> Non
 
 
 def test_a_log_that_needs_too_much_memory_is_one_line(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(_path: Path) -> None:
+    def full(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("cockpit.judge.verdict.judge", full)
+    monkeypatch.setattr("cockpit.judge.judged.judge_log", full)
     monkeypatch.setattr(sys, "argv", ["stickslip", "log", "info", str(log)])
     said = call("log", "info", str(log))
     assert said.exit_code == FAULTS["NO_MEMORY"].exit_status
@@ -243,7 +242,7 @@ def test_a_controller_that_does_not_tell_what_a_verdict_needs_is_a_bad_log(tmp_p
     with pytest.raises(
         Fault, match=r"BAD_LOG: .*configuration of the controller: must hold policy.enabled_from_s as a number"
     ):
-        judge_run(bare)
+        verdict_of(bare)
 
 
 def test_a_log_that_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -265,7 +264,7 @@ def test_a_force_that_is_no_number_any_more_is_no_error(tmp_path: Path, from_blo
     def spoil(tables):
         tables["sensors"]["drive_force_N"][from_block:] = np.nan
 
-    verdict = judge_run(read_run(doctored(tmp_path, spoil)))
+    verdict = verdict_of(read_run(doctored(tmp_path, spoil)))
     assert (verdict.before is None) == (from_block == 0)
     assert verdict.before is None or np.isfinite(verdict.before.swing_N)
     assert not verdict.good
@@ -276,7 +275,7 @@ def test_messages_out_of_order_are_not_lost(tmp_path: Path) -> None:
         for name in ("sensors", "applied", "command", "trace", "state"):
             tables[name][[0, 30]] = tables[name][[30, 0]]
 
-    verdict = judge_run(read_run(doctored(tmp_path, exchange)))
+    verdict = verdict_of(read_run(doctored(tmp_path, exchange)))
     assert (verdict.lost_blocks, verdict.lost_messages) == (0, 0)
 
 

@@ -19,11 +19,11 @@ from bridge.wire.messages import sensor_block
 from bridge.wire.topics import SENSORS
 from cockpit.cli import app
 from cockpit.figures.grid import Grid, on_grid
-from cockpit.judge.verdict import judge, judge_run
+from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import headline, in_words
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import load_scenario
-from tests.logs import empty_log, short_log
+from tests.logs import empty_log, short_log, verdict_of
 
 
 @pytest.fixture
@@ -163,7 +163,7 @@ def test_slips_while_the_controller_takes_over_are_in_the_headline(log: Path) ->
         untested="", before=before, taking_over=before._replace(slips=1), after=before._replace(slips=0)
     )
     assert headline(made) == "stick-slip is gone: 5 slips before, 1 while the controller took over, none after"
-    assert "settling 1 slip in the 0.4 s that the controller has to take over" in "\n".join(in_words(made))
+    assert "settling 1 slip in the first 0.4 s after hand-over" in "\n".join(in_words(made, verbose=True))
     assert "none with the controller in charge" in headline(made._replace(taking_over=None))
 
 
@@ -171,5 +171,5 @@ def test_every_slip_of_a_run_is_in_one_part_of_the_verdict(tmp_path: Path) -> No
     """The sawtooth as the force of a run whose controller is enabled at 1.5 s: slips at 0.98, 1.98, 2.98 and 3.98 s."""
     run = read_run(sawtooth_log(tmp_path / "measured.mcap"))
     settings = {"block_s": 0.02, "policy": {"enabled_from_s": 1.5}}
-    verdict = judge_run(run._replace(headers={"controller": {"configuration": json.dumps(settings)}}))
+    verdict = verdict_of(run._replace(headers={"controller": {"configuration": json.dumps(settings)}}))
     assert [part and part.slips for part in (verdict.before, verdict.taking_over, verdict.after)] == [1, 1, 2]

@@ -1,5 +1,6 @@
 """A first start: who still compiles is told, and a run waits for it; the wait can be set."""
 
+import re
 import sys
 import time
 from pathlib import Path
@@ -7,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from bridge.compiling import PROGRESS
 from bridge.faults import Fault
-from bridge.plain import COMPILED, COMPILING, LOADED
+from bridge.plain import LOADED
 from cockpit.run import processes
 from tests.patience import PATIENCE_S
 
@@ -16,25 +18,30 @@ from tests.patience import PATIENCE_S
 class Child:
     """As a process that was started: its role, and what it still does."""
 
-    def __init__(self, role: str, still: str = processes.READY) -> None:
-        self.role, self.still = role, still
+    def __init__(self, role: str, still: str = processes.READY, left: tuple[int, int] = (0, 0)) -> None:
+        self.role, self.still, self.left = role, still, left
 
 
 def beginning(log: Path, wait_s: float | None, *children: Any) -> processes.Beginning:
     return processes.Beginning(list(children), log, wait_s)
 
 
-def test_who_still_compiles_is_told_now_and_then(tmp_path, monkeypatch, capsys):
+def test_who_still_starts_is_told_now_and_then(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes, "_TOLD_S", 0.0)
-    start = beginning(
-        tmp_path / "run.mcap", None, Child("plant", processes.COMPILES), Child("controller", processes.STARTS)
-    )
+    start = beginning(tmp_path / "run.mcap", None, Child("plant"), Child("controller", processes.STARTS))
     time.sleep(0.01)
     start.look()
-    assert (
-        "waiting  the plant still compiles, the controller still starts, since 0 s; Ctrl-C ends it"
-        in capsys.readouterr().err
-    )
+    assert re.search(r"waiting  the controller still starts, since \d+ s; Ctrl-C ends it", capsys.readouterr().err)
+
+
+def test_the_kernels_that_are_left_are_those_of_all_processes(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(processes, "_TOLD_S", 0.0)
+    plant, controller = (Child(role, processes.COMPILES, (30, 40)) for role in ("plant", "controller"))
+    start = beginning(tmp_path / "run.mcap", None, plant, controller)
+    for plant.left, controller.left in (((30, 40), (30, 40)), ((0, 40), (20, 40)), ((0, 40), (0, 40))):
+        start.look()
+    said = capsys.readouterr().err.splitlines()
+    assert said == [f"stickslip: {PROGRESS}{left} of 80 left" for left in (60, 20, 0)]
 
 
 def test_nothing_is_told_once_the_log_has_begun(tmp_path, monkeypatch, capsys):
@@ -64,8 +71,8 @@ def test_after_the_longest_wait_the_fault_says_who_is_not_ready(tmp_path, still,
 
 
 def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys):
-    said = f"print('stickslip: {COMPILING}the plant, once', file=sys.stderr, flush=True)"
-    over = f"print('stickslip: {COMPILED}the plant', file=sys.stderr, flush=True)"
+    said = f"print('stickslip: {PROGRESS}3 of 4 left', file=sys.stderr, flush=True)"
+    over = f"print('stickslip: {PROGRESS}0 of 4 left', file=sys.stderr, flush=True)"
     more = f"print('other', file=sys.stderr); print('stickslip: {LOADED}', file=sys.stderr)"
     code = f"import sys; sys.stdin.readline(); {said}; sys.stdin.readline(); {over}; {more}"
     started = processes.subprocess.Popen
@@ -82,11 +89,11 @@ def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys)
     while child.still != processes.COMPILES and time.monotonic() < until_s:
         time.sleep(0.01)
     assert child.still == processes.COMPILES
+    assert child.left == (3, 4)
     child.process.stdin.write("\n")
     child.process.stdin.close()
     assert child.process.wait(PATIENCE_S) == 0
     child._reader.join(PATIENCE_S)
     assert child.still == processes.READY
-    told = capsys.readouterr().err
-    assert f"{COMPILING}the plant" in told
-    assert COMPILED not in told
+    assert child.left == (0, 4)
+    assert capsys.readouterr().err == ""  # the parent shows what is left of all its children

@@ -12,12 +12,19 @@ from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
 from cockpit.commands.as_json.schemas import FORMATS
-from cockpit.judge.machine_terms import Motion, motion_of, reversals_of
-from cockpit.judge.verdict import judge_run
+from cockpit.judge.judged import judge_log
+from cockpit.judge.machine_terms import Following, FollowingSum, Motion, reversals_of
 from cockpit.judge.verdict_words import following_in_words, in_words
-from tests.logs import doctored
+from tests.logs import doctored, verdict_of
 
 T_S = (np.arange(4000) + 1) * 1e-3
+
+
+def following(motion: Motion, from_s: float) -> tuple[Following | None, float]:
+    """Of the blocks from a time on; and the dose."""
+    found = FollowingSum()
+    found.add(motion, lambda t_s: t_s > from_s)
+    return found.result(1e-3), found.dose_mm2_per_s
 
 
 def made_turn(noise_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -64,29 +71,44 @@ def test_following_error_of_a_stretch() -> None:
     direction = np.where(T_S <= 2.0, 1, -1)
     swing_m = np.where(np.arange(4000) % 2 == 0, 1e-5, -1e-5)
     error_m = np.where(T_S <= 2.0, 5e-5, -4e-5 + swing_m)
-    motion = Motion(
-        T_S, error_m, direction, np.full(4000, 4e-9), reversals_of(T_S, -error_m, 0.0 * T_S, direction), 1e-3
-    )
-    back = motion.following(lambda t_s: t_s > 2.0)
+    motion = Motion(T_S, error_m, direction, np.full(4000, 4e-9), reversals_of(T_S, -error_m, 0.0 * T_S, direction))
+    back, _ = following(motion, 2.0)
     assert back is not None
     assert back.moving_s == pytest.approx(2.0)
     assert back.error_peak_m == pytest.approx(5e-5)
     assert back.error_rms_m == pytest.approx(np.sqrt((3e-5**2 + 5e-5**2) / 2))
     assert back.error_ripple_m == pytest.approx(1e-5)
-    whole = motion.following(lambda t_s: t_s > 0.0)
+    whole, _ = following(motion, 0.0)
     assert whole is not None
     assert whole.error_ripple_m == pytest.approx(1e-5 / np.sqrt(2.0))  # about the mean of each direction
-    assert motion.dose_mm2_per_s(lambda t_s: t_s > 3.0) == pytest.approx(1000 * 4e-9 * 1e6)
-    assert motion._replace(error_m=None).following(lambda t_s: t_s > 0.0) is None
+    assert following(motion, 3.0)[1] == pytest.approx(1000 * 4e-9 * 1e6)
+    assert following(motion._replace(error_m=None), 0.0)[0] is None
+
+
+def test_pieces_of_a_stretch_are_the_stretch() -> None:
+    """A ripple of 1 nm on an error of 10 mm, whose squares alone would lose it."""
+    direction = np.where(np.arange(4000) % 1000 < 700, 1, -1)
+    error_m = 0.01 * direction + 1e-9 * np.sin(np.arange(4000.0))
+    whole = Motion(T_S, error_m, direction, 0.0 * T_S, [])
+    pieces = FollowingSum()
+    for part in np.split(np.arange(4000), [3, 900, 901, 3100]):
+        pieces.add(
+            Motion(T_S[part], error_m[part], direction[part], 0.0 * T_S[part], []), lambda t_s: np.ones(len(t_s), bool)
+        )
+    found, expected = pieces.result(1e-3), following(whole, 0.0)[0]
+    assert found is not None
+    assert expected is not None
+    assert tuple(found) == pytest.approx(tuple(expected), rel=1e-9)
+    assert found.error_ripple_m == pytest.approx(1e-9 / np.sqrt(2.0), rel=0.01)
 
 
 def test_the_lines_of_a_stretch_beside_another() -> None:
     slide_m, drive_m = made_turn()
     direction = np.where(T_S < 2.0, 1, -1)
-    motion = Motion(T_S, drive_m - slide_m, direction, 0.0 * T_S, reversals_of(T_S, slide_m, drive_m, direction), 1e-3)
-    following = motion.following(lambda t_s: t_s > 0.0)
-    assert following is not None
-    error, reversal = following_in_words(following, following, "before")
+    motion = Motion(T_S, drive_m - slide_m, direction, 0.0 * T_S, reversals_of(T_S, slide_m, drive_m, direction))
+    found, _ = following(motion, 0.0)
+    assert found is not None
+    error, reversal = following_in_words(found, found, "before")
     assert error.startswith("error    following error ")
     assert reversal.startswith(
         "reversal quadrant error 239 um, the slide stands for 300 ms, the worst of 1 (before: 239 um"
@@ -99,9 +121,11 @@ def test_the_dose_of_a_run_is_that_of_the_blocks_in_which_the_exciter_moved(tmp_
         tables["applied"]["amplitude_m"] = 0.0
         tables["applied"]["amplitude_m"][200:300] = 4e-8
 
-    motion = motion_of(read_run(doctored(tmp_path, shake)), 1e-3)
-    assert motion.dose_mm2_per_s(lambda t_s: t_s > 0.0) == pytest.approx(0.036)
-    assert motion.dose_mm2_per_s(lambda t_s: t_s <= 0.25) == pytest.approx(0.018)
+    path = doctored(tmp_path, shake)
+    for from_s, dose_mm2_per_s in ((0.0, 0.036), (0.25, 0.018)):
+        stretch = judge_log(path, stretch_from_s=from_s).judge.stretch
+        assert stretch is not None
+        assert stretch.vibration_dose_mm2_per_s == pytest.approx(dose_mm2_per_s)
 
 
 def test_a_transducer_that_stands_gives_no_following_error(tmp_path: Path) -> None:
@@ -109,8 +133,7 @@ def test_a_transducer_that_stands_gives_no_following_error(tmp_path: Path) -> No
         tables["sensors"]["mass_position_m"] = 0.0
 
     run = read_run(doctored(tmp_path, stand))
-    assert motion_of(run, 1e-3).error_m is None
-    before = judge_run(run).before
+    before = verdict_of(run).before
     assert before is not None
     assert before.following is None
 
@@ -123,13 +146,13 @@ def test_the_verdict_has_the_terms_of_the_stretch_after(tmp_path: Path) -> None:
 
     run = read_run(doctored(tmp_path, from_the_start))
     configuration = '{"block_s": 0.001, "policy": {"enabled_from_s": 0.0}}'
-    verdict = judge_run(run._replace(headers=run.headers | {"controller": {"configuration": configuration}}))
+    verdict = verdict_of(run._replace(headers=run.headers | {"controller": {"configuration": configuration}}))
     assert verdict.after is not None
     following = verdict.after.following
     assert following is not None
     way_m = float(run.sensors["drive_position_m"][-1].mean() - run.sensors["mass_position_m"][-1].mean())
     assert following.error_peak_m == pytest.approx(way_m, rel=0.05)
-    assert any(line.startswith("error    following error") for line in in_words(verdict))
+    assert any(line.startswith("error    following error") for line in in_words(verdict, verbose=True))
     assert verdict.as_dict()["after"]["following"]["error_peak_m"] == following.error_peak_m
 
 

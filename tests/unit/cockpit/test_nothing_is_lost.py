@@ -104,7 +104,7 @@ def test_a_log_is_not_replaced_by_the_result_of_its_run(tmp_path):
 
 def test_a_run_without_an_end_leaves_room_on_the_disk_of_its_log(tmp_path, monkeypatch):
     log = tmp_path / "endless.mcap"
-    words = ["run", "--in-process", "--set", "duration_s=0", "--log", str(log)]
+    words = ["run", "--in-process", "--scenario", "belt-axis", "--set", "duration_s=0", "--log", str(log)]
     monkeypatch.setattr(run, "_LOOK_S", 0.0)
     free = [1 << 40, 1 << 40, 1 << 40, 5_000_000]
     monkeypatch.setattr(run, "_free_bytes", lambda _: free.pop(0) if len(free) > 1 else free[0])

@@ -1,6 +1,8 @@
 """A person's word: whose it was, what came of it, and what is said of a rig that does not answer."""
 
 import socket
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
@@ -41,15 +43,15 @@ class Rig:
     def publisher(self, _topic: Topic) -> Callable[[bytes], None]:
         def send(payload: bytes) -> None:
             self.words.append(parsed(wire.Operator, payload, OPERATOR.name))
-            self._say(self._begins if len(self.words) == 1 else [])
-            self._say(self._answer(self.words[-1]))
+            self.publish(self._begins if len(self.words) == 1 else [])
+            self.publish(self._answer(self.words[-1]))
 
         return send
 
     def wait_for(self, _roles: list[str], _timeout_s: float) -> set[str]:
         return set()
 
-    def _say(self, messages: list[Any]) -> None:
+    def publish(self, messages: list[Any]) -> None:
         for message in messages:
             topic = APPLIED if isinstance(message, wire.Applied) else PLANT_EVENT
             self._listeners[topic.name](Received(topic, message.SerializeToString(), 0))
@@ -95,9 +97,35 @@ def test_a_rig_that_falls_silent_is_not_told_by_what_it_said_before(
 def test_an_answer_to_another_word_is_none_to_this_one(say: Callable[[Rig, str], operator.Obeyed]) -> None:
     """Somebody else's word, and an earlier one of this process, end in the state that is asked for."""
     other = wire.Operator(who="somebody else")
-    obeyed = say(Rig([], lambda _word: [taken(other, "RESET"), applied(DISARMED)] * 3), "RESET")
-    assert (obeyed.done, obeyed.taken) == (False, False)
-    assert "warning  the rig did not say that it took this word: say it again" in obeyed.in_words()
+    with pytest.raises(Fault, match=r"did not say that it took RESET .* is DISARMED .*; say it again") as raised:
+        say(Rig([], lambda _word: [taken(other, "RESET"), applied(DISARMED)] * 3), "RESET")
+    assert raised.value.kind is FAULTS["NO_PEER"]
+
+
+def test_a_check_that_takes_longer_than_an_answer_is_waited_for(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+    rig = Rig([], lambda word: [taken(word, "ARM")])
+
+    def check() -> None:
+        for _ in range(20):
+            rig.publish([applied(wire.CHECKING, wire.ARMED_BY_PERSON)])
+            time.sleep(0.04)
+        rig.publish([applied(ARMED, wire.CHECK_PASSED)])
+
+    thread = threading.Thread(target=lambda: (time.sleep(0.1), check()))
+    thread.start()
+    obeyed = say(rig, "ARM")
+    thread.join()
+    assert (obeyed.done, obeyed.state) == (True, "ARMED")
+    assert obeyed.seconds > 0.4
+
+
+def test_a_rig_without_a_guard_has_nothing_to_arm(say: Callable[[Rig, str], operator.Obeyed]) -> None:
+    armed = say(Rig([], lambda _word: [applied(wire.NO_GUARD, wire.NO_CAUSE, 37e-9)]), "ARM")
+    assert armed.done
+    assert armed.in_words() == ["arm      this rig has no guard: nothing to arm; the controller vibrates already"]
+    disarmed = say(Rig([], lambda _word: [applied(wire.NO_GUARD, wire.NO_CAUSE, 37e-9)]), "DISARM")
+    assert not disarmed.done
+    assert "`stickslip stop`" in disarmed.in_words()[0]
 
 
 def test_what_the_rig_did_before_it_took_the_word_does_not_count(say: Callable[[Rig, str], operator.Obeyed]) -> None:

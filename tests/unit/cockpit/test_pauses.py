@@ -10,10 +10,9 @@ from bridge.log.logfile import RunData, read_run
 from bridge.log.pause_events import CORE_PAUSE, NOT_WATCHED, PAUSE, WATCH, in_words
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import APPLIED
-from cockpit.judge.pauses import Pauses, pauses_in, pauses_in_words
-from cockpit.judge.verdict import judge_run
+from cockpit.judge.pauses import Pauses, computer_in_words, pauses_in_words
 from cockpit.run.progress import progress_line
-from tests.logs import short_log
+from tests.logs import short_log, verdict_of
 
 BLOCKS, MS = 1000, 1_000_000
 Late = dict[int, float]  # how late a command was [ms], by the block that it answers
@@ -66,10 +65,10 @@ def watched(run: RunData, applied: Any, *pauses_ms: tuple[float, float]) -> RunD
 
 
 def found(run: RunData, applied: Any, *pauses_ms: tuple[float, float]) -> Pauses:
-    pauses, why_not = pauses_in(watched(run, applied, *pauses_ms), 1e6)
-    assert pauses is not None
-    assert why_not == ""
-    return pauses
+    verdict = verdict_of(watched(run, applied, *pauses_ms))
+    assert verdict.pauses is not None
+    assert verdict.not_watched == ""
+    return verdict.pauses
 
 
 def test_a_command_across_a_pause_is_late_inside_and_another_outside(run: RunData) -> None:
@@ -85,10 +84,13 @@ def test_a_command_across_a_pause_is_late_inside_and_another_outside(run: RunDat
 def test_a_command_that_is_late_while_one_core_stands_still_is_outside_and_counted_apart(run: RunData) -> None:
     told = watched(run, account({500: 1.5, 800: 1.2}), (501.2, 1.1))
     alone = [event(CORE_PAUSE, in_words(2 * MS, 1), t_ms) for t_ms in (500.5, 801.0)]
-    pauses, _ = pauses_in(told._replace(events=[*told.events, *alone]), 1e6)
+    pauses = verdict_of(told._replace(events=[*told.events, *alone])).pauses
     assert pauses is not None
     assert (pauses.number, pauses.late_inside, pauses.late_outside, pauses.late_one_core) == (1, 1, 1, 1)
-    assert "1 late command outside of them (1 while one core stood still alone)" in pauses_in_words(pauses, "")[0]
+    assert pauses_in_words(pauses) == [
+        "stalls   every core stalled 1 time (1.1 ms in total, longest 1.1 ms); 1 late command in stalls, "
+        "1 command later than 1 ms outside of them (0.10 %), 1 of them while one core stalled"
+    ]
 
 
 def test_blocks_that_were_due_in_a_pause_are_inside_it(run: RunData) -> None:
@@ -107,7 +109,7 @@ def test_a_loop_that_stood_still_by_itself_is_late_outside(run: RunData) -> None
 
 
 def test_commands_that_never_come_are_late(run: RunData) -> None:
-    lost = dict.fromkeys((200, 201, 700, BLOCKS - 2), np.inf)
+    lost: Late = dict.fromkeys((200, 201, 700, BLOCKS - 2), np.inf)
     pauses = found(run, account(lost), (201.5, 1.0))
     assert (pauses.late_inside, pauses.late_outside) == (2, 2)
 
@@ -120,12 +122,12 @@ def test_rows_that_the_log_lacks_are_no_late_commands(run: RunData) -> None:
 def test_where_nothing_was_watched_no_figure_is_given(run: RunData) -> None:
     applied = account({500: 1.5})
     refused = run._replace(applied=applied, events=[event(WATCH, NOT_WATCHED + "no real-time priority")])
-    verdict = judge_run(refused)
+    verdict = verdict_of(refused)
     assert verdict.pauses is None
     assert verdict.not_watched == "no real-time priority"
-    assert "pauses   of the machine not watched: no real-time priority" in pauses_in_words(None, verdict.not_watched)
-    assert judge_run(run._replace(applied=applied)).not_watched == "the recorder of this log did not"
-    assert judge_run(run).not_watched == ""  # in lockstep nobody has to
+    assert computer_in_words(verdict.computer, verdict.not_watched).endswith("not watched: no real-time priority")
+    assert verdict_of(run._replace(applied=applied)).not_watched == "the recorder of this log did not"
+    assert verdict_of(run).not_watched == ""  # in lockstep nobody has to
 
 
 def test_the_progress_line_tells_of_pauses_once_there_are_some() -> None:
@@ -135,10 +137,30 @@ def test_the_progress_line_tells_of_pauses_once_there_are_some() -> None:
 
 def test_what_the_verdict_says(run: RunData, tmp_path: Path) -> None:
     applied = account({500: 1.5, 800: 1.2})
-    verdict = judge_run(watched(run, applied, (501.2, 1.1), (900.0, 12.0)))
-    assert pauses_in_words(verdict.pauses, verdict.not_watched) == [
-        "pauses   the machine stood still 2 times, 13.1 ms in all, the longest 12.0 ms; 1 late command in its pauses, "
-        "1 late command outside of them: 99.898 % within 1 ms there"
-    ]
+    verdict = verdict_of(watched(run, applied, (501.2, 1.1), (900.0, 12.0)))
+    assert pauses_in_words(verdict.pauses)[0].startswith("stalls   every core stalled 2 times (13.1 ms in total, ")
     assert verdict.as_dict()["pauses"]["number"] == 2
-    assert pauses_in_words(found(run, applied), "") == ["pauses   none of the machine; 2 late commands"]
+    assert pauses_in_words(found(run, applied)) == [
+        "stalls   none of every core; 2 commands later than 1 ms outside of them (0.20 %)"
+    ]
+    assert computer_in_words(verdict.computer, "") == (
+        "computer stalled 2 times, longest 12.0 ms (every core, at 0.90 s)"
+    )
+
+
+def test_the_longest_stall_is_that_of_whoever_saw_more(run: RunData) -> None:
+    """The log of a demo whose plant was 40.5 ms late read "4.0 ms": the watch saw less than the plant."""
+    applied = account({})
+    applied["late_ns"][500:503] = np.array([39.1, 40.5, 39.5]) * MS
+    verdict = verdict_of(watched(run, applied, (505.0, 4.0), (700.0, 0.8)))
+    assert computer_in_words(verdict.computer, "") == (
+        "computer stalled 2 times, longest 40.5 ms (plant, at 0.50 s)"  # one of them is seen by both
+    )
+    assert verdict.control != "not ok"
+
+
+def test_a_stall_alone_changes_no_status(run: RunData) -> None:
+    sound = verdict_of(run)
+    stalled = verdict_of(watched(run, account({500: 30.0}), (501.0, 30.0)))
+    assert (stalled.control, stalled.reason) == (sound.control, sound.reason)
+    assert stalled.losses() != [] == sound.losses()

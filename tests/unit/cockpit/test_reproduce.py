@@ -8,7 +8,8 @@ import pytest
 from cockpit.paper.claims import PaperRow
 from cockpit.paper.page import reproduce
 
-pytestmark = pytest.mark.slow
+# 19 s of CPU; tests/truth/test_paper.py has the numbers of the same runs
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 
 @pytest.fixture(scope="module")

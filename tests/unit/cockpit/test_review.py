@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from bridge.log.logfile import read_run
 from cockpit.cli import app
-from cockpit.judge.verdict import Phase, judge
+from cockpit.judge.judged import judge
+from cockpit.judge.phases import Phase
 from cockpit.judge.verdict_words import headline
 from cockpit.review.differences import parameters_of
 from cockpit.review.page import write_review
@@ -152,4 +153,6 @@ def test_the_answer_says_why_a_run_without_a_slip_is_not_good(tmp_path: Path) ->
         following=None,
         vibration_dose_mm2_per_s=0.0,
     )
-    assert "; but cut: has no end" in headline(judge(cut)._replace(after=still, untested="", alone=None))
+    verdict = judge(cut)._replace(after=still, untested="", alone=None)
+    assert headline(verdict) == "not judged: how many blocks are missing is not known"
+    assert "cut: has no end" in verdict.reason

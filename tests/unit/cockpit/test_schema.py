@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,15 +34,20 @@ def call(*arguments: str):
     return CliRunner().invoke(app, list(arguments))
 
 
+@cache
+def validator(name: str) -> Any:
+    """To make the schema takes longer than to use it."""
+    return jsonschema.Draft202012Validator(FORMATS[name].schema())
+
+
 def fits(name: str, value: Any) -> bool:
     """Whether a value is what a schema says."""
-    validator = jsonschema.Draft202012Validator(FORMATS[name].schema())
-    return validator.is_valid(value)
+    return validator(name).is_valid(value)
 
 
 def check(name: str, value: Any) -> None:
     """Raise where a value is not what a schema says."""
-    jsonschema.validate(strict_json(value), FORMATS[name].schema(), jsonschema.Draft202012Validator)
+    validator(name).validate(strict_json(value))
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from bridge.log.logfile import RunData, read_run
-from cockpit.judge.slips import cycles_of
-from cockpit.judge.verdict import judge_run
 from cockpit.judge.verdict_words import in_words
-from tests.logs import Tables, doctored
+from tests.logs import Tables, cycles_of, doctored, verdict_of
 
 STIFFNESS_N_PER_M = 1e6
 SPEED_MPS = 1e-3
@@ -56,11 +54,13 @@ def test_a_force_swings_inside_a_stroke_and_not_where_its_drive_turns_or_stands(
     way = np.where(at_s < 0.08, 1.0, -1.0)
     behind_m = np.where(stands, 0.0, way * (2e-5 + 4e-6 * np.sin(2 * np.pi * T_S / 0.01)))
     run = made_run(tmp_path, SPEED_MPS * (there_s - back_s), behind_m)
-    whole = judge_run(run).before
+    whole = verdict_of(run).before
     assert whole is not None
     assert whole.swing_N == pytest.approx(8.0, rel=0.1)
     assert whole.strokes == 2
-    assert "drive force swings by 7.87 N (median of 2 strokes, without their turns)" in in_words(judge_run(run))[0]
+    assert "drive force swings by 7.87 N (median of 2 strokes, without their turns)" in "\n".join(
+        in_words(verdict_of(run), verbose=False)
+    )
 
 
 @pytest.mark.parametrize("places", [True, False])

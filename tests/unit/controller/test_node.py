@@ -16,7 +16,7 @@ def test_a_pause_makes_a_block_late_only_where_the_rig_does_not_wait(lockstep: b
     node = ControllerNode(CONFIG, lockstep)
     events: list[int] = []
     for number, arrival_ms in enumerate([1.0, 2.0, 103.0, 103.1]):
-        node.block(block(number), round(arrival_ms * 1e6))
+        node.block(block(number), round(arrival_ms * 1e6), round(arrival_ms * 1e6))
         events.append(wire.Trace.FromString(node.rest(0)[0].payload).events)
     assert events == [BLOCK, BLOCK, *([BLOCK] * 2 if lockstep else [BLOCK | LATE] * 2)]
 

@@ -7,7 +7,7 @@ import pytest
 from bridge.guard.received import Commands
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.complaints import Complaints
-from bridge.wire.inbox import Received
+from bridge.wire.inbox import WAITING, Received
 from bridge.wire.topics import COMMAND
 
 
@@ -73,7 +73,7 @@ def test_rubbish_is_dropped() -> None:
 
 def test_of_a_flood_the_newest_are_read_and_the_rest_is_told() -> None:
     made, told = commands()
-    for _ in range(1000):
+    for _ in range(WAITING + 744):
         made.push(command(3))
     made.push(command(9))
     assert [answered for _, answered in made.take(10)][-1] == 9

@@ -110,9 +110,13 @@ def test_a_rival_with_fewer_slips_for_less_energy_beats_the_controller() -> None
 
 
 @pytest.mark.slow
-def test_bench_control_writes_table_page_and_json(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("only", "small"), [(("stiff-20",), False), pytest.param((), True, marks=pytest.mark.nightly)], ids=["one", "small"]
+)
+def test_bench_control_writes_table_page_and_json(tmp_path: Path, only: tuple[str, ...], small: bool) -> None:
     page, table = tmp_path / "control.html", tmp_path / "control.json"
-    words = ["bench", "control", "--small", "--jobs", "1", "--report", str(page), "--json", str(table)]
+    which = [word for name in only for word in ("--only", name)] + ["--small"] * small
+    words = ["bench", "control", *which, "--jobs", "1", "--report", str(page), "--json", str(table)]
     result = CliRunner().invoke(app, words)
     assert result.exit_code in {0, 3}
     told = json.loads(table.read_text())
@@ -124,7 +128,7 @@ def test_bench_control_writes_table_page_and_json(tmp_path: Path) -> None:
         [one for (_, subject), one in runs.items() if subject == rules.NAMES[rule] and one["expect"] == "helped"]
         for rule in (rules.NONE, rules.MOVING)
     )
-    assert len(none) == len(moving) == sum(one.bank.small and one.bank.expect == "helped" for one in BANK)
+    assert len(none) == len(moving) == sum(one.bank.expect == "helped" for one in chosen(BANK, list(only), small=small))
     assert all(one["slips"] > 5 for one in none)
     assert all(one["slips"] + one["surges"] == 0 for one in moving)
     text = page.read_text()

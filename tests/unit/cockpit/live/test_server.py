@@ -169,13 +169,17 @@ def test_a_thirteenth_page_sees_nothing_and_may_stop(port: int, monkeypatch: pyt
     assert words == ["STOP"]
 
 
-def test_connections_that_say_nothing_keep_no_page_out(port: int) -> None:
-    request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()
+def test_connections_that_say_nothing_keep_no_page_out(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    monkeypatch.setattr(server, "_OPEN_S", 2.0 * PATIENCE_S)  # none of them is closed before the page has come
+    port = request.getfixturevalue("port")
+    words = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode()
     half_open = [
-        socket.create_connection(("127.0.0.1", port), timeout=5.0) for _ in range(4 * server._MOST_CONNECTIONS)
+        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) for _ in range(4 * server._MOST_CONNECTIONS)
     ]
     try:
-        assert b" 200 " in raw(port, request, timeout_s=server._OPEN_S / 2.0)
+        assert b" 200 " in raw(port, words)
     finally:
         for one in half_open:
             one.close()
@@ -203,7 +207,7 @@ def test_arming_needs_the_token_and_stop_waits_for_nobody(monkeypatch: pytest.Mo
     def obey(_bus: BusConfig, word: str) -> Obeyed:
         said.append(word)
         if word == "ARM":
-            armed.wait(5.0)
+            armed.wait(PATIENCE_S)
         if word == "RESET":
             raise Fault("NO_PEER", "nobody there\x1b[2J")
         return Obeyed("here", word, True, "ARMED", "CHECK_PASSED", "", 0.0, 0.1, "", True, False)

@@ -11,7 +11,8 @@ from diagnosis.hypotheses.trials import trials
 from diagnosis.model.per_run import is_phase
 from tests.prepared import fitter_of, prepared
 
-pytestmark = pytest.mark.slow
+# 8 s of CPU; tests/unit/diagnosis/model/test_per_run.py has the phases of runs apart
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 FREQUENCY_HZ, PHASE_RAD = 2.6, 1.2
 

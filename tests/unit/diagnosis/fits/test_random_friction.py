@@ -79,6 +79,12 @@ def rigs_in_bursts(folder, effect, formula, count):
     return sum(found)
 
 
+def test_a_load_that_goes_on_comes_in_no_bursts(rig):
+    (fitter, _, _, _), _ = rig
+    assert not in_bursts(fitter.problem)
+
+
+@pytest.mark.nightly  # 15 s of CPU
 def test_bursts_of_one_rig_are_told_from_a_load_that_goes_on(tmp_path):
     assert rigs_in_bursts(tmp_path / "debris", "debris-bursts", "gaussian", 1) == 1
     assert rigs_in_bursts(tmp_path / "load", "normal-load-fluctuation", "narrow-band", 1) == 0

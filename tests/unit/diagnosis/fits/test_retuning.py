@@ -27,6 +27,7 @@ def straight(evidence_and_runs):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly  # 6 s of CPU; the next has the same fit of a chain as described
 def test_a_bent_displacement_sensor_is_no_gap(evidence_and_runs, straight):
     evidence, runs = evidence_and_runs
 

@@ -86,7 +86,7 @@ def test_the_loop_holds_on_the_corrected_rig(diagnosed, tmp_path):
 
 def test_a_piezo_that_is_too_weak_is_said(diagnosed, tmp_path):
     weak = ("--set", "rig.effects.piezo-roll-off.corner_Hz=300.0")
-    result = run("--rig", diagnosed, *weak, *SHORT, "--log", tmp_path / "run.mcap")
+    result = run("--rig", diagnosed, *weak, *SHORT, "--verbose", "--log", tmp_path / "run.mcap")
     assert "with piezo-roll-off, static-friction-ageing" in result.stdout
     assert "AT ITS LIMIT" in result.stdout
     assert "stick-slip may return" in result.stdout or result.exit_code == 1

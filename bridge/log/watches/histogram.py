@@ -1,0 +1,37 @@
+"""A distribution in a memory that does not grow with the number of values: counts in bins of equal ratio."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+# Ratio of two edges. A quantile is off by half of it at most, 0.25 %, less than a repeated run scatters by. Smaller: more memory
+# (now 5500 bins of 8 bytes); larger: percentiles that visibly come in steps.
+_RATIO = 1.005
+_LOWEST, _HIGHEST = 1e-3, 1e9  # values beyond count in the first or last bin
+_BINS = int(np.ceil(np.log(_HIGHEST / _LOWEST) / np.log(_RATIO)))
+
+
+class Histogram:
+    """Counts of positive values, in any unit."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.most = 0.0  # exact
+        self._bins = np.zeros(_BINS, np.int64)
+
+    def add(self, values: npt.NDArray[Any]) -> None:
+        """Count values, [values]."""
+        if not len(values):
+            return
+        at = np.log(np.maximum(values, _LOWEST) / _LOWEST) / np.log(_RATIO)
+        self._bins += np.bincount(np.minimum(at.astype(np.int64), _BINS - 1), minlength=_BINS)
+        self.count += len(values)
+        self.most = max(self.most, float(values.max()))
+
+    def quantile(self, share: float) -> float:
+        """The value below which this share of the values is, to 0.25 %; 0 without values."""
+        if not self.count:
+            return 0.0
+        at = int(np.searchsorted(np.cumsum(self._bins), share * self.count))
+        return min(float(_LOWEST * _RATIO ** (min(at, _BINS - 1) + 0.5)), self.most)

@@ -1,0 +1,72 @@
+"""Judging a run from its log, or from the arrays of a log that was read."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+from bridge.log.check.log_check import LogCheck
+from bridge.log.log_reader import LogReader
+from bridge.log.logfile import STREAMING, RunData, check_log_file, iter_pieces
+from bridge.log.storage.parts import chain_of_log
+from cockpit.judge.run_judge import RunJudge
+from cockpit.judge.verdict import RunVerdict
+from diagnosis.features.cycles import Cycles
+
+_PIECE_ROWS = 4096  # of a log in memory, which the judge takes at once
+
+
+class Judged(NamedTuple):
+    """What came of a log."""
+
+    verdict: RunVerdict
+    check: LogCheck  # the findings of `log check`
+    judge: RunJudge
+
+
+def judge_log(
+    path: Path,
+    progress: Callable[[float], None] | None = None,
+    margins: bool = False,
+    stretch_from_s: float | None = None,
+) -> Judged:
+    """Judge a log and check it, in one pass and in memory that does not grow with the log. Raises Fault BAD_LOG.
+
+    Args:
+        path: of the log.
+        progress: called with the share of the log that was read, 0 to 1.
+        margins, stretch_from_s: as in `RunJudge`.
+
+    """
+    check_log_file(path)
+    reader = LogReader(path)
+    judge = RunJudge(path, reader.metadata, margins=margins, stretch_from_s=stretch_from_s)
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        chain = beside.submit(chain_of_log, path)
+        for piece in iter_pieces(reader):
+            if piece.topic in STREAMING:
+                judge.add(piece.topic, piece.records, piece.log_time_ns)
+            else:
+                judge.add_others(piece.topic, piece.payloads)
+            if progress is not None:
+                progress(reader.position_bytes / max(reader.size_bytes, 1))
+        verdict = judge.result(reader.damage, chain.result(), reader.foreign)
+        return Judged(verdict, judge.log.result(reader, verdict.chain), judge)
+
+
+def judge(path: Path) -> RunVerdict:
+    """Read a log and judge its run. Raises Fault BAD_LOG."""
+    return judge_log(path).verdict
+
+
+def judge_tables(run: RunData) -> tuple[RunVerdict, Cycles | None]:
+    """Judge a log that is in memory, as pictures and pages need it; the verdict and the slips. Raises Fault BAD_LOG."""
+    judge = RunJudge(run.path, run.headers)
+    judge.log.events.add(run.events)
+    tables = {name: getattr(run, name) for name in ("trace", "applied", "command", "state", "announce", "sensors")}
+    pieces = max(map(len, tables.values())) // _PIECE_ROWS + 1
+    for piece in range(pieces):  # of the same time, but for what is missing
+        for name, table in tables.items():
+            part = table[len(table) * piece // pieces : len(table) * (piece + 1) // pieces]
+            judge.add(name, part, part["t_ns"])
+    return judge.result(run.damage, run.chain, run.foreign), judge.cycles

@@ -1,0 +1,188 @@
+"""v_a over v_d while the rig vibrates, judged at both ends.
+
+Below 1.05 stick-slip may return; far above the set point the exciter, the mount and the workpiece are shaken for nothing, or v_a
+is measured wrongly. The set point is that of the configuration, or the higher one to which the controller raises it after slips,
+as far as `policy.most_ratio` allows. Judged are steps in EXCITE with a drive that moves evenly, after the ramp. Left out are
+stalls of the computer and the second after each, in which v_a is what it was when the controller last heard.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.log.in_charge import NO_COMMAND
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import Records
+from cockpit.judge.described import Described
+from controller.codes import GAP, LATE, STALE
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+ALARM_RATIO = 1.05
+# Set points above which v_a / v_d is too large, and for how long in one stretch. A stretch, as a set point that rises or a mount
+# that resonates is above for the 10 to 60 ms that the loop needs, again and again, in a sound run; in total every long run would
+# fail. Shipped scenarios: at most 0.02 s above. Smaller: a drive that becomes slower by more than a third fails.
+_MOST_SET_POINTS = 1.5
+MOST_ABOVE_S = 0.2
+SETTLING_S = 1.0  # after a stall, and after the controller is enabled
+_RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
+_STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a drive that changed by less in this time moves evenly
+_STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
+_RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
+_LATE_BLOCKS = 2.0  # that a block leaves late, from which the computer stalled
+_PENDING = 4096  # blocks of what the rig did that wait for their steps at most
+
+
+class RatioVerdict(NamedTuple):
+    """v_a over v_d in a run; 0 where nothing was judged."""
+
+    lowest: float
+    highest: float
+    judged_s: float
+    below_s: float  # under 1.05
+    above_s: float  # over 1.5 set points, in all
+    longest_above_s: float  # the same, in one stretch
+    left_out_s: float  # vibration in stalls and the second after them
+
+    @property
+    def ok(self) -> bool:
+        """Whether v_a / v_d was never above 1.5 set points for more than 0.2 s."""
+        return self.longest_above_s <= MOST_ABOVE_S
+
+    @property
+    def low(self) -> bool:
+        """Whether it was below 1.05, which is a warning: where no slip came of it the run is good."""
+        return self.below_s > 0.0
+
+    def in_words(self) -> str:
+        """A line; empty where nothing was judged."""
+        if not self.judged_s:
+            return ""
+        wrong: list[str] = []
+        if self.low:
+            wrong.append(f"below {ALARM_RATIO} for {self.below_s:.2f} s: stick-slip may return")
+        if not self.ok:
+            wrong.append(f"above {_MOST_SET_POINTS:g} set points for {self.longest_above_s:.2f} s: more than is needed")
+        out = f", without {self.left_out_s:.1f} s around stalls" if self.left_out_s else ""
+        return f"{self.lowest:.2f} to {self.highest:.2f} while vibrating{out} ({'; '.join(wrong) or 'ok'})"
+
+
+class RatioWatch:
+    """Looks at one log, piece by piece, in file order; the memory does not grow with the log.
+
+    Args:
+        of: the description in the log, with the set point.
+        block_s: length of a block.
+
+    """
+
+    def __init__(self, of: Described, block_s: float) -> None:
+        self._block_s = block_s
+        self._set_point = of.v_ratio if math.isfinite(of.v_ratio) else math.inf
+        self._most_ratio = of.most_ratio if math.isfinite(of.most_ratio) else 0.0
+        self._from_s = of.enabled_from_s + (SETTLING_S if of.enabled_from_s > 0.0 else 0.0)
+        self._back = max(round(_STEADY_S / block_s), 1)
+        self._speeds = np.zeros(0)  # of the last 0.1 s
+        self._since = math.inf  # steps in EXCITE; infinite before a first one that counts
+        self._ends_s = -math.inf  # of the newest stall
+        self._stalls: list[Floats] = []  # times at which the rig stalled, that no step has passed yet
+        self._held: list[Records] = []
+        self._lowest, self._highest = math.inf, 0.0
+        self._judged = self._below = self._above = self._longest = self._now = self._left_out = 0
+
+    def sensors(self, records: Records) -> None:
+        """The ratio is the controller's."""
+
+    def command(self, records: Records) -> None:
+        """The ratio is the controller's."""
+
+    def applied(self, records: Records) -> None:
+        """Take what the rig did, [blocks]."""
+        if len(records):
+            # before its first command a rig is on its own, and did not stall
+            answers = records["command_block"] != np.uint64(NO_COMMAND)
+            stalls = ((records["fallback"] != 0) & answers) | (records["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)
+            if stalls.any():
+                self._stalls.append(records["t_ns"][stalls] * 1e-9)
+
+    def trace(self, records: Records) -> None:
+        """Take steps of the controller, [steps]; judged once a later piece has come, as the rig's stalls may come after them."""
+        if len(records):
+            self._held.append(records)
+            if len(self._held) > 1 and sum(map(len, self._held[:-1])):
+                self._judge(self._held.pop(0))
+
+    def _judge(self, trace: Records) -> None:
+        t_s = trace["t_ns"] * 1e-9
+        speed_mps = np.abs(trace["drive_velocity_mps"])
+        excited = (trace["mode"] == wire.EXCITE) & ~np.isin(trace["limit"], _RAMPED_DOWN)
+        counts = excited & (self._since_begin(excited) * self._block_s > _RAMP_S) & self._steady(speed_mps)
+        counts &= (t_s > self._from_s) & np.isfinite(trace["vibration_velocity_mps"])
+        calm = ~self._after_stall(t_s, (trace["events"] & (GAP | STALE | LATE)) != 0)
+        self._left_out += int(np.count_nonzero(counts & ~calm))
+        counts &= calm
+        ratio = np.divide(trace["vibration_velocity_mps"], speed_mps, out=np.zeros(len(trace)), where=counts)
+        if counts.any():
+            self._lowest = min(self._lowest, float(ratio[counts].min()))
+            self._highest = max(self._highest, float(ratio[counts].max()))
+            self._judged += int(np.count_nonzero(counts))
+            self._below += int(np.count_nonzero(ratio[counts] < ALARM_RATIO))
+        set_point = np.maximum(np.minimum(trace["velocity_ratio"], self._most_ratio), self._set_point)
+        self._count_above(counts & (ratio > _MOST_SET_POINTS * set_point))
+
+    def _since_begin(self, excited: Bools) -> Floats:
+        """Steps since the vibration began, at each step; a vibration that a log begins with has begun before."""
+        index = np.arange(len(excited), dtype=np.float64)
+        last = np.maximum.accumulate(np.where(excited, -math.inf, index))
+        since = np.where(np.isfinite(last), index - last - 1.0, index + self._since)
+        self._since = float(since[-1]) + 1.0 if excited[-1] else 0.0
+        return since
+
+    def _steady(self, speed_mps: Floats) -> Bools:
+        joined = np.concatenate([self._speeds, speed_mps])
+        steady = np.zeros(len(joined), bool)
+        changed_mps = np.abs(joined[self._back :] - joined[: -self._back])
+        steady[self._back :] = (joined[self._back :] > _STANDSTILL_MPS) & (
+            changed_mps < _STEADY_SHARE * joined[self._back :]
+        )
+        self._speeds = joined[-self._back :]
+        return steady[len(joined) - len(speed_mps) :]
+
+    def _after_stall(self, t_s: Floats, stalled: Bools) -> Bools:
+        """Steps in a stall of either side, or within a second after it."""
+        at_s = np.sort(np.concatenate([[self._ends_s], *self._stalls, t_s[stalled]]))
+        last = np.searchsorted(at_s, t_s + 0.5 * self._block_s, side="right") - 1
+        after = (last >= 0) & (t_s - at_s[np.maximum(last, 0)] <= SETTLING_S)
+        passed = at_s[at_s <= t_s[-1] + 0.5 * self._block_s]
+        self._ends_s = float(passed[-1]) if len(passed) else -math.inf
+        waiting = at_s[len(passed) :][-_PENDING:]
+        self._stalls = [waiting] if len(waiting) else []
+        return after
+
+    def _count_above(self, above: Bools) -> None:
+        self._above += int(np.count_nonzero(above))
+        if not above.any():
+            self._now = 0
+            return
+        index = np.arange(len(above))
+        last = np.maximum.accumulate(np.where(above, -1 - self._now, index))
+        self._longest = max(self._longest, int((index - last)[above].max()))
+        self._now = int(index[-1] - last[-1]) if above[-1] else 0
+
+    def result(self) -> RatioVerdict:
+        """All of it, at the end of the log."""
+        for trace in self._held:
+            self._judge(trace)
+        self._held = []
+        return RatioVerdict(
+            lowest=self._lowest if self._judged else 0.0,
+            highest=self._highest,
+            judged_s=self._judged * self._block_s,
+            below_s=self._below * self._block_s,
+            above_s=self._above * self._block_s,
+            longest_above_s=self._longest * self._block_s,
+            left_out_s=self._left_out * self._block_s,
+        )

@@ -1,0 +1,393 @@
+"""The judge of a run: messages in, piece by piece, in the order of the log; at the end the verdict.
+
+It is a composition of watches, each with a method for every topic that it looks at, and of sums over windows. One that looks at
+messages goes into `_watches`, one that needs blocks and steps together into `_judge_window`.
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.log.check.log_check import LogWatch
+from bridge.log.damage import Damage, damage_findings, foreign_in_words
+from bridge.log.in_charge import GONE_S, InCharge
+from bridge.log.metadata import Metadata, configuration_of
+from bridge.log.storage.chain import Chain, chain_findings
+from bridge.log.watches.loss_watch import LossWatch
+from bridge.units import counted
+from bridge.wire import realtime
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.event_codes import WEAK_REASONS, harms, is_told
+from bridge.wire.messages import Records
+from cockpit.judge.described import described
+from cockpit.judge.machine_terms import MotionOf
+from cockpit.judge.pauses import CommandSum, Pauses, StallSum
+from cockpit.judge.phases import Phase, PhaseSum, Stretches, apart, together, within
+from cockpit.judge.ratio_watch import RatioWatch
+from cockpit.judge.sensor_watch import SensorVerdict, SensorWatch
+from cockpit.judge.setup import SETTLING_S, Setup, is_known, setup_of
+from cockpit.judge.slips import bins_of, forces_of
+from cockpit.judge.verdict import MISSING_SHARE, RunVerdict
+from cockpit.judge.watches import FiniteWatch, LatencyWatch, StepWatch
+from cockpit.judge.window import Moved, Waiting, reduced
+from diagnosis.features.cycles import Cycles
+
+if TYPE_CHECKING:
+    from cockpit.judge.margins import Margins, MarginSum
+
+_COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}  # from the blocks and steps themselves
+_COUNTED = ("applied", "command", "trace", "state")  # topics besides the blocks whose missing messages count
+
+
+def _margin_sum() -> "MarginSum":
+    """Imported where it is wanted alone, as the controller's design comes with it."""
+    from cockpit.judge.margins import MarginSum
+
+    return MarginSum()
+
+
+class RunJudge:
+    """Judges one run.
+
+    Args:
+        path: of its log.
+        headers: the tables of the log, which may be filled while it is read.
+        margins: of the amplitude loop are wanted.
+        stretch_from_s: a stretch from here to the end is wanted besides, whoever is in charge.
+
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        headers: Metadata,
+        margins: bool = False,
+        stretch_from_s: float | None = None,
+    ) -> None:
+        self.log = LogWatch()
+        self.cycles: Cycles | None = None  # all slips, once `result` was called; None without a force
+        self.stretch: Phase | None = None  # the one that was wanted, once `result` was called
+        self._stretch_from_s = stretch_from_s
+        self._path, self._headers = path, headers
+        self._waiting = Waiting()
+        self._losses = {name: LossWatch() for name in ("sensors", *_COUNTED)}
+        self._latency, self._finite, self._steps = LatencyWatch(), FiniteWatch(), StepWatch()
+        self._watches: Sequence[Any] = (self._latency, self._finite, self._steps)
+        self._motion, self._moved = MotionOf(), Moved()
+        self._commands, self._stalls = CommandSum(), StallSum()
+        self._margins = _margin_sum() if margins else None
+        self._sensor_watch: SensorWatch | None = None  # made, with the next, once the description is known
+        self._ratio: RatioWatch | None = None
+        self._early: list[tuple[str, Records]] = []  # messages before that
+        self._setup: Setup | None = None
+        self._bins = 0
+        self._first_ns: int | None = None
+        self._last_ns = self._applied_ns = 0
+        self._has_force = self._answered = False  # a block has a force; a block has a fresh command
+        self._gain_seen = False  # a loop check confirmed the exciter's gain
+        self._phases: dict[str, PhaseSum] = {}
+        self._alone: dict[float, PhaseSum] = {}  # by begin
+        self._cycles: list[Cycles] = []
+
+    def begin(self, headers: Metadata) -> None:
+        """The tables of a log that was begun after the judge was made."""
+        self._headers = headers
+
+    def add(self, topic: str, records: Records, log_time_ns: npt.NDArray[np.int64]) -> None:
+        """Take messages of a streaming topic, [messages]. Raises Fault BAD_LOG."""
+        if not len(records):
+            return
+        self.log.add(topic, records, log_time_ns)
+        if topic in self._losses:
+            self._losses[topic].add(records)
+        for watch in self._watches:
+            take: Callable[[Records], None] | None = getattr(watch, topic, None)
+            if take is not None:
+                take(records)
+        self._early.append((topic, records))
+        if self.log.period_ns and is_known(self._headers):
+            self._look_at_sensors(self._known_setup())
+        if topic == "sensors":
+            self._sensors(records)
+        elif topic in ("trace", "applied") or (topic == "command" and self._margins is not None):
+            self._waiting.others(topic, records)
+        if topic == "applied":
+            self._answered |= bool((records["fallback"] == 0).any())
+            self._applied_ns = max(self._applied_ns, int(records["t_ns"].max()))
+            self._gain_seen |= bool(np.isin(records["cause"], (wire.CHECK_PASSED, wire.GAIN_ACCEPTED)).any())
+
+    def add_others(self, topic: str, payloads: Sequence[bytes]) -> None:
+        """Take messages of another topic."""
+        self.log.add_others(topic, payloads)
+
+    def _sensors(self, records: Records) -> None:
+        if self._first_ns is None:
+            self._first_ns = int(records["t_ns"].min())
+            self._bins = bins_of(records["drive_force_N"].shape[1], self.log.period_ns)
+        self._last_ns = int(records["t_ns"][-1])
+        self._waiting.sensors(reduced(records, self._bins))
+        if self._waiting.is_full(self.log.period_ns * 1e-9) and is_known(self._headers):
+            self._judge_window(self._known_setup(), is_last=False)
+
+    def _known_setup(self) -> Setup:
+        if self._setup is None:
+            self._setup = setup_of(self._headers, self._path, self.log.period_ns)
+        return self._setup
+
+    def _look_at_sensors(self, setup: Setup) -> None:
+        """Give the messages that wait to the watches that need the description; an imported log has none."""
+        if not setup.imported:
+            if self._sensor_watch is None or self._ratio is None:
+                plant = configuration_of(self._headers, "plant", self._path) if "plant" in self._headers else None
+                of = described(plant, configuration_of(self._headers, "controller", self._path))
+                self._sensor_watch, self._ratio = SensorWatch(of, self.log.signals), RatioWatch(of, setup.block_s)
+            for topic, records in self._early:
+                for watch in (self._sensor_watch, self._ratio):
+                    take: Callable[[Records], None] | None = getattr(watch, topic, None)
+                    if take is not None:
+                        take(records)
+        self._early.clear()
+
+    def _begin_phases(self, setup: Setup) -> None:
+        """The stretches of the run; of an imported log the whole is `before`."""
+        began_s = max((self._first_ns or 0) * 1e-9 - setup.block_s, 0.0)  # a log may begin late
+        if setup.imported:
+            self._phases = {"before": PhaseSum(0.0, np.inf)}
+            return
+        enabled_s, settled_s = setup.enabled_from_s, setup.settled_from_s
+        self._phases = {
+            "before": PhaseSum(began_s, enabled_s),
+            "taking_over": PhaseSum(enabled_s, settled_s),
+            "after": PhaseSum(max(settled_s, began_s), np.inf),
+        }
+        if self._stretch_from_s is not None:
+            self._phases["stretch"] = PhaseSum(self._stretch_from_s, np.inf)
+
+    def _judge_window(self, setup: Setup, is_last: bool) -> None:
+        """Judge the blocks that wait, all of them where they are the last."""
+        if not self._phases:
+            self._begin_phases(setup)
+        window = self._waiting.window(is_last, setup.block_s)
+        forces = forces_of(window, setup, self._moved)
+        window = window._replace(end=forces.end)
+        motion = self._motion(window, setup.block_s) if not setup.imported else None
+        for sum_ in (*self._phases.values(), *(self._alone.values() if is_last else ())):
+            sum_.to_s = min(sum_.to_s, self._last_ns / 1e9) if is_last else sum_.to_s
+        without = self._without(setup, is_last)
+        for name, sum_ in self._phases.items():
+            sum_.add(forces, motion, [] if name in ("before", "stretch") else without)
+        for from_s, until_s in self._gone():
+            alone = self._alone.setdefault(from_s, PhaseSum(from_s, until_s))
+            alone.to_s = until_s
+            alone.add(forces, motion, [])
+        self._cycles.append(forces.cycles)
+        self._has_force |= len(forces.t_s) > 0
+        if not setup.imported:
+            events = self.log.events
+            self._commands.add(window, setup.block_s * 1e9, sorted(events.pauses), sorted(events.core_pauses))
+            self._stalls.add(window, events.pauses)
+            if self._margins is not None:
+                self._margins.add(window)
+        if not is_last:
+            self._waiting.judged(window, forces.turned, forces.stroke, setup.block_s)
+
+    def _fallbacks(self) -> Stretches:
+        """When the rig was without a fresh command, to infinity where it still is."""
+        charge = self.log.charge
+        return [*charge.stretches, *([(charge.open_from_s, np.inf)] if charge.open_from_s is not None else [])]
+
+    def _gone(self) -> Stretches:
+        """Fallbacks that no stall explains."""
+        return [stretch for stretch in self._fallbacks() if stretch[1] - stretch[0] > GONE_S]
+
+    def _without(self, setup: Setup, is_last: bool) -> Stretches:
+        """What is no part of the controller's time: it has a second to settle after it was stopped, or was not there."""
+        stops = self._steps.stops(setup.block_s, is_last)
+        return [*stops, *((from_s, until_s + SETTLING_S) for from_s, until_s in self._fallbacks())]
+
+    def result(self, damage: Damage, chain: Chain, foreign: dict[str, int]) -> RunVerdict:
+        """The verdict, at the end of the log. Raises Fault BAD_LOG."""
+        charge = self.log.charge.result()
+        setup = self._known_setup()
+        if self._waiting.blocks:
+            self._judge_window(setup, is_last=True)
+        if self._has_force and "drive_force_N" not in setup.absent:
+            self.cycles = Cycles(*(np.concatenate(parts) for parts in zip(*self._cycles, strict=True)))
+        else:
+            self._phases, self._alone = {}, {}
+        phases = {name: sum_.result(setup.block_s) for name, sum_ in self._phases.items()}
+        self.stretch = phases.get("stretch")
+        after, seconds = phases.get("after"), self._last_ns / 1e9
+        stops = self._steps.stops(setup.block_s, is_last=True) if not setup.imported else []
+        stopped_s = sum(min(until_s - SETTLING_S, seconds) - from_s for from_s, until_s in stops)
+        gone = self._gone()
+        enabled_s = min(setup.enabled_from_s, seconds) if setup.imported else setup.enabled_from_s
+        in_charge_s = seconds - enabled_s - stopped_s - sum(until_s - from_s for from_s, until_s in gone)
+        lost_blocks, all_known = self._lost_blocks(damage)
+        latency = self._latency.result() if not setup.imported else None
+        not_watched = self.log.events.not_watched if latency is not None else ""
+        faults, told = self._lines(charge, damage, chain, foreign)
+        missing = self._phases["after"].missing + self._lost_at_the_end() if "after" in self._phases else 0
+        untested = self._untested(setup, after, in_charge_s)
+        ratio = self._ratio.result() if self._ratio is not None else None
+        return RunVerdict(
+            log=str(self._path),
+            seconds=seconds,
+            blocks=self.log.topics["sensors"].messages,
+            lost_blocks=lost_blocks,
+            lost_messages=lost_blocks + sum(self._losses[name].missing for name in _COUNTED),
+            all_losses_known=all_known,
+            controller_missed=self._steps.missed,
+            missing=missing,
+            enabled_from_s=enabled_s,
+            stopped_s=stopped_s,
+            charge=charge,
+            alone=together(sum_.result(setup.block_s) for sum_ in self._alone.values()),
+            before=phases.get("before"),
+            taking_over=phases.get("taking_over"),
+            after=after,
+            unsure_slips=self._phases["after"].unsure if after is not None else 0,
+            stopped_slips=self._slips_in(stops),
+            stalled_slips=self._slips_in_stalls(setup, stops, gone),
+            drive_velocity_max_mps=self._steps.drive_velocity_max_mps,
+            velocity_ratio_min=ratio.lowest if ratio is not None else 0.0,
+            velocity_ratio_max=ratio.highest if ratio is not None else 0.0,
+            ratio=ratio,
+            sensors=self._sensor_verdict(setup, seconds),
+            latency=latency,
+            late_commands=self._latency.late,
+            pauses=self._pauses() if latency is not None and not not_watched else None,
+            computer=self._stalls.result() if latency is not None else None,
+            not_watched=not_watched,
+            faults=faults,
+            told=told,
+            chain=chain,
+            normal_scheduling=[
+                event.source
+                for event in self.log.events.kept
+                if event.code == "START" and event.text.startswith(realtime.NORMAL)
+            ],
+            untested=untested,
+            doubts=self._doubts(after, missing, setup.block_s, chain, damage, all_known) if not setup.imported else [],
+            imported=setup.imported,
+            gain_verified=setup.known_gain or self._gain_seen,
+        )
+
+    def margins(self) -> "Margins":
+        """The margins of the amplitude loop. Raises ValueError where they were not wanted, Fault BAD_LOG."""
+        if self._margins is None:
+            raise ValueError("margins: must be wanted when the judge is made")
+        return self._margins.result(self._headers, self._path, self._steps.loop_delay_s)
+
+    def _sensor_verdict(self, setup: Setup, seconds: float) -> SensorVerdict | None:
+        """What the sensors can carry; None for an imported log, and for one without a block."""
+        if self._sensor_watch is None:
+            return None
+        judged = apart((setup.settled_from_s, seconds), self._without(setup, is_last=True))
+        slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
+        return self._sensor_watch.result(slips_s, judged)
+
+    def _pauses(self) -> Pauses:
+        return self._commands.result(sorted(self.log.events.pauses), self._applied_ns)
+
+    def _slips_in(self, stretches: Stretches) -> int:
+        """Slips in any of the stretches, each counted once."""
+        return int(np.count_nonzero(within(self.cycles.breakaway_t_s, stretches))) if self.cycles is not None else 0
+
+    def _slips_in_stalls(self, setup: Setup, stops: Stretches, gone: Stretches) -> int:
+        """Slips with the controller enabled in short fallbacks and in the second after each."""
+        apart = [*stops, *((from_s, until_s + SETTLING_S) for from_s, until_s in gone)]
+        short = [
+            (max(from_s, setup.settled_from_s), until_s + SETTLING_S)
+            for from_s, until_s in self.log.charge.stretches
+            if until_s - from_s <= GONE_S
+        ]
+        if self.cycles is None or not short:
+            return 0
+        at_s = self.cycles.breakaway_t_s
+        return int(np.count_nonzero(within(at_s, short) & ~within(at_s, apart)))
+
+    def _lost_blocks(self, damage: Damage) -> tuple[int, bool]:
+        """Blocks that are not in the log, and whether it tells of all.
+
+        A damaged chunk may hold the first blocks or the last ones: then the plant's END counts, which says how many there were.
+        """
+        watch, whole = self._losses["sensors"], damage.whole and not damage.before
+        if self.log.events.blocks_sent is None:
+            return watch.missing, whole
+        first = 0 if whole else watch.first  # a recorder may have come late
+        return watch.missing + first + self._lost_at_the_end(), True
+
+    def _lost_at_the_end(self) -> int:
+        """Blocks after the last one in the log, by the plant's END."""
+        return max((self.log.events.blocks_sent or 0) - self._losses["sensors"].end, 0)
+
+    def _lines(
+        self, charge: InCharge, damage: Damage, chain: Chain, foreign: dict[str, int]
+    ) -> tuple[list[str], list[str]]:
+        """What harms the run or its log, and what else is of interest; one line for all events of one code of one source."""
+        faults: list[str] = []
+        told: list[str] = []
+        counts, listed = self.log.events.counts, set[tuple[str, str]]()
+        for event in self.log.events.kept:
+            key = event.source, event.code
+            if key in listed or event.code in _COUNTED_ELSEWHERE or not is_told(event.code):
+                continue
+            listed.add(key)
+            many = f" (the first of {counts[key]})" if counts[key] > 1 else ""
+            (faults if harms(event.code) else told).append(f"{event.code}: {event.text}{many}")
+        told += foreign_in_words(foreign)
+        for code, text, is_fault in charge.sentences():
+            (faults if is_fault else told).append(f"{code}: {text}")
+        faults += [line for line in (self._clock(), *self._finite.faults(), self._steps.unseen()) if line]
+        findings = [*damage_findings(damage, self._path), *chain_findings(chain, self._path.name)]
+        return [*faults, *(f"{finding.kind}: {finding.text}" for finding in findings)], told
+
+    def _clock(self) -> str:
+        """What is wrong with the time of the blocks, in words; empty where it follows their numbers."""
+        watch = self.log.topics["sensors"]
+        if not watch.jumps:
+            return ""
+        stands = watch.standing > watch.jumps // 2
+        how = f"stands at {counted(watch.standing, 'block')}" if stands else f"jumps at {counted(watch.jumps, 'block')}"
+        first, off_ns = watch.first_jump
+        return f"CLOCK: t_ns of /sensors {how}, first {first} by {off_ns * 1e-6:g} ms: times are wrong from there"
+
+    def _doubts(
+        self, after: Phase | None, missing: int, block_s: float, chain: Chain, damage: Damage, all_known: bool
+    ) -> list[str]:
+        """Why a run cannot be judged although something was tested."""
+        doubts = [line for line in (self._clock(), self._steps.unseen()) if line]
+        if after is not None and missing * block_s > MISSING_SHARE * (after.seconds + missing * block_s):
+            share = 100.0 * missing * block_s / (after.seconds + missing * block_s)
+            doubts.append(f"{share:.1f} % of the judged blocks are missing, more than {100 * MISSING_SHARE:g} %")
+        if chain.changes:
+            doubts.append("bytes of the log were changed after it was written")
+        if not all_known:
+            kinds = [f"{finding.kind}: {finding.text}" for finding in damage_findings(damage, self._path)]
+            doubts.append(f"how many blocks are missing is not known; {'; '.join(kinds)}")
+        return doubts
+
+    def _untested(self, setup: Setup, after: Phase | None, in_charge_s: float) -> str:
+        """Why nothing was tested, in words; empty where something was. `in_charge_s`: of the controller, its settling too."""
+        if setup.imported:
+            return "measured data of another program: no controller was there to be judged"
+        if self._first_ns is None:
+            return "no block was recorded"
+        if not self._steps.steps:
+            return "no step of a controller was recorded: nothing was tested"
+        if not self._steps.armed:
+            return "the rig was never armed: `stickslip arm`, or `arm = true` in the scenario of a simulated rig"
+        if not self._steps.moved:
+            return "the drive never moved: nothing was tested"
+        if after is not None:
+            return ""
+        if in_charge_s <= 0.0 or not self._answered:
+            return "the controller was not in charge in this run"
+        why = f"too short to judge: it has {SETTLING_S:g} s to settle"
+        if in_charge_s > SETTLING_S:  # the force is no number, or stops and stalls left it no second to settle in
+            why = "but nothing there can be judged"
+        return f"the controller was in charge for {in_charge_s:.2g} s, {why}"

@@ -1,0 +1,144 @@
+"""What a verdict needs of a run besides its motion, each gathered message by message in a memory that does not grow."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bridge.log.watches.arrays import steps
+from bridge.log.watches.histogram import Histogram
+from bridge.units import counted
+from bridge.wire import stickslip_pb2 as wire
+from bridge.wire.messages import Records
+from cockpit.judge.setup import SETTLING_S
+
+STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
+_CONTROLLED = ("drive_force_N", "mass_position_m", "base_accel_mps2", "drive_position_m")
+# A drive that turns stands for a moment, and a slip may come then: 17 in an hour of the belt axis, which has 718 turns. Smaller:
+# they count as slips with a dead transducer; larger: a transducer at the end of its range is found later.
+_TURN_S = 0.2
+
+
+class Latency(NamedTuple):
+    """Block out to its command in."""
+
+    p50_us: float  # percentiles to 0.25 %
+    p99_us: float
+    p999_us: float
+    within_1_ms: float  # share
+
+
+class LatencyWatch:
+    """How long the commands took, from the plant's own account."""
+
+    def __init__(self) -> None:
+        self.took_us = Histogram()
+        self.late = 0  # commands that took more than 1 ms
+        self._rows = self._commands = 0
+
+    def applied(self, records: Records) -> None:
+        """Take what the rig did, [blocks]."""
+        self._rows += len(records)
+        self._commands += int(records["commands"].sum())
+        self.late += int(records["commands_late"].sum())
+        round_trip_ns = records["round_trip_ns"][records["commands"] > 0]
+        self.took_us.add(round_trip_ns[round_trip_ns > 0] * 1e-3)
+
+    def result(self) -> Latency | None:
+        """All of it; None in lockstep, where nothing takes time."""
+        if not self.took_us.count:
+            return None
+        # a command that never came is a late one; the last block's comes after the end
+        in_time = min((self._commands - self.late) / max(self._rows - 1, 1), 1.0)
+        p50_us, p99_us, p999_us = (self.took_us.quantile(share) for share in (0.5, 0.99, 0.999))
+        return Latency(p50_us, p99_us, p999_us, in_time)
+
+
+class FiniteWatch:
+    """Samples of the controlled channels that are no numbers."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[int, int]] = {}  # by channel: blocks, and the first
+
+    def sensors(self, records: Records) -> None:
+        """Take sensor blocks, [blocks]."""
+        for name in _CONTROLLED:
+            finite = np.isfinite(records[name])
+            if finite.all():
+                continue
+            bad = ~finite.all(axis=1)
+            blocks, first = self._found.get(name, (0, int(records["sequence"][bad][0])))
+            self._found[name] = blocks + int(np.count_nonzero(bad)), first
+
+    def faults(self) -> list[str]:
+        """A line for each channel."""
+        return [
+            f"NOT_FINITE: /sensors {name}: {counted(blocks, 'block holds', 'blocks hold')} a sample that is no number, "
+            f"first {first}; left out"
+            for name, (blocks, first) in self._found.items()
+        ]
+
+
+class StepWatch:
+    """What the controller's steps say of the run: whether it was armed, what it missed, when it was stopped."""
+
+    def __init__(self) -> None:
+        self.steps = 0
+        self.missed = 0  # blocks that never came to the controller
+        self.armed = self.moved = False
+        self.drive_velocity_max_mps = 0.0
+        self.loop_delay_s = 0.0
+        self._slips: int | None = None
+        self._unseen = 0  # slips while the drive seemed to stand
+        self._unseen_s = 0.0
+        self._moved_s = -np.inf  # when the drive was last seen to move
+        self._idle: list[tuple[float, float]] = []  # first and last step of each stretch that ended
+        self._idle_from_s: float | None = None
+        self._last_s = 0.0
+
+    def trace(self, records: Records) -> None:
+        """Take steps of the controller, [steps]."""
+        if not len(records):
+            return
+        self.steps += len(records)
+        self.missed += int(records["gap_blocks"].sum())
+        not_armed = records["reason"] == wire.NOT_ARMED
+        self.armed = self.armed or not not_armed.all()
+        v_d_mps, t_s = records["drive_velocity_mps"], records["t_ns"] * 1e-9
+        stands = ~(np.abs(v_d_mps) > STANDSTILL_MPS)
+        self.moved = self.moved or not stands.all()
+        self.drive_velocity_max_mps = max(self.drive_velocity_max_mps, float(v_d_mps.max()))
+        self.loop_delay_s = max(self.loop_delay_s, float(records["loop_delay_s"].max()))
+        slips = records["slips"].astype(np.int64)
+        moved_s = np.maximum.accumulate(np.where(stands, self._moved_s, t_s))
+        self._moved_s = float(moved_s[-1])
+        rose = steps(slips, int(slips[0]) if self._slips is None else self._slips) > 0
+        unseen = rose & (t_s - moved_s > _TURN_S)
+        if unseen.any():
+            self._unseen_s = self._unseen_s if self._unseen else float(t_s[unseen][0])
+            self._unseen += int(np.count_nonzero(unseen))
+        self._slips = int(slips[-1])
+        idle = (records["mode"] == wire.STOPPED) | not_armed
+        for at in np.flatnonzero(steps(idle.view(np.int8), int(self._idle_from_s is not None))):
+            if idle[at]:
+                self._idle_from_s = float(t_s[at])
+            elif self._idle_from_s is not None:
+                self._idle.append((self._idle_from_s, float(t_s[at - 1]) if at else self._last_s))
+                self._idle_from_s = None
+        self._last_s = float(t_s[-1])
+
+    def stops(self, block_s: float, is_last: bool) -> list[tuple[float, float]]:
+        """When an operator had stopped the controller, or the rig was not armed, and until it was in charge again; in s."""
+        found = [(from_s - block_s, last_s + SETTLING_S) for from_s, last_s in self._idle]
+        if self._idle_from_s is not None:
+            until_s = self._last_s + SETTLING_S if is_last else np.inf
+            found.append((self._idle_from_s - block_s, until_s))
+        return found
+
+    def unseen(self) -> str:
+        """A line about slips while the drive position stood; empty without any."""
+        if not self._unseen:
+            return ""
+        return (
+            f"DRIVE_UNSEEN: {counted(self._unseen, 'slip')} while the drive position stood, first at {self._unseen_s:.3f} s: "
+            "is its transducer at the end of its range, or loose?"
+        )

@@ -1,0 +1,186 @@
+"""The rows of a run that wait to be judged, and the windows in which they are.
+
+A log is judged window by window: up to 60 s of blocks, with what came just before and at least 10 s of what comes after. So each
+block is judged once, by the same rules, and a run of an hour needs the memory of one window. A window ends where the drive turns,
+if it does: each stroke is then judged as a whole.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from bridge.wire.messages import Records
+
+Rows = npt.NDArray[Any]
+
+# Blocks that are judged at once. More: the thresholds for slips follow a change of the force less well, and memory grows (0.3 kB
+# a block). Fewer: strokes are cut. With 5000 the shipped scenarios give the same slips; the swing of the pneumatic seal, whose
+# strokes are longer than that, is 2.9 instead of 1.1 N.
+WINDOW_BLOCKS = 60_000
+# Rows after a window that are known when it is judged. Less than 8 s: the part of a phase that its swing leaves out may depend on
+# the end of the run. More: memory.
+AHEAD_S = 10.0
+# Rows before a window that are seen again. Less: a slip (0.1 s) or a ramp of the vibration (0.15 s) that began before is cut.
+BEHIND_S = 2.0
+
+TRACE_ROW = np.dtype(
+    [
+        ("t_ns", "i8"), ("block", "i8"), ("mode", "u1"), ("limit", "u1"), ("state", "u1"),
+        ("drive_velocity_mps", "f8"), ("vibration_velocity_mps", "f8"), ("lateness_ns", "i8"),
+    ]
+)  # fmt: skip
+COMMAND_ROW = np.dtype([("t_ns", "i8"), ("block", "i8"), ("frequency_Hz", "f8"), ("amplitude_m", "f8")])
+APPLIED_ROW = np.dtype(
+    [
+        ("t_ns", "i8"), ("sequence", "i8"), ("amplitude_m", "f8"), ("command_block", "u8"), ("late_ns", "i8"),
+        ("commands", "i8"), ("commands_late", "i8"),
+    ]
+)  # fmt: skip
+
+_LAYOUTS = {"trace": TRACE_ROW, "applied": APPLIED_ROW, "command": COMMAND_ROW}
+
+
+class Blocks(NamedTuple):
+    """Sensor blocks, reduced to what the judge needs of them."""
+
+    sequence: Rows  # int64, [blocks]
+    t_ns: Rows  # int64, [blocks]
+    force_N: Rows  # float32, [blocks, samples]
+    drive_m: Rows  # float64, means of bins, [blocks, bins]
+    slide_m: Rows
+
+    def part(self, rows: Any) -> "Blocks":
+        """Some of the blocks."""
+        return Blocks(*(column[rows] for column in self))
+
+    def copied(self) -> "Blocks":
+        """The same in memory that nothing else holds."""
+        return Blocks(*(column.copy() for column in self))
+
+
+def reduced(sensors: Records, bins: int) -> Blocks:
+    """The blocks of some messages, [blocks]; `bins` divides their samples."""
+    return Blocks(
+        sensors["sequence"].astype(np.int64),
+        sensors["t_ns"].astype(np.int64),
+        np.ascontiguousarray(sensors["drive_force_N"]),
+        means(sensors["drive_position_m"], bins),
+        means(sensors["mass_position_m"], bins),
+    )
+
+
+def means(samples: npt.NDArray[Any], bins: int) -> npt.NDArray[np.float64]:
+    """Means of the bins of blocks, [blocks, bins]."""
+    count = samples.shape[1] // bins
+    whole = np.ascontiguousarray(samples).astype(np.float64)
+    return np.add.reduce(whole.reshape(len(samples), bins, count), axis=2) / count
+
+
+def rows_of(records: Records, layout: np.dtype[Any]) -> Rows:
+    """Some fields of messages, [messages]."""
+    found = np.empty(len(records), layout)
+    for name in layout.names or ():
+        found[name] = records[name]
+    return found
+
+
+class Window(NamedTuple):
+    """Rows with their surroundings; those from `first` to before `end` are to be judged."""
+
+    blocks: Blocks
+    trace: Rows
+    applied: Rows
+    command: Rows
+    first: int
+    end: int
+    begins: int  # row with which the present stroke begins, or what is known of it
+    after_turn: bool  # the drive turned there
+    stroke: int  # its number
+    is_last: bool
+
+    @property
+    def own_ns(self) -> tuple[int, int]:
+        """Times of the rows that are to be judged, and of the first one after."""
+        t_ns = self.blocks.t_ns
+        far = np.iinfo(np.int64)
+        from_ns = int(t_ns[self.first]) if self.first else far.min
+        return from_ns, far.max if self.is_last else int(t_ns[self.end])
+
+
+class Waiting:
+    """Rows that wait for their window."""
+
+    def __init__(self) -> None:
+        self.blocks = 0
+        self._sensors: list[Blocks] = []
+        self._rows: dict[str, list[Rows]] = {name: [np.empty(0, layout)] for name, layout in _LAYOUTS.items()}
+        self._first = self._begins = self._stroke = 0
+        self._after_turn = False
+
+    def sensors(self, blocks: Blocks) -> None:
+        """Blocks that wait."""
+        self._sensors.append(blocks)
+        self.blocks += len(blocks.sequence)
+
+    def others(self, topic: str, records: Records) -> None:
+        """Messages of `trace`, `applied` or `command` that wait."""
+        self._rows[topic].append(rows_of(records, _LAYOUTS[topic]))
+
+    def is_full(self, block_s: float) -> bool:
+        """Whether a window can be judged."""
+        return self.blocks - self._first > WINDOW_BLOCKS + AHEAD_S / block_s
+
+    def window(self, is_last: bool, block_s: float) -> Window:
+        """All rows that wait, at least one block; the end of the window is where it must end, at the latest."""
+        blocks = Blocks(*(np.concatenate(columns) for columns in zip(*self._sensors, strict=True)))
+        rows = {name: np.concatenate(parts) for name, parts in self._rows.items()}
+        return Window(
+            blocks,
+            rows["trace"],
+            rows["applied"],
+            rows["command"],
+            first=self._first,
+            end=self.blocks if is_last else self.blocks - round(AHEAD_S / block_s),
+            begins=self._begins,
+            after_turn=self._after_turn,
+            stroke=self._stroke,
+            is_last=is_last,
+        )
+
+    def judged(self, window: Window, turned: bool, stroke: int, block_s: float) -> None:
+        """Forget the rows that no later window needs.
+
+        Args:
+            window: that was judged.
+            turned: whether the drive turned at its end.
+            stroke: number of the stroke with which the next window begins.
+            block_s: length of a block.
+
+        """
+        keep = max(window.end - round(BEHIND_S / block_s), 0)
+        self._sensors = [window.blocks.part(slice(keep, None)).copied()]
+        keep_ns = int(window.blocks.t_ns[keep])
+        for name, rows in (("trace", window.trace), ("applied", window.applied), ("command", window.command)):
+            self._rows[name] = [rows[rows["t_ns"] >= keep_ns]]
+        self.blocks -= keep
+        self._first = window.end - keep
+        self._begins = self._first if turned else 0
+        self._after_turn, self._stroke = turned, stroke
+
+
+class Moved:
+    """Whether the channels of place moved at all so far: one that is not there shows one number."""
+
+    def __init__(self) -> None:
+        self._ends: dict[str, tuple[float, float]] = {}
+
+    def __call__(self, name: str, place_m: npt.NDArray[np.floating[Any]]) -> bool:
+        """With the places of one more window, [bins]."""
+        known_m = place_m[np.isfinite(place_m)]
+        low_m, high_m = self._ends.get(name, (math.inf, -math.inf))
+        if len(known_m):
+            low_m, high_m = min(low_m, float(known_m.min())), max(high_m, float(known_m.max()))
+        self._ends[name] = low_m, high_m
+        return high_m > low_m

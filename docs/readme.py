@@ -1,0 +1,64 @@
+"""The outputs that README.md shows: `make readme` runs the commands, keeps all that they print, and copies lines of it.
+
+tests/unit/test_docs.py compares README.md with the kept output, tests/system/test_readme.py the kept output with the commands.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
+KEPT = Path(__file__).parent / "start" / "example.txt"
+# In simulated time, so that the same scenario prints the same lines on each computer.
+DEMO = "stickslip run --in-process --scenario paper-c45-c45 --log runs/demo.mcap"
+_EXAMPLE = re.compile(r"^    (stickslip example .*?)(?: +#.*)?$", re.MULTILINE)
+_BLOCK = re.compile(r"(?<=<!-- made by `make readme` -->\n\n).*?(?=\n\n)", re.DOTALL)
+
+
+def commands(readme: str) -> list[str]:
+    """The demo in simulated time, and the commands that the README gives for a diagnosis."""
+    found = _EXAMPLE.search(readme)
+    if found is None:
+        raise ValueError("README.md: must give the command `stickslip example ...`, four blanks before it")
+    return [DEMO, *found[1].split(" && ")]
+
+
+def run(command: str, folder: Path) -> str:
+    """What a command prints on stdout, run in a folder by this Python.
+
+    Raises subprocess.CalledProcessError where it fails.
+    """
+    words = [sys.executable, "-P", "-m", "cockpit", *command.split()[1:]]
+    usual = os.environ | {"COLUMNS": "130"}
+    return subprocess.run(words, cwd=folder, env=usual, stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
+def kept(readme: str) -> str:
+    """The whole output of all commands, each below its command."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "runs").mkdir()
+        return "\n".join(f"$ {one}\n{run(one, Path(folder))}" for one in commands(readme))
+
+
+def block(text: str) -> str:
+    """The lines of the kept output that the README shows: the first of the demo, the answer and the number of the diagnosis."""
+    lines = text.splitlines()
+    demo = lines[lines.index(f"$ {DEMO}") + 1]
+    shown = [demo, *(next(line for line in lines if line.startswith(word)) for word in ("effect:", "candidates"))]
+    return "\n".join(f"    {' '.join(line.split())}" for line in shown)
+
+
+def main() -> None:
+    """Run the commands, and write the kept output and the README's block."""
+    readme = README.read_text(encoding="utf-8")
+    text = kept(readme)
+    KEPT.write_text(text, encoding="utf-8")
+    README.write_text(_BLOCK.sub(lambda _: block(text), readme), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""A computer that stalls: nothing is lost, and no sensor, exciter or gain is blamed for what the stall did."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.log.logfile import RunData, read_run
+from bridge.wire.event_codes import TRIPS, WEAK_REASONS
+from cockpit.run.scenario import load_scenario
+from cockpit.run.simulated.log import run_with_faults
+from controller.trips.stall import MOST_S, SETTLED_S
+from plant.faults.table import FaultTable
+
+FROM_S = 1.0
+
+
+def run(path: Path, seconds: float, *tables: dict[str, Any]) -> RunData:
+    made = load_scenario("from-the-start", [f"duration_s={seconds}"])
+    run_with_faults(made.model_copy(update={"fault": [FaultTable(**table) for table in tables]}), path, {})
+    return read_run(path)
+
+
+def blamed(data: RunData) -> Iterator[tuple[float, str, str]]:
+    """Time [s], code and text of what the controller says of sensors and exciter."""
+    for event in data.events:
+        if event.code in (*TRIPS, *WEAK_REASONS):
+            yield event.t_ns * 1e-9, event.code, event.text
+
+
+@pytest.mark.parametrize("for_s", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("role", ["plant", "controller"])
+def test_a_stall_loses_nothing_and_teaches_nothing(tmp_path: Path, role: str, for_s: float) -> None:
+    """A tenth of a second and less were PIEZO_WEAK, and half a second taught half the gain."""
+    frozen = {"kind": "frozen", "target": role, "from_s": FROM_S, "for_s": for_s}
+    data = run(tmp_path / "run.mcap", FROM_S + for_s + 2.5, frozen)
+    numbers = data.sensors["sequence"].astype(np.int64)
+    assert (np.diff(numbers) == 1).all()
+    assert data.trace["gap_blocks"].sum() == 0
+    assert not {event.code for event in data.events} & {"GAP", "FLOOD", "RIG_LOST", "RESTART"}
+    assert list(blamed(data)) == []
+    t_s = data.trace["t_ns"] * 1e-9
+    before, after = (data.trace["exciter_gain"][t_s > at_s][0] for at_s in (FROM_S - 0.1, FROM_S + for_s + 0.5))
+    assert after == pytest.approx(before, rel=0.01)
+
+
+def test_an_exciter_that_fails_in_a_stall_is_told_once_the_stall_is_over(tmp_path: Path) -> None:
+    frozen = {"kind": "frozen", "target": "plant", "from_s": FROM_S, "for_s": 0.03}
+    dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
+    told = list(blamed(run(tmp_path / "run.mcap", 3.0, frozen, dead)))
+    assert FROM_S + SETTLED_S < told[0][0] < FROM_S + SETTLED_S + 0.5
+    assert "stalled" not in told[0][2]
+
+
+def test_a_computer_that_stalls_all_the_time_is_named_and_delays_a_doubt_by_three_seconds(tmp_path: Path) -> None:
+    stalls = [
+        {"kind": "frozen", "target": "plant", "from_s": at_s, "for_s": 0.03} for at_s in np.arange(FROM_S, 6.0, 0.4)
+    ]
+    dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
+    told = list(blamed(run(tmp_path / "run.mcap", 6.0, *stalls, dead)))
+    assert FROM_S + MOST_S - 0.5 < told[0][0] < FROM_S + MOST_S + 0.5
+    assert "the computer or the link stalled" in told[0][2]

@@ -1,0 +1,115 @@
+"""v_a over v_d at both ends, outside of stalls and the second after them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bridge.log.logfile import RunData, read_run
+from bridge.wire.messages import APPLIED, TRACE
+from bridge.wire.stickslip_pb2 import EXCITE
+from cockpit.judge.described import described
+from cockpit.judge.ratio_watch import MOST_ABOVE_S, RatioVerdict, RatioWatch
+from controller.codes import GAP, LATE, STALE
+from tests.logs import verdict_of
+
+GOLDEN = Path(__file__).parents[2] / "golden"
+CONTROLLER = {"policy": {"enabled_from_s": 0.0, "most_ratio": 2.4}, "limits": {"v_ratio": 1.2}, "block_s": 1e-3}
+BLOCK_S = 1e-3
+
+
+def made(ratio: Any) -> tuple[Any, Any]:
+    """What the rig did, and steps of a controller in EXCITE at 1 mm/s with this v_a / v_d, one a block."""
+    count = len(ratio)
+    trace, applied = TRACE.blank(count).copy(), APPLIED.blank(count).copy()
+    for table in (trace, applied):
+        table["sequence"] = np.arange(count)
+        table["t_ns"] = (np.arange(count) + 1) * 1_000_000
+    trace["mode"], trace["drive_velocity_mps"], trace["velocity_ratio"] = EXCITE, 1e-3, 1.2
+    trace["vibration_velocity_mps"] = 1e-3 * np.asarray(ratio)
+    return applied, trace
+
+
+def watched(applied: Any, trace: Any, step: int = 77) -> RatioVerdict:
+    watch = RatioWatch(described(None, CONTROLLER), BLOCK_S)
+    for begin in range(0, len(trace), step):
+        watch.trace(trace[begin : begin + step])
+        watch.applied(applied[begin : begin + step])
+    return watch.result()
+
+
+def of_run(run: RunData, step: int = 500) -> RatioVerdict:
+    watch = RatioWatch(described(None, run.configuration("controller")), BLOCK_S)
+    for begin in range(0, len(run.trace), step):
+        watch.applied(run.applied[begin : begin + step])
+        watch.trace(run.trace[begin : begin + step])
+    return watch.result()
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in GOLDEN.glob("*.mcap")))
+def test_without_a_stall_it_is_what_the_verdict_says_today(name: str) -> None:
+    run = read_run(GOLDEN / f"{name}.mcap")
+    seen, verdict = of_run(run), verdict_of(run)
+    assert seen.lowest == pytest.approx(verdict.velocity_ratio_min, rel=1e-9)
+    assert seen.highest == pytest.approx(verdict.velocity_ratio_max, rel=1e-9)
+    assert seen.ok
+    assert seen == of_run(run, 61) == of_run(run, 100_000)
+
+
+def stretch(of_s: float, ratio: float) -> Any:
+    values = np.full(6000, 1.2)
+    values[4000 : 4000 + round(of_s / BLOCK_S)] = ratio
+    return values
+
+
+@pytest.mark.parametrize(("of_s", "ok"), [(MOST_ABOVE_S - 0.01, True), (MOST_ABOVE_S + 0.01, False)])
+def test_above_one_and_a_half_set_points_for_long_is_not_ok(of_s: float, ok: bool) -> None:
+    seen = watched(*made(stretch(of_s, 3.18)))
+    assert seen.ok is ok
+    assert seen.highest == pytest.approx(3.18)
+    assert seen.longest_above_s == pytest.approx(of_s, abs=2e-3)
+    assert ("above 1.5 set points" in seen.in_words()) is not ok
+
+
+def test_a_set_point_that_the_controller_raised_is_the_set_point() -> None:
+    applied, trace = made(stretch(1.0, 2.4))
+    trace["velocity_ratio"] = 2.4
+    assert watched(applied, trace).ok
+    trace["velocity_ratio"] = 9.0  # no more than the configuration allows
+    trace["vibration_velocity_mps"] *= 1.6
+    assert not watched(applied, trace).ok
+
+
+def test_below_is_a_warning_with_its_seconds() -> None:
+    seen = watched(*made(stretch(0.5, 1.01)))
+    assert seen.low
+    assert seen.ok
+    assert seen.below_s == pytest.approx(0.5, abs=2e-3)
+
+
+@pytest.mark.parametrize("bit", [GAP, STALE, LATE])
+def test_a_stall_and_the_second_after_it_are_left_out(bit: int) -> None:
+    applied, trace = made(stretch(0.9, 3.18))
+    trace["events"][3999] |= bit
+    seen = watched(applied, trace)
+    assert seen.ok
+    assert seen.highest == pytest.approx(1.2)
+    assert seen.left_out_s == pytest.approx(1.0, abs=5e-3)
+
+
+@pytest.mark.parametrize(("field", "value"), [("late_ns", 40_000_000), ("fallback", 1)])
+def test_a_stall_of_the_rig_counts_as_well(field: str, value: int) -> None:
+    applied, trace = made(stretch(0.9, 3.18))
+    applied[field][3999] = value
+    seen = watched(applied, trace)
+    assert seen.ok
+    assert seen.left_out_s == pytest.approx(1.0, abs=5e-3)
+
+
+def test_a_run_without_vibration_has_nothing_to_say() -> None:
+    applied, trace = made(np.full(100, 1.2))
+    trace["mode"] = 0
+    seen = watched(applied, trace)
+    assert seen.ok
+    assert seen.in_words() == ""

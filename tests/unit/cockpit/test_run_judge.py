@@ -1,0 +1,198 @@
+"""The streaming judge: windows change nothing, stalls and gaps change no status, and what is missing where it decides does."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from bridge.faults import FAULTS
+from bridge.log.logfile import RunData, read_run
+from bridge.wire import stickslip_pb2 as wire
+from cockpit.cli import app
+from cockpit.judge import window
+from cockpit.judge.judged import judge, judge_log
+from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, OK
+from cockpit.judge.verdict_words import data_in_words, headline, in_words
+from cockpit.run.closed_loop import ClosedLoop
+from cockpit.run.in_process import run_onboard
+from cockpit.run.run import run_scenario
+from cockpit.run.scenario import load_scenario
+from tests.logs import Tables, tables_of, verdict_of, write
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """6 s with one turn of the drive; the controller is in charge from 3 s on."""
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    profile = "rig.drive.profile=[[0.0, 0.0005], [3.9, 0.0005], [4.0, -0.0005]]"
+    settings = ["rig.sensors.force_lowest_N=-50.0", "duration_s=6.0", "controller.policy.enabled_from_s=3.0", profile]
+    run_onboard(load_scenario("paper-c45-c45", settings), path, {})
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(log: Path) -> RunData:
+    return read_run(log)
+
+
+def figures(verdict: Any) -> dict[str, Any]:
+    return {name: value for name, value in verdict.as_dict().items() if name not in {"log", "chain"}}
+
+
+def test_windows_change_no_figure(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = judge(log)
+    assert whole.before is not None
+    assert whole.before.slips >= 1
+    monkeypatch.setattr(window, "WINDOW_BLOCKS", 1200)
+    monkeypatch.setattr(window, "AHEAD_S", 1.5)
+    monkeypatch.setattr(window, "BEHIND_S", 1.0)
+    cut = judge(log)
+    assert cut.before is not None
+    assert cut.after is not None
+    assert whole.after is not None
+    for one, other in ((cut.before, whole.before), (cut.after, whole.after)):
+        assert (one.slips, one.seconds) == (other.slips, other.seconds)
+        assert one.vibration_dose_mm2_per_s == pytest.approx(other.vibration_dose_mm2_per_s)
+        assert one.swing_N == pytest.approx(other.swing_N, rel=0.02)
+        assert one.following is not None
+        assert other.following is not None
+        assert tuple(one.following) == pytest.approx(tuple(other.following), rel=0.02)
+    assert (cut.velocity_ratio_min, cut.velocity_ratio_max) == (whole.velocity_ratio_min, whole.velocity_ratio_max)
+
+
+def test_a_run_is_judged_while_it_is_written_as_its_log_is(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    came = run_scenario("belt-axis", ["duration_s=3.0", "controller.policy.enabled_from_s=1.0"], False, True, path)
+    again = judge_log(path, margins=True)
+    assert figures(came.verdict) == figures(again.verdict)
+    assert came.loop == (again.judge.margins() if came.effects else None)
+
+
+def changed(run: RunData, path: Path, change: Any) -> Path:
+    tables = tables_of(run)
+    change(tables)
+    write(path, tables, run, 200)
+    return path
+
+
+def test_dropouts_that_overlap_are_left_out_once(run: RunData, tmp_path: Path) -> None:
+    """Seven fallbacks of 0.1 s, one every 0.2 s, each with its second to settle: they gave negative seconds."""
+
+    def dropouts(tables: Tables) -> None:
+        for k in range(7):
+            tables["applied"]["fallback"][4100 + 200 * k : 4200 + 200 * k] = 1
+
+    after = judge(changed(run, tmp_path / "dropouts.mcap", dropouts)).after
+    assert after is not None
+    # from 4 s to 4.1 s: the last fallback ends at 5.4 s, and its second after the end of the run
+    assert after.seconds == pytest.approx(0.1, abs=2e-3)
+
+
+def gap(first: int, count: int, seen: bool) -> Any:
+    def change(tables: Tables) -> None:
+        tables["sensors"] = np.delete(tables["sensors"], slice(first, first + count))
+        if not seen:
+            tables["trace"]["gap_blocks"][first + count] = count
+            tables["trace"] = np.delete(tables["trace"], slice(first, first + count))
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "control", "data"),
+    [
+        (gap(5000, 5, seen=True), OK, "5 of 6000 blocks missing in the log (the controller had them all)"),
+        (gap(5000, 5, seen=False), OK, "5 of 6000 blocks missing in the log (the controller missed 5)"),
+        (gap(5000, 40, seen=True), NOT_JUDGED, "40 of 6000 blocks missing in the log (the controller had them all)"),
+        (gap(500, 40, seen=True), OK, "40 of 6000 blocks missing in the log (the controller had them all)"),
+    ],
+    ids=["log", "controller", "too-many", "before"],
+)
+def test_missing_blocks_change_the_status_only_where_they_decide(
+    run: RunData, tmp_path: Path, change: Any, control: str, data: str
+) -> None:
+    verdict = judge(changed(run, tmp_path / "gap.mcap", change))
+    assert verdict.control == control
+    assert data_in_words(verdict).startswith(data)
+    assert verdict.exit_status(strict=False) == (0 if control == OK else FAULTS["NOT_JUDGED"].exit_status)
+    assert control == NOT_JUDGED or verdict.exit_status(strict=True) == 1
+
+
+def slip(run: RunData, tables: Tables, block: int) -> None:
+    """The slide jumps ahead of its drive, which goes back, and the force along it falls by 3 N."""
+    stiffness_N_per_m = run.configuration("plant")["rig"]["drive"]["stiffness_N_per_m"]
+    tables["sensors"]["drive_force_N"][block:] += np.float32(3.0)
+    tables["trace"]["drive_force_N"][block:] += np.float32(3.0)
+    tables["sensors"]["mass_position_m"][block:] -= np.float32(3.0 / stiffness_N_per_m)
+
+
+def test_a_slip_with_missing_blocks_in_it_may_be_none(run: RunData, tmp_path: Path) -> None:
+    def fall(tables: Tables) -> None:
+        slip(run, tables, 5000)
+
+    sure = judge(changed(run, tmp_path / "sure.mcap", fall))
+    assert sure.control == NOT_OK, sure.reason
+    assert sure.after is not None
+    assert sure.after.slips == 1
+
+    def both(tables: Tables) -> None:
+        fall(tables)
+        gap(4999, 3, seen=True)(tables)
+
+    unsure = judge(changed(run, tmp_path / "unsure.mcap", both))
+    assert (unsure.control, unsure.unsure_slips) == (NOT_JUDGED, 1)
+    assert "blocks are missing within 1 slip" in headline(unsure)
+
+
+def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path) -> None:
+    def stalled(tables: Tables) -> None:
+        slip(run, tables, 4500)
+        tables["applied"]["fallback"][4300:4700] = 1
+
+    verdict = judge(changed(run, tmp_path / "stalled.mcap", stalled))
+    assert verdict.after is not None
+    assert (verdict.after.slips, verdict.stalled_slips, verdict.control, verdict.reason) == (0, 1, OK, "")
+
+
+def test_equal_warnings_are_one_line_with_a_count(run: RunData) -> None:
+    storm = [wire.Event(source="controller", code="STALE", text=f"for {k} ms") for k in range(100)]
+    injected = wire.Event(source="plant", code="INJECTED", text="a pause")
+    trip = wire.Event(source="controller", code="FROZEN", text="a channel repeats one number")
+    verdict = verdict_of(run._replace(events=[*run.events, *storm, injected, trip]))
+    assert verdict.warnings == ["STALE: for 0 ms (the first of 100)"]
+    assert verdict.injected == ["INJECTED: a pause"]
+    assert verdict.trips == ["FROZEN: a channel repeats one number"]
+    assert (verdict.control, verdict.reason) == (NOT_OK, "FROZEN: a channel repeats one number")
+    words = in_words(verdict, verbose=False)
+    assert [line.partition(" ")[0] for line in words[1:6]] == ["control", "data", "computer", "before", "after"]
+    assert len(words) <= 9
+
+
+def test_log_info_has_the_findings_of_log_check(run: RunData, tmp_path: Path) -> None:
+    def dead(tables: Tables) -> None:
+        tables["sensors"]["base_accel_mps2"][:] = 0.25
+
+    path = changed(run, tmp_path / "dead.mcap", dead)
+    result = CliRunner().invoke(app, ["log", "info", str(path), "--json"])
+    assert "dead" in {finding["kind"] for finding in json.loads(result.stdout)["findings"]}
+    assert "finding  dead" in CliRunner().invoke(app, ["log", "info", str(path)]).stdout
+
+
+def test_a_run_that_a_fault_ends_is_judged_on_its_recorded_part(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here the numbers of the rig run away after 1.5 s."""
+    advance = ClosedLoop.advance
+
+    def runs_away(loop: ClosedLoop, blocks: int, *more: Any) -> Any:
+        return advance(loop, blocks if loop.block < 1000 else blocks // 2, *more)
+
+    monkeypatch.setattr(ClosedLoop, "advance", runs_away)
+    words = ["run", "--in-process", "--scenario", "from-the-start", "--log", str(tmp_path / "run.mcap")]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2
+    assert "control  ok" in result.stderr
+    assert "data     whole: " in result.stderr
