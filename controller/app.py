@@ -263,6 +263,8 @@ class ControllerProcess:
             command = node.block(received.payload, received.arrival_ns, time.perf_counter_ns())
             if command is not None:
                 self._send[COMMAND.name](command.payload)
+                if not self._lockstep:
+                    realtime.let_the_bus_send()
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
                 self._tell_of_block(before)
             return command is not None

@@ -178,6 +178,7 @@ class PlantProcess:
                 self._send_sensors(message.payload)
         else:
             self._send_sensors(sensors)
+        realtime.let_the_bus_send()
         self._send_applied(applied)
         self._tell()
         for code, text in faults.news():

@@ -125,6 +125,14 @@ def _lock_memory() -> bool:
     return ctypes.CDLL(None).mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) == 0
 
 
+def let_the_bus_send() -> None:
+    """Let the thread that sends run now: it has this thread's core and priority, and waits until the loop sleeps otherwise.
+
+    Without it a command takes 410 to 440 us in the median in place of 320 to 350 (docs/method/bridge.md).
+    """
+    os.sched_yield()
+
+
 def may_claim(priority: int = LOOP_PRIORITY) -> bool:
     """Whether this process could get SCHED_FIFO. Tried in a thread that ends at once, so that nothing keeps the priority."""
     granted: list[bool] = []

@@ -10,7 +10,12 @@ phases          the stretches of a run: before the controller, while it takes ov
 slips, strokes  slips and swing of the drive force
 machine_terms   following error, quadrant error at reversals, dose of vibration
 pauses          stalls of the computer, and the commands that were late
-watches         latency, samples that are no numbers, the controller's steps, v_a/v_d
+watches         latency, samples that are no numbers, the controller's steps
+tested          whether a run tests its controller at all
+ratio_watch     v_a/v_d at both ends
+described       the sensors and the axis as the log describes them
+relations       the spring's law; the log against the controller and the exciter
+sensor_watch    whether the sensors can carry a verdict; three witnesses of slips
 margins         the stability margins of the amplitude loop
 stability_map   where a rig sticks and slips, as a picture
 """

@@ -65,6 +65,7 @@ class FollowingSum:
     """How the slide follows the drive in a stretch of a run, gathered piece by piece."""
 
     def __init__(self) -> None:
+        self.moving = 0  # blocks in which the drive moves, whether or not its slide has a position
         self._blocks = 0
         self._squares_m2 = self._peak_m = self._dose_m2_per_s = 0.0
         self._ways = {-1: (0, 0.0, 0.0), 1: (0, 0.0, 0.0)}  # by direction: blocks, mean, squares about the mean
@@ -75,6 +76,7 @@ class FollowingSum:
         """The blocks and reversals whose times count."""
         counted = counts(motion.t_s)
         self._dose_m2_per_s += float(motion.dose_m2_per_s[counted].sum())
+        self.moving += int(np.count_nonzero(counted & (motion.direction != 0)))
         if motion.error_m is None:
             return
         for way, before in self._ways.items():

@@ -55,6 +55,11 @@ class PhaseSum:
         self._whole, self._steady = Swing(), Swing()
         self._following = FollowingSum()
 
+    @property
+    def moving(self) -> int:
+        """Blocks in which the drive moved."""
+        return self._following.moving
+
     def add(self, forces: Forces, motion: Motion | None, without: Stretches) -> None:
         """The part of a window that is in the stretch, but for what lies in the stretches `without`."""
 

@@ -13,9 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.log.in_charge import NO_COMMAND
+from bridge.log.watches.arrays import Longest
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import Records
 from cockpit.judge.described import Described
+from cockpit.judge.setup import SETTLING_S, settled_from_s
+from cockpit.judge.watches import STANDSTILL_MPS
+from cockpit.judge.window import Window
 from controller.codes import GAP, LATE, STALE
 
 Floats = npt.NDArray[np.float64]
@@ -27,13 +30,10 @@ ALARM_RATIO = 1.05
 # fail. Shipped scenarios: at most 0.02 s above. Smaller: a drive that becomes slower by more than a third fails.
 _MOST_SET_POINTS = 1.5
 MOST_ABOVE_S = 0.2
-SETTLING_S = 1.0  # after a stall, and after the controller is enabled
 _RAMP_S = 0.15  # 40 ms of ramp at the default slew, and the measurement's filter behind it
 _STEADY_S, _STEADY_SHARE = 0.1, 0.1  # a drive that changed by less in this time moves evenly
-_STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
 _RAMPED_DOWN = (wire.STALE_INPUT, wire.NOT_FINITE, wire.OPERATOR_STOP)
 _LATE_BLOCKS = 2.0  # that a block leaves late, from which the computer stalled
-_PENDING = 4096  # blocks of what the rig did that wait for their steps at most
 
 
 class RatioVerdict(NamedTuple):
@@ -71,7 +71,7 @@ class RatioVerdict(NamedTuple):
 
 
 class RatioWatch:
-    """Looks at one log, piece by piece, in file order; the memory does not grow with the log.
+    """v_a over v_d, window by window.
 
     Args:
         of: the description in the log, with the set point.
@@ -83,47 +83,30 @@ class RatioWatch:
         self._block_s = block_s
         self._set_point = of.v_ratio if math.isfinite(of.v_ratio) else math.inf
         self._most_ratio = of.most_ratio if math.isfinite(of.most_ratio) else 0.0
-        self._from_s = of.enabled_from_s + (SETTLING_S if of.enabled_from_s > 0.0 else 0.0)
+        self._from_s = settled_from_s(of.enabled_from_s)
         self._back = max(round(_STEADY_S / block_s), 1)
-        self._speeds = np.zeros(0)  # of the last 0.1 s
-        self._since = math.inf  # steps in EXCITE; infinite before a first one that counts
-        self._ends_s = -math.inf  # of the newest stall
-        self._stalls: list[Floats] = []  # times at which the rig stalled, that no step has passed yet
-        self._held: list[Records] = []
+        self._stretch = Longest()
         self._lowest, self._highest = math.inf, 0.0
-        self._judged = self._below = self._above = self._longest = self._now = self._left_out = 0
+        self._judged = self._below = self._above = self._left_out = 0
 
-    def sensors(self, records: Records) -> None:
-        """The ratio is the controller's."""
-
-    def command(self, records: Records) -> None:
-        """The ratio is the controller's."""
-
-    def applied(self, records: Records) -> None:
-        """Take what the rig did, [blocks]."""
-        if len(records):
-            # before its first command a rig is on its own, and did not stall
-            answers = records["command_block"] != np.uint64(NO_COMMAND)
-            stalls = ((records["fallback"] != 0) & answers) | (records["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)
-            if stalls.any():
-                self._stalls.append(records["t_ns"][stalls] * 1e-9)
-
-    def trace(self, records: Records) -> None:
-        """Take steps of the controller, [steps]; judged once a later piece has come, as the rig's stalls may come after them."""
-        if len(records):
-            self._held.append(records)
-            if len(self._held) > 1 and sum(map(len, self._held[:-1])):
-                self._judge(self._held.pop(0))
-
-    def _judge(self, trace: Records) -> None:
-        t_s = trace["t_ns"] * 1e-9
-        speed_mps = np.abs(trace["drive_velocity_mps"])
+    def add(self, window: Window) -> None:
+        """Take the steps of a window; ramp and stalls before them are in the rows before it."""
+        trace, applied = window.trace, window.applied
+        t_s, speed_mps = trace["t_ns"] * 1e-9, np.abs(trace["drive_velocity_mps"])
+        from_ns, until_ns = window.own_ns
+        own = (trace["t_ns"] >= from_ns) & (trace["t_ns"] < until_ns)
+        if not own.any():
+            return
         excited = (trace["mode"] == wire.EXCITE) & ~np.isin(trace["limit"], _RAMPED_DOWN)
-        counts = excited & (self._since_begin(excited) * self._block_s > _RAMP_S) & self._steady(speed_mps)
+        counts = own & excited & (_since_begin(excited) * self._block_s > _RAMP_S) & self._steady(speed_mps)
         counts &= (t_s > self._from_s) & np.isfinite(trace["vibration_velocity_mps"])
-        calm = ~self._after_stall(t_s, (trace["events"] & (GAP | STALE | LATE)) != 0)
-        self._left_out += int(np.count_nonzero(counts & ~calm))
-        counts &= calm
+        # before its first command a rig is on its own, and did not stall
+        answers = applied["command_block"] != np.uint64(NO_COMMAND)
+        stalls = ((applied["fallback"] != 0) & answers) | (applied["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)
+        stalled = (trace["events"] & (GAP | STALE | LATE)) != 0
+        after = self._after_stall(t_s, np.concatenate([applied["t_ns"][stalls] * 1e-9, t_s[stalled]]))
+        self._left_out += int(np.count_nonzero(counts & after))
+        counts &= ~after
         ratio = np.divide(trace["vibration_velocity_mps"], speed_mps, out=np.zeros(len(trace)), where=counts)
         if counts.any():
             self._lowest = min(self._lowest, float(ratio[counts].min()))
@@ -131,58 +114,37 @@ class RatioWatch:
             self._judged += int(np.count_nonzero(counts))
             self._below += int(np.count_nonzero(ratio[counts] < ALARM_RATIO))
         set_point = np.maximum(np.minimum(trace["velocity_ratio"], self._most_ratio), self._set_point)
-        self._count_above(counts & (ratio > _MOST_SET_POINTS * set_point))
-
-    def _since_begin(self, excited: Bools) -> Floats:
-        """Steps since the vibration began, at each step; a vibration that a log begins with has begun before."""
-        index = np.arange(len(excited), dtype=np.float64)
-        last = np.maximum.accumulate(np.where(excited, -math.inf, index))
-        since = np.where(np.isfinite(last), index - last - 1.0, index + self._since)
-        self._since = float(since[-1]) + 1.0 if excited[-1] else 0.0
-        return since
+        above = (counts & (ratio > _MOST_SET_POINTS * set_point))[own]
+        self._above += int(np.count_nonzero(above))
+        self._stretch.add(above)
 
     def _steady(self, speed_mps: Floats) -> Bools:
-        joined = np.concatenate([self._speeds, speed_mps])
-        steady = np.zeros(len(joined), bool)
-        changed_mps = np.abs(joined[self._back :] - joined[: -self._back])
-        steady[self._back :] = (joined[self._back :] > _STANDSTILL_MPS) & (
-            changed_mps < _STEADY_SHARE * joined[self._back :]
-        )
-        self._speeds = joined[-self._back :]
-        return steady[len(joined) - len(speed_mps) :]
+        steady, back = np.zeros(len(speed_mps), bool), self._back
+        now_mps = speed_mps[back:]
+        changed_mps = np.abs(now_mps - speed_mps[: len(now_mps)])
+        steady[back:] = (now_mps > STANDSTILL_MPS) & (changed_mps < _STEADY_SHARE * now_mps)
+        return steady
 
-    def _after_stall(self, t_s: Floats, stalled: Bools) -> Bools:
+    def _after_stall(self, t_s: Floats, stalls_s: Floats) -> Bools:
         """Steps in a stall of either side, or within a second after it."""
-        at_s = np.sort(np.concatenate([[self._ends_s], *self._stalls, t_s[stalled]]))
+        at_s = np.sort(np.append(stalls_s, -math.inf))
         last = np.searchsorted(at_s, t_s + 0.5 * self._block_s, side="right") - 1
-        after = (last >= 0) & (t_s - at_s[np.maximum(last, 0)] <= SETTLING_S)
-        passed = at_s[at_s <= t_s[-1] + 0.5 * self._block_s]
-        self._ends_s = float(passed[-1]) if len(passed) else -math.inf
-        waiting = at_s[len(passed) :][-_PENDING:]
-        self._stalls = [waiting] if len(waiting) else []
-        return after
-
-    def _count_above(self, above: Bools) -> None:
-        self._above += int(np.count_nonzero(above))
-        if not above.any():
-            self._now = 0
-            return
-        index = np.arange(len(above))
-        last = np.maximum.accumulate(np.where(above, -1 - self._now, index))
-        self._longest = max(self._longest, int((index - last)[above].max()))
-        self._now = int(index[-1] - last[-1]) if above[-1] else 0
+        return np.asarray(t_s - at_s[last] <= SETTLING_S)
 
     def result(self) -> RatioVerdict:
         """All of it, at the end of the log."""
-        for trace in self._held:
-            self._judge(trace)
-        self._held = []
         return RatioVerdict(
             lowest=self._lowest if self._judged else 0.0,
             highest=self._highest,
             judged_s=self._judged * self._block_s,
             below_s=self._below * self._block_s,
             above_s=self._above * self._block_s,
-            longest_above_s=self._longest * self._block_s,
+            longest_above_s=self._stretch.longest * self._block_s,
             left_out_s=self._left_out * self._block_s,
         )
+
+
+def _since_begin(excited: Bools) -> Floats:
+    """Steps since the vibration began, at each step; one with which the rows begin has begun before."""
+    index = np.arange(len(excited), dtype=np.float64)
+    return index - np.maximum.accumulate(np.where(excited, -math.inf, index)) - 1.0

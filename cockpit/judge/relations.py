@@ -1,4 +1,4 @@
-"""What the sensors of an axis must have to do with each other: force and spring, the base's acceleration and the command.
+"""What the sensors of an axis must have to do with each other: force and spring, and the log with what its controller saw.
 
 A channel that is swapped with another one, of the wrong sign or scale, or not connected breaks a relation of physics that the
 other channels keep. A relation says nothing where nothing moves enough to stand out from noise.
@@ -10,30 +10,40 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.log.watches.arrays import median
 from cockpit.judge.described import Described
+from cockpit.judge.window import Rows, Window
 
 Floats = npt.NDArray[np.float64]
 
-_WINDOW_S = 0.25  # in which force and spring are compared about their means: drift and zeros of the sensors fall out
-_EPOCH_S = 1.0  # of which each has a result of its own: a channel that fails later is seen
-# Variance of the spring's extension over that of its noise, from which a window counts: noise makes k_d at most 4 % too small.
+# Force and spring are compared about their means in parts of this length: drift and zeros of the sensors fall out. Longer: drift
+# counts; shorter: fewer parts stand out from noise.
+_PART_S = 0.25
+_PARTS = 4  # with a result of their own, 1 s. More: a channel that fails late passes; fewer: the slope is less sure
+# Variance of the spring's extension over that of its noise, from which a part counts. Smaller: noise makes k_d too small, by 4 %
+# at 25; larger: less of a run is compared.
 _EXCITED = 25.0
-_SIGMAS = 5.0  # of the slope by which it is outside
+_SIGMAS = 5.0  # of the slope by which it is outside. Smaller: chance counts; larger: a wrong scale in noise passes
+_EXPLAINED = (
+    0.25  # of the force's variance by a spring of the wrong sign. Smaller: inertia counts; larger: a swap passes
+)
+# Least vibration that is compared, in noise of the accelerometer. Smaller: noise counts; larger: nothing is left of slow feeds.
+_SEEN = 100.0
+# Change of the amplitude from block to block. Larger: ramps count, in which v_a is behind; smaller: few blocks are left.
+_STEADY = 0.02
+# Factor between v_a in the log and in the controller, either way. Smaller: the accelerometer's roll-off, which the controller
+# corrects for, counts; larger: a scale of 0.4 passes. In the bank: 0.97 to 1.1.
 # rms of the slide over that of the base under vibration, and the share of the blocks in which it is more. Smaller: slips under a
 # vibration that is too weak, 5 % of the blocks in the bank, count; larger: a swap in the last fifth of a run passes.
 _LOUDER, _LOUDER_SHARE = 1.3, 0.2
-_SEEN = 3.0  # noise of the accelerometer, from which the base shows a vibration
-_WELL_ABOVE = 100.0  # the same, of what is commanded, below which no statement is made
-_AT_REST = 10.0  # the same, of blocks at rest that count as loud
-_SAME_FORCE = 0.02  # of the force, up to which log and controller have the same; it is equal to the last bit
-_SAME_V_A = 2.2  # factor of v_a, either way; in the bank 0.97 to 1.1, as the accelerometer's roll-off is corrected for
-_OTHER_SHARE = 0.01  # of the blocks, from which the log has another force
-_FEWEST = 200  # blocks with vibration of which v_a is compared
-_RARE = 1e-3  # of the blocks at rest, up to which loud ones are chance
+_SAME_V_A = 2.2
+_SAME_FORCE = 0.02  # of the force, up to which log and controller have the same: equal to the last bit in a sound log
+# Blocks that differ. Larger: a channel that fails late passes; smaller: v_a after ramps counts, 0.014 where a drive inches.
+_OTHER_SHARE = 0.05
 
 
 class Doubt(NamedTuple):
-    """A relation that does not hold."""
+    """A channel that is wrong by itself, or a relation that does not hold."""
 
     code: str
     text: str
@@ -41,167 +51,106 @@ class Doubt(NamedTuple):
 
 
 class SpringRelation:
-    """F = k_d (drive - slide), window by window; the memory does not grow."""
-
-    def __init__(self, of: Described, bin_s: float, noise_m: float) -> None:
-        self._of = of
-        self._least_m2 = max(noise_m, 1e-12) ** 2
-        self._width = max(round(_WINDOW_S / bin_s), 8)
-        self._windows = max(round(_EPOCH_S / bin_s / self._width), 1)
-        self._rest: list[Floats] = [np.empty(0)] * 3
-        self.epochs = 0
-        self._wrong: dict[str, list[tuple[float, float, float]]] = {}  # kind: first time, ratio, and how many
-
-    def add(self, t_s: Floats, force_N: Floats, behind_m: Floats) -> None:
-        """Take bins, [bins] each; behind_m is drive less slide."""
-        t_s, force_N, behind_m = (
-            np.concatenate(both) for both in zip(self._rest, (t_s, force_N, behind_m), strict=True)
-        )
-        size = self._width * self._windows
-        epochs = len(t_s) // size
-        self._rest = [one[epochs * size :] for one in (t_s, force_N, behind_m)]
-        if not epochs:
-            return
-        force_N, behind_m = (
-            one[: epochs * size].reshape(epochs, self._windows, self._width) for one in (force_N, behind_m)
-        )
-        bend_m = np.abs(behind_m[..., 2::4] - 2.0 * behind_m[..., 1:-1:4] + behind_m[..., :-2:4])
-        noise_m2 = (np.median(bend_m, axis=(1, 2)) / 0.6745) ** 2 / 6.0
-        behind_m = behind_m - behind_m.mean(axis=2, keepdims=True)
-        force_N = force_N - force_N.mean(axis=2, keepdims=True)
-        square_m2 = (behind_m**2).mean(axis=2)
-        excited = square_m2 > _EXCITED * np.maximum(noise_m2[:, None], self._least_m2)
-        ee, ff, fe = (
-            (excited * (a * b).sum(axis=2)).sum(axis=1)
-            for a, b in ((behind_m, behind_m), (force_N, force_N), (force_N, behind_m))
-        )
-        count = excited.sum(axis=1) * self._width
-        for at in np.flatnonzero(count):
-            slope = float(fe[at] / ee[at])
-            left_N2 = max(float(ff[at] - fe[at] ** 2 / ee[at]), 0.0)
-            sigma = math.sqrt(left_N2 / float(count[at]) / float(ee[at]))
-            explained = 1.0 - left_N2 / max(float(ff[at]), 1e-30)
-            self._judge(float(t_s[at * size]), slope, sigma, explained)
-
-    def _judge(self, from_s: float, slope: float, sigma: float, explained: float) -> None:
-        of, self.epochs = self._of, self.epochs + 1
-        ratio = slope / of.stiffness_N_per_m
-        spread = sigma / of.stiffness_N_per_m
-        kind = ""
-        if not math.isfinite(ratio):
-            return
-        if ratio + _SIGMAS * spread < 0.0 and explained > 0.25:
-            kind = "sign"
-        elif ratio + _SIGMAS * spread < 1.0 / of.off:
-            kind = "small"
-        elif ratio - _SIGMAS * spread > of.off:
-            kind = "large"
-        if kind:
-            found = self._wrong.setdefault(kind, [(from_s, 0.0, 0.0)])
-            first_s, total, times = found[0]
-            found[0] = (first_s, total + ratio, times + 1.0)
-
-    def doubts(self) -> list[Doubt]:
-        """What does not hold."""
-        found: list[Doubt] = []
-        for kind, ((from_s, total, times),) in self._wrong.items():
-            ratio, k_d = total / times, self._of.stiffness_N_per_m
-            what = (
-                f"the drive force changes by {ratio * k_d:.3g} N per m of drive less slide, the spring has {k_d:.3g} N/m "
-                f"(in {times:.0f} of {self.epochs} s with motion, first at {from_s:.1f} s)"
-            )
-            if kind == "sign":
-                text = f"{what}: the force has the wrong sign, or both positions are swapped"
-                found.append(Doubt("SENSOR_SWAPPED", text, True))
-            else:
-                text = f"{what}: the force or a position is of another scale, another signal, or not connected"
-                found.append(Doubt("SENSOR_SCALE", text, True))
-        return found
-
-
-class ShakenRelation:
-    """The base shakes as it is commanded, more than the slide, and is silent otherwise; [blocks]."""
+    """F = k_d (drive - slide), in parts of a quarter of a second."""
 
     def __init__(self, of: Described) -> None:
         self._of = of
-        self.shaken = 0  # blocks
-        self._seen = self._faint = self._louder = 0
-        self._rest = self._loud = 0
+        self.compared = 0  # seconds with motion
+        self._wrong: list[tuple[float, float]] = []  # time and ratio, of the first second and of as many as were wrong
 
-    def add(
-        self, base_mps2: Floats, slide_mps2: Floats, commanded_mps2: Floats, rests: npt.NDArray[np.bool_]
-    ) -> npt.NDArray[np.bool_]:
-        """Take blocks; returns in which of them a vibration stands well out of the noise.
+    def add(self, t_s: Floats, force_N: Floats, behind_m: Floats, bin_s: float) -> None:
+        """Take the bins of a window, [bins]; behind_m is drive less slide."""
+        width = max(round(_PART_S / bin_s), 8)
+        seconds = len(t_s) // (width * _PARTS)
+        parts = (one[: seconds * _PARTS * width].reshape(seconds, _PARTS, width) for one in (force_N, behind_m))
+        force_N, behind_m = (one - one.mean(axis=2, keepdims=True) for one in parts)
+        for at, (force, behind) in enumerate(zip(force_N, behind_m, strict=True)):
+            noise_m = median(np.abs(np.diff(behind, 2)).ravel()) / 0.6745 / math.sqrt(6.0)
+            excited = (behind**2).mean(axis=1) > _EXCITED * max(noise_m, 1e-12) ** 2
+            if excited.any():
+                self._compare(float(t_s[at * _PARTS * width]), force[excited].ravel(), behind[excited].ravel())
 
-        Args:
-            base_mps2, slide_mps2: rms about the mean of each block.
-            commanded_mps2: rms of what the amplitude in force would give, 0 where it changed or rests.
-            rests: blocks since whose vibration 0.1 s have passed.
-
-        """
-        noise = float(np.nan_to_num(self._of.noise["base_accel_mps2"]))
-        shaken = commanded_mps2 > max(_WELL_ABOVE * noise, 0.0)
-        self.shaken += int(np.count_nonzero(shaken))
-        self._faint += int(np.count_nonzero(shaken & (base_mps2 < _SEEN * noise)))
-        self._louder += int(np.count_nonzero(shaken & (slide_mps2 > _LOUDER * base_mps2)))
-        self._rest += int(np.count_nonzero(rests))
-        loud = rests & (base_mps2 > _AT_REST * max(noise, 1e-12)) & (base_mps2 > _LOUDER * slide_mps2)
-        self._loud += int(np.count_nonzero(loud)) if noise > 0.0 else 0
-        return shaken
+    def _compare(self, at_s: float, force_N: Floats, behind_m: Floats) -> None:
+        slope = float(force_N @ behind_m / (behind_m @ behind_m))
+        left_N2 = float(np.square(force_N - slope * behind_m).sum())
+        spread = _SIGMAS * math.sqrt(left_N2 / len(force_N) / float(behind_m @ behind_m)) / self._of.stiffness_N_per_m
+        ratio = slope / self._of.stiffness_N_per_m
+        if not math.isfinite(ratio):
+            return
+        self.compared += 1
+        opposite = ratio + spread < 0.0 and left_N2 < (1.0 - _EXPLAINED) * float(force_N @ force_N)
+        if opposite or 0.0 < ratio + spread < 1.0 / self._of.off or ratio - spread > self._of.off:
+            self._wrong.append((at_s, ratio))
 
     def doubts(self) -> list[Doubt]:
         """What does not hold."""
-        found: list[Doubt] = []
-        if self.shaken and self._faint > 0.5 * self.shaken:
-            text = (
-                f"the base accelerometer shows noise alone in {self._faint} of {self.shaken} blocks with vibration: it is not "
-                "connected, or the exciter is off"
-            )
-            found.append(Doubt("SENSOR_ABSENT", text, True))
-        elif self.shaken and self._louder > _LOUDER_SHARE * self.shaken:
-            text = (
-                f"the slide shakes more than the base in {self._louder} of {self.shaken} blocks with vibration: both "
-                "accelerometers are swapped, or the base's is another signal"
-            )
-            found.append(Doubt("SENSOR_SWAPPED", text, True))
-        if self._loud > max(_RARE * self._rest, 3.0) and not self._of.base_yields:
-            text = (
-                f"the base accelerometer shows motion in {self._loud} of {self._rest} blocks without vibration, more than the "
-                "slide's: both are swapped, or it is another signal"
-            )
-            found.append(Doubt("SENSOR_SWAPPED", text, True))
-        return found
+        if not self._wrong:
+            return []
+        (from_s, ratio), k_d = self._wrong[0], self._of.stiffness_N_per_m
+        text = (
+            f"the drive force changes by {ratio * k_d:.3g} N per m of drive less slide, the spring has {k_d:.3g} N/m "
+            f"(in {len(self._wrong)} of {self.compared} s with motion, first at {from_s:.1f} s): the force or a position has "
+            "another sign or scale, is another signal, or not connected"
+        )
+        return [Doubt("SENSOR_SCALE" if ratio > 0.0 else "SENSOR_SWAPPED", text, True)]
 
 
 class SameRelation:
-    """The log holds the force and the base's vibration with which the controller worked; [blocks]."""
+    """The log holds the force and the base's vibration with which the controller worked, and the base vibrates, not the slide."""
 
     def __init__(self, of: Described) -> None:
         self._of = of
-        self._blocks = self._other = self._looks = self._other_looks = 0
-        self._ratio = 1.0
+        self.vibrated = False
+        self._forces = self._other_forces = self._v_a = self._other_v_a = self._vibrating = self._louder = 0
 
-    def add(self, force_N: Floats, seen_N: Floats, v_a_mps: Floats, seen_mps: Floats) -> None:
-        """Take means of the force, v_a by the base's rms, and what the controller saw of both; NaN where it is not known."""
-        off_N, known = np.abs(force_N - seen_N), np.isfinite(force_N) & np.isfinite(seen_N)
-        least_N = float(np.nan_to_num(self._of.noise["drive_force_N"]))
-        self._blocks += int(np.count_nonzero(known))
-        other = off_N > np.maximum(_SAME_FORCE * np.maximum(np.abs(force_N), np.abs(seen_N)), least_N)
-        self._other += int(np.count_nonzero(known & other))
-        both = np.isfinite(v_a_mps) & np.isfinite(seen_mps) & (seen_mps > 0.0)
-        if np.count_nonzero(both) >= _FEWEST:
-            ratio = float(v_a_mps[both].sum() / seen_mps[both].sum())
-            self._looks += 1
-            if not 1.0 / _SAME_V_A < ratio < _SAME_V_A:
-                self._other_looks, self._ratio = self._other_looks + 1, ratio
+    def add(self, window: Window, rows: slice, force_N: Floats) -> None:
+        """Take the rows of a window, with the mean forces of their blocks, [blocks]."""
+        number = window.blocks.sequence[rows]
+        trace, seen = _rows_at(window.trace, "block", number)
+        applied, known = _rows_at(window.applied, "sequence", number)
+        amplitude_m, omega = np.where(known, applied["amplitude_m"], np.nan), 2.0 * math.pi * applied["frequency_Hz"]
+        self.vibrated |= bool((amplitude_m > 0.0).any())
+        least_N = float(np.nan_to_num(self._of.channels["drive_force_N"].noise))
+        seen_N = trace["drive_force_N"]
+        other = np.abs(force_N - seen_N) > np.maximum(
+            _SAME_FORCE * np.maximum(np.abs(force_N), np.abs(seen_N)), least_N
+        )
+        self._forces += int(np.count_nonzero(seen))
+        self._other_forces += int(np.count_nonzero(seen & other))
+        noise_mps2 = float(np.nan_to_num(self._of.channels["base_accel_mps2"].noise))
+        steady = np.abs(np.diff(amplitude_m, prepend=np.nan)) < _STEADY * amplitude_m
+        v_a_mps = trace["vibration_velocity_mps"]
+        vibrating = steady & (omega**2 * amplitude_m > _SEEN * noise_mps2)
+        base_mps2, slide_mps2 = window.blocks.base_mps2[rows], window.blocks.slide_mps2[rows]
+        self._vibrating += int(np.count_nonzero(vibrating))
+        self._louder += int(np.count_nonzero(vibrating & (slide_mps2 > _LOUDER * base_mps2)))
+        both = seen & vibrating & (v_a_mps > 0.0)
+        ratio = math.sqrt(2.0) * base_mps2[both] / (omega[both] * v_a_mps[both])
+        self._v_a += len(ratio)
+        self._other_v_a += int(np.count_nonzero(~((ratio > 1.0 / _SAME_V_A) & (ratio < _SAME_V_A))))
 
     def doubts(self) -> list[Doubt]:
         """What is not the same."""
         found: list[Doubt] = []
-        if self._other > _OTHER_SHARE * self._blocks:
-            text = f"the drive force of {self._other} of {self._blocks} blocks is not the one with which the controller worked"
-            found.append(Doubt("SENSOR_OTHER", text, True))
-        if self._other_looks:
-            text = f"the base accelerometer shows {self._ratio:.3g} times the v_a with which the controller worked"
-            found.append(Doubt("SENSOR_OTHER", text, True))
+        for what, other, blocks in (
+            ("drive force", self._other_forces if self._of.uses_force else 0, self._forces),
+            ("vibration of the base accelerometer", self._other_v_a, self._v_a),
+        ):
+            if other > _OTHER_SHARE * blocks:
+                text = f"the {what} in {other} of {blocks} blocks is not the one with which the controller worked"
+                found.append(Doubt("SENSOR_OTHER", text, True))
+        if self._louder > _LOUDER_SHARE * self._vibrating:
+            text = (
+                f"the slide vibrates more than the base in {self._louder} of {self._vibrating} blocks with vibration: both "
+                "accelerometers are swapped, or the base's is another signal"
+            )
+            found.append(Doubt("SENSOR_SWAPPED", text, True))
         return found
+
+
+def _rows_at(rows: Rows, name: str, number: Rows) -> tuple[Rows, npt.NDArray[np.bool_]]:
+    """The rows with these numbers of blocks, [blocks], and whether there is one; else the row is one of zeros."""
+    rows = np.concatenate([rows, np.zeros(1, rows.dtype)])
+    at = np.minimum(np.searchsorted(rows[name][:-1], number), len(rows) - 1)
+    known = (rows[name][at] == number) & (at < len(rows) - 1)
+    return rows[np.where(known, at, -1)], known

@@ -30,8 +30,9 @@ from cockpit.judge.ratio_watch import RatioWatch
 from cockpit.judge.sensor_watch import SensorVerdict, SensorWatch
 from cockpit.judge.setup import SETTLING_S, Setup, is_known, setup_of
 from cockpit.judge.slips import bins_of, forces_of
+from cockpit.judge.tested import too_little, untested
 from cockpit.judge.verdict import MISSING_SHARE, RunVerdict
-from cockpit.judge.watches import FiniteWatch, LatencyWatch, StepWatch
+from cockpit.judge.watches import FiniteWatch, FrozenWatch, LatencyWatch, StepWatch
 from cockpit.judge.window import Moved, Waiting, reduced
 from diagnosis.features.cycles import Cycles
 
@@ -75,13 +76,13 @@ class RunJudge:
         self._waiting = Waiting()
         self._losses = {name: LossWatch() for name in ("sensors", *_COUNTED)}
         self._latency, self._finite, self._steps = LatencyWatch(), FiniteWatch(), StepWatch()
-        self._watches: Sequence[Any] = (self._latency, self._finite, self._steps)
+        self._frozen = FrozenWatch()
+        self._watches: Sequence[Any] = (self._latency, self._finite, self._frozen, self._steps)
         self._motion, self._moved = MotionOf(), Moved()
         self._commands, self._stalls = CommandSum(), StallSum()
         self._margins = _margin_sum() if margins else None
-        self._sensor_watch: SensorWatch | None = None  # made, with the next, once the description is known
+        self._sensor_watch: SensorWatch | None = None  # made, with the next, at the first window
         self._ratio: RatioWatch | None = None
-        self._early: list[tuple[str, Records]] = []  # messages before that
         self._setup: Setup | None = None
         self._bins = 0
         self._first_ns: int | None = None
@@ -107,9 +108,6 @@ class RunJudge:
             take: Callable[[Records], None] | None = getattr(watch, topic, None)
             if take is not None:
                 take(records)
-        self._early.append((topic, records))
-        if self.log.period_ns and is_known(self._headers):
-            self._look_at_sensors(self._known_setup())
         if topic == "sensors":
             self._sensors(records)
         elif topic in ("trace", "applied") or (topic == "command" and self._margins is not None):
@@ -137,20 +135,6 @@ class RunJudge:
             self._setup = setup_of(self._headers, self._path, self.log.period_ns)
         return self._setup
 
-    def _look_at_sensors(self, setup: Setup) -> None:
-        """Give the messages that wait to the watches that need the description; an imported log has none."""
-        if not setup.imported:
-            if self._sensor_watch is None or self._ratio is None:
-                plant = configuration_of(self._headers, "plant", self._path) if "plant" in self._headers else None
-                of = described(plant, configuration_of(self._headers, "controller", self._path))
-                self._sensor_watch, self._ratio = SensorWatch(of, self.log.signals), RatioWatch(of, setup.block_s)
-            for topic, records in self._early:
-                for watch in (self._sensor_watch, self._ratio):
-                    take: Callable[[Records], None] | None = getattr(watch, topic, None)
-                    if take is not None:
-                        take(records)
-        self._early.clear()
-
     def _begin_phases(self, setup: Setup) -> None:
         """The stretches of the run; of an imported log the whole is `before`."""
         began_s = max((self._first_ns or 0) * 1e-9 - setup.block_s, 0.0)  # a log may begin late
@@ -163,6 +147,9 @@ class RunJudge:
             "taking_over": PhaseSum(enabled_s, settled_s),
             "after": PhaseSum(max(settled_s, began_s), np.inf),
         }
+        plant = configuration_of(self._headers, "plant", self._path) if "plant" in self._headers else None
+        of = described(plant, configuration_of(self._headers, "controller", self._path))
+        self._sensor_watch, self._ratio = SensorWatch(of, self.log, self._frozen), RatioWatch(of, setup.block_s)
         if self._stretch_from_s is not None:
             self._phases["stretch"] = PhaseSum(self._stretch_from_s, np.inf)
 
@@ -174,6 +161,9 @@ class RunJudge:
         forces = forces_of(window, setup, self._moved)
         window = window._replace(end=forces.end)
         motion = self._motion(window, setup.block_s) if not setup.imported else None
+        if self._sensor_watch is not None and self._ratio is not None:
+            self._sensor_watch.add(window, forces)
+            self._ratio.add(window)
         for sum_ in (*self._phases.values(), *(self._alone.values() if is_last else ())):
             sum_.to_s = min(sum_.to_s, self._last_ns / 1e9) if is_last else sum_.to_s
         without = self._without(setup, is_last)
@@ -231,7 +221,7 @@ class RunJudge:
         not_watched = self.log.events.not_watched if latency is not None else ""
         faults, told = self._lines(charge, damage, chain, foreign)
         missing = self._phases["after"].missing + self._lost_at_the_end() if "after" in self._phases else 0
-        untested = self._untested(setup, after, in_charge_s)
+        why_untested = untested(setup, self._steps, self._first_ns is not None, self._answered, after, in_charge_s)
         ratio = self._ratio.result() if self._ratio is not None else None
         return RunVerdict(
             log=str(self._path),
@@ -270,8 +260,10 @@ class RunJudge:
                 for event in self.log.events.kept
                 if event.code == "START" and event.text.startswith(realtime.NORMAL)
             ],
-            untested=untested,
-            doubts=self._doubts(after, missing, setup.block_s, chain, damage, all_known) if not setup.imported else [],
+            untested=why_untested,
+            doubts=self._doubts(charge, after, missing, setup.block_s, chain, damage, all_known)
+            if not setup.imported
+            else [],
             imported=setup.imported,
             gain_verified=setup.known_gain or self._gain_seen,
         )
@@ -284,11 +276,12 @@ class RunJudge:
 
     def _sensor_verdict(self, setup: Setup, seconds: float) -> SensorVerdict | None:
         """What the sensors can carry; None for an imported log, and for one without a block."""
-        if self._sensor_watch is None:
-            return None
-        judged = apart((setup.settled_from_s, seconds), self._without(setup, is_last=True))
+        return self.sensors_in(apart((setup.settled_from_s, seconds), self._without(setup, is_last=True)))
+
+    def sensors_in(self, judged: Stretches) -> SensorVerdict | None:
+        """The same, with the slips in these stretches [s] counted, once `result` was called."""
         slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
-        return self._sensor_watch.result(slips_s, judged)
+        return self._sensor_watch.result(slips_s, judged) if self._sensor_watch is not None else None
 
     def _pauses(self) -> Pauses:
         return self._commands.result(sorted(self.log.events.pauses), self._applied_ns)
@@ -357,10 +350,24 @@ class RunJudge:
         return f"CLOCK: t_ns of /sensors {how}, first {first} by {off_ns * 1e-6:g} ms: times are wrong from there"
 
     def _doubts(
-        self, after: Phase | None, missing: int, block_s: float, chain: Chain, damage: Damage, all_known: bool
+        self,
+        charge: InCharge,
+        after: Phase | None,
+        missing: int,
+        block_s: float,
+        chain: Chain,
+        damage: Damage,
+        all_known: bool,
     ) -> list[str]:
         """Why a run cannot be judged although something was tested."""
-        doubts = [line for line in (self._clock(), self._steps.unseen()) if line]
+        doubts = [line for line in (self._clock(), too_little(after, self._phases, block_s)) if line]
+        doubts += [
+            f"no message of /{name} is in the log"
+            for name in ("applied", "command")
+            if not self.log.topics[name].messages
+        ]
+        if charge.controller_until_s is not None:
+            doubts.append(f"no step of the controller is in the log after {charge.controller_until_s:.2f} s")
         if after is not None and missing * block_s > MISSING_SHARE * (after.seconds + missing * block_s):
             share = 100.0 * missing * block_s / (after.seconds + missing * block_s)
             doubts.append(f"{share:.1f} % of the judged blocks are missing, more than {100 * MISSING_SHARE:g} %")
@@ -370,24 +377,3 @@ class RunJudge:
             kinds = [f"{finding.kind}: {finding.text}" for finding in damage_findings(damage, self._path)]
             doubts.append(f"how many blocks are missing is not known; {'; '.join(kinds)}")
         return doubts
-
-    def _untested(self, setup: Setup, after: Phase | None, in_charge_s: float) -> str:
-        """Why nothing was tested, in words; empty where something was. `in_charge_s`: of the controller, its settling too."""
-        if setup.imported:
-            return "measured data of another program: no controller was there to be judged"
-        if self._first_ns is None:
-            return "no block was recorded"
-        if not self._steps.steps:
-            return "no step of a controller was recorded: nothing was tested"
-        if not self._steps.armed:
-            return "the rig was never armed: `stickslip arm`, or `arm = true` in the scenario of a simulated rig"
-        if not self._steps.moved:
-            return "the drive never moved: nothing was tested"
-        if after is not None:
-            return ""
-        if in_charge_s <= 0.0 or not self._answered:
-            return "the controller was not in charge in this run"
-        why = f"too short to judge: it has {SETTLING_S:g} s to settle"
-        if in_charge_s > SETTLING_S:  # the force is no number, or stops and stalls left it no second to settle in
-            why = "but nothing there can be judged"
-        return f"the controller was in charge for {in_charge_s:.2g} s, {why}"

@@ -5,9 +5,12 @@ turns, the force changes its sign as fast as a slip on a stiff axis, so each str
 
 The force falls as well where a soft drive rings, and where the drive stops and the slide comes after it. With the place of the
 slide the two are told apart: a slide that slips is faster than its drive was, as `docs/method/bank.md` has it.
+
+The same rule on drive less slide, the spring's extension, counts the slips by position: a second witness, without the force.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +45,8 @@ class Forces(NamedTuple):
     end: int  # row after the last of the window: where the drive turns, if it does
     turned: bool
     stroke: int  # number of the stroke that begins, or goes on, at `end`
+    by_position_s: Floats  # times of the slips in drive less slide, by the rule of the force
+    least_m: float  # the smallest fall of drive less slide that counts; infinite where a position is not known
 
 
 def bins_of(samples: int, period_ns: float) -> int:
@@ -57,7 +62,9 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
     if not len(usable):
         nothing = np.empty(0)
         none = np.empty(0, np.int64)
-        return Forces(_NONE, np.empty(0, bool), nothing, nothing, none, none, window.end, False, window.stroke)
+        return Forces(
+            _NONE, np.empty(0, bool), nothing, nothing, none, none, window.end, False, window.stroke, nothing, math.inf
+        )
     blocks = blocks.part(usable) if len(usable) < len(finite) else blocks
     force_N = blocks.force_N.astype(np.float64)
     samples, bins = force_N.shape[1], blocks.drive_m.shape[1]
@@ -75,19 +82,25 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
     part[part >= 0] += window.stroke - present
     part = np.concatenate([np.full(begins, -1), part])
     end, turned = _end(window, [int(usable[begins + one.first]) for one in strokes[1:]])
-    from_s, until_s = (time_ns * 1e-9 for time_ns in (window._replace(end=end).own_ns))
+    limits_s, bin_s = [time_ns * 1e-9 for time_ns in window._replace(end=end).own_ns], block_s / bins
     found: list[Cycles] = []
+    by_position_s: list[Floats] = [np.empty(0)]
+    bin_t_s, behind_m = sample_s[:, :: samples // bins].ravel(), drive_m - slide_m
+    least_m = smallest_drop_N(bin_t_s, behind_m) if np.isfinite(behind_m).all() else math.inf
     for stroke in (Stroke(begins + one.first, begins + one.end, one.way) for one in strokes):
         if stroke.end <= first or usable[stroke.first] >= end:
             continue
         rows, inside = slice(stroke.first, stroke.end), slice(stroke.first * bins, stroke.end * bins)
         along_N = stroke.way * force_N[rows]
-        cycles = find_cycles(sample_s[rows].ravel(), along_N.ravel(), drop_N, setup.slowest_fall_s)
-        own = (cycles.breakaway_t_s >= from_s) & (cycles.breakaway_t_s < until_s)
-        t_s = sample_s[rows, :: samples // bins].ravel()
-        force_of_bins_N = along_N.reshape(len(along_N), bins, -1).mean(axis=2).ravel()
-        places = _Stroke(t_s, force_of_bins_N, stroke.way * drive_m[inside], stroke.way * slide_m[inside])
-        found.append(_signed(_slips_among(cycles, own, places, block_s / bins), stroke.way))
+        drive, slide = stroke.way * drive_m[inside], stroke.way * slide_m[inside]
+        means_N = along_N.reshape(len(along_N), bins, -1).mean(axis=2).ravel()
+        t_s = bin_t_s[inside]
+        falls = find_cycles(sample_s[rows].ravel(), along_N.ravel(), drop_N, setup.slowest_fall_s)
+        found.append(_signed(_slips_among(falls, limits_s, _Stroke(t_s, means_N, drive, slide), bin_s), stroke.way))
+        if math.isfinite(least_m):
+            falls = find_cycles(t_s, drive - slide, least_m, setup.slowest_fall_s)
+            places = _Stroke(t_s, drive - slide, drive, slide)
+            by_position_s.append(_slips_among(falls, limits_s, places, bin_s).breakaway_t_s)
     cycles = Cycles(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else _NONE
     mine = slice(first, int(np.searchsorted(usable, end)))
     steps = np.diff(blocks.sequence, prepend=blocks.sequence[:1] - 1) - 1
@@ -102,6 +115,8 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
         end,
         turned,
         window.stroke - present + next(goes_on, present),
+        np.concatenate(by_position_s),
+        least_m,
     )
 
 
@@ -152,8 +167,9 @@ def _signed(cycles: Cycles, way: int) -> Cycles:
     )
 
 
-def _slips_among(falls: Cycles, own: npt.NDArray[np.bool_], stroke: _Stroke, bin_s: float) -> Cycles:
-    """Those of the falls of a stroke that are slips; only `own` ones are looked at, [falls]."""
+def _slips_among(falls: Cycles, limits_s: Sequence[float], stroke: _Stroke, bin_s: float) -> Cycles:
+    """Those of the falls of a stroke that are slips; only the ones from and until the limits are looked at."""
+    own = (falls.breakaway_t_s >= limits_s[0]) & (falls.breakaway_t_s < limits_s[1])
     first = np.searchsorted(stroke.t_s, falls.breakaway_t_s, side="right") - 1
     last = [*first, len(stroke.t_s) - 1][1:]
     slips = np.array(

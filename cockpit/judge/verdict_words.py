@@ -217,6 +217,8 @@ def headline(verdict: RunVerdict) -> str:
         rest += f"; {counted(v.stopped_slips, 'slip')} while it was stopped or not armed"
     if v.after.slips > v.unsure_slips and not v.blind:
         return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge{rest}"
+    if v.control == NOT_OK and v.blind:
+        return f"not ok: {v.reason.partition('; ')[0]}; slips cannot be judged: {v.blind[0]}{rest}"
     if v.control == NOT_JUDGED:
         return f"not judged: {v.reason.partition('; ')[0]}{rest}"
     if v.control == NOT_OK and not rest:  # what is good above the line must not hide why the run is not

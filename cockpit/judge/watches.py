@@ -3,12 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from bridge.log.watches.arrays import steps
+from bridge.log.watches.arrays import Longest, steps
 from bridge.log.watches.histogram import Histogram
 from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import Records
+from bridge.wire.messages import CHANNELS, Records
 from cockpit.judge.setup import SETTLING_S
 
 STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
@@ -76,6 +77,25 @@ class FiniteWatch:
             f"first {first}; left out"
             for name, (blocks, first) in self._found.items()
         ]
+
+
+class FrozenWatch:
+    """Blocks that repeat the one before, sample by sample: a converter that stopped, of which a driver sends the last buffer."""
+
+    def __init__(self) -> None:
+        self.runs = {name: Longest() for name in CHANNELS}  # of such blocks
+        self._last: dict[str, npt.NDArray[np.float32]] = {}
+
+    def sensors(self, records: Records) -> None:
+        """Take sensor blocks, [blocks]."""
+        for name, run in self.runs.items():
+            values = np.concatenate([self._last.get(name, np.full_like(records[name][:1], np.nan)), records[name]])
+            self._last[name] = values[-1:].copy()
+            repeats = values[1:, 0] == values[:-1, 0]
+            at = np.flatnonzero(repeats)
+            # equal samples are a dead channel, not one that repeats
+            repeats[at] = (values[at + 1] == values[at]).all(axis=1) & (values[at] != values[at, :1]).any(axis=1)
+            run.add(repeats)
 
 
 class StepWatch:

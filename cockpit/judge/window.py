@@ -28,14 +28,15 @@ BEHIND_S = 2.0
 TRACE_ROW = np.dtype(
     [
         ("t_ns", "i8"), ("block", "i8"), ("mode", "u1"), ("limit", "u1"), ("state", "u1"),
-        ("drive_velocity_mps", "f8"), ("vibration_velocity_mps", "f8"), ("lateness_ns", "i8"),
+        ("drive_velocity_mps", "f8"), ("vibration_velocity_mps", "f8"), ("lateness_ns", "i8"), ("events", "u4"),
+        ("velocity_ratio", "f8"), ("drive_force_N", "f8"), ("slips", "i8"), ("surges", "i8"),
     ]
 )  # fmt: skip
 COMMAND_ROW = np.dtype([("t_ns", "i8"), ("block", "i8"), ("frequency_Hz", "f8"), ("amplitude_m", "f8")])
 APPLIED_ROW = np.dtype(
     [
         ("t_ns", "i8"), ("sequence", "i8"), ("amplitude_m", "f8"), ("command_block", "u8"), ("late_ns", "i8"),
-        ("commands", "i8"), ("commands_late", "i8"),
+        ("commands", "i8"), ("commands_late", "i8"), ("fallback", "u1"), ("frequency_Hz", "f8"), ("guard_state", "u1"),
     ]
 )  # fmt: skip
 
@@ -50,6 +51,8 @@ class Blocks(NamedTuple):
     force_N: Rows  # float32, [blocks, samples]
     drive_m: Rows  # float64, means of bins, [blocks, bins]
     slide_m: Rows
+    base_mps2: Rows  # float64, rms about the mean of each block, [blocks]
+    slide_mps2: Rows  # the same of the slide's accelerometer
 
     def part(self, rows: Any) -> "Blocks":
         """Some of the blocks."""
@@ -68,6 +71,8 @@ def reduced(sensors: Records, bins: int) -> Blocks:
         np.ascontiguousarray(sensors["drive_force_N"]),
         means(sensors["drive_position_m"], bins),
         means(sensors["mass_position_m"], bins),
+        _rms(sensors["base_accel_mps2"]),
+        _rms(sensors["mass_accel_mps2"]),
     )
 
 
@@ -76,6 +81,14 @@ def means(samples: npt.NDArray[Any], bins: int) -> npt.NDArray[np.float64]:
     count = samples.shape[1] // bins
     whole = np.ascontiguousarray(samples).astype(np.float64)
     return np.add.reduce(whole.reshape(len(samples), bins, count), axis=2) / count
+
+
+def _rms(samples: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Root mean square about the mean of each block, [blocks]."""
+    mean = np.einsum("ij->i", samples) / samples.shape[1]
+    with np.errstate(invalid="ignore"):  # samples that are no numbers
+        square = np.einsum("ij,ij->i", samples, samples) / samples.shape[1] - mean * mean
+    return np.sqrt(np.maximum(square, 0.0)).astype(np.float64)
 
 
 def rows_of(records: Records, layout: np.dtype[Any]) -> Rows:

@@ -5,7 +5,7 @@ limit below has the value that the shipped rigs and 180 drawn axes keep to. Faul
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -14,25 +14,34 @@ from plant.config import RigConfig
 from plant.drive_motion import Motion, lowest_mps, reach_m
 from plant.records import build
 
-# What a range is above the largest value that is sure to come, where it is refused: the number to use. The refusal has no margin.
+# A refusal has no margin; the number to use is this many times the largest value that is sure to come. Larger: coarser sensors
+# are advised; smaller: an effect that is not described leaves the range.
 _ROOM = 1.25
-# A fall of the force counts as a slip from ten standard deviations of its means over 1 ms on (`diagnosis.features.cycles`).
-# Shipped: 258 and more, but for the bank's family `blind`, 1.3 to 4.5, in which nothing sees a slip.
+# A fall of the force counts as a slip from ten standard deviations of its means over 1 ms on (`diagnosis.features.cycles`, whose
+# values these are). Shipped: 258 and more, but for the bank's family `blind`, 1.3 to 4.5, in which nothing sees a slip.
 _SIGMAS, _BIN_S = 10.0, 1e-3
-_STEPS_A_DROP = 4.0  # of the force's resolution in F_s - F_c, half of a fall; shipped: 940 and more
-# Steps of the position's resolution in the way of a slip, 2 (F_s - F_c) / k_d: a shorter slip may change no sample. Shipped: 2.3
-# and more, drawn: 1.3. Larger: stiff axes are refused whose force shows every slip.
+# Steps of the force's resolution in F_s - F_c, half of a fall. Larger: coarse sensors that show each slip are refused; smaller: a
+# fall of a step or two, which noise makes too, counts. Shipped: 940 and more.
+_STEPS_A_DROP = 4.0
+# Steps of the position's resolution in the way of a slip, 2 (F_s - F_c) / k_d. Larger: stiff axes are refused whose force shows
+# every slip; smaller: a slip may change no sample. Shipped: 2.3 and more, drawn: 1.3.
 _STEPS_A_SLIP = 1.0
-_SIGMAS_A_SLIP = 2.0  # of the position's means over 1 ms in the same way; shipped: 3.9 and more
-_LONGEST_S = (
-    1.0  # in which the drive's velocity has to stand out from noise: the controller has it to settle; shipped: 0.03
-)
-_FEWEST_SAMPLES = 8.0  # in a period of the slide on its spring; shipped: 60 and more
-# Least steps of the accelerometer's resolution in the amplitude of the slowest feed, and least amplitude over its noise: v_a to
-# 10 % in the 5 ms of its filter. Shipped: 110 steps, 70 times the noise.
+# Noise of the position's means over 1 ms in the same way. Larger: stiff axes are refused, as above; smaller: noise outruns slips.
+# Shipped: 3.9 and more.
+_SIGMAS_A_SLIP = 2.0
+# In which the drive's velocity has to stand out from noise: the controller has it to settle. Larger: feeds pass that it cannot
+# follow in time; smaller: slow feeds are refused that it follows. Shipped: 0.03 s.
+_LONGEST_S = 1.0
+# Samples in a period of the slide on its spring. Larger: stiff axes are refused; smaller: ends of slips are cut. Shipped: 60.
+_FEWEST_SAMPLES = 8.0
+# Least steps of the accelerometer's resolution in the amplitude of the slowest feed, and least amplitude over its noise. Larger:
+# slow feeds are refused; smaller: v_a is off by more than 10 % in the 5 ms of its filter. Shipped: 110 steps, 70 times the noise.
 _STEPS_AN_AMPLITUDE, _LEAST_OVER_NOISE = 4.0, 2.0
-_SAME_BAND = 1.1  # of the accelerometer's bandwidth over the one that the controller corrects for, either way
-_MOST_OF_NOISE = 2.0  # of smooth noise over its rms: its largest value, sqrt(3) / sqrt(26/35)
+# The accelerometer's bandwidth over the one that the controller corrects for, either way. Larger: v_a is off by as much; smaller:
+# a bandwidth that was rounded is refused.
+_SAME_BAND = 1.1
+_MOST_OF_NOISE = 2.0  # of smooth noise over its rms: its largest value, sqrt(3) / sqrt(26/35), not tuned
+_LAGS = {"second-order": 2.0, "fourth-order": 4.0}  # of a force sensor in a row, by the form of its effect
 
 
 def refuse_out_of_travel(rig: RigConfig, duration_s: float) -> None:
@@ -178,69 +187,59 @@ def _largest_level(p: Any, until_s: float) -> float:
     return level * (1.0 + max(float(p.forward_ratio), float(p.backward_ratio), 0.0))
 
 
+def _refuse(name: str, value: float, why: str, remedy: str) -> NoReturn:
+    raise ValueError(f"rig.{name} = {value:g}: {why}; set it to {remedy}")
+
+
 def _force(rig: RigConfig, needs: _Needs) -> None:
     sensors, sample_s = rig.sensors, rig.solver.block_s / rig.solver.samples_per_block
-    friction = f"contact.static_force_N = {rig.contact.static_force_N:g}"
-    if needs.most_N > sensors.force_range_N:
-        raise ValueError(
-            f"rig.sensors.force_range_N = {sensors.force_range_N:g}: with {friction}, effects and motion included, the drive "
-            f"pulls with {needs.most_N:.4g} N: must be more than that; set it to {_above(_ROOM * needs.most_N):g}"
-        )
-    if needs.least_N > -sensors.force_lowest_N:
-        room_N = _above(_ROOM * needs.least_N)
-        raise ValueError(
-            f"rig.sensors.force_lowest_N = {sensors.force_lowest_N:g}: the drive goes back within the run, and pushes with "
-            f"{needs.least_N:.4g} N, which this sensor shows as {sensors.force_lowest_N:g}; set it to "
-            f"{-max(room_N, sensors.force_range_N):g}"
-        )
+    lowest_N, highest_N = sensors.force_lowest_N, sensors.force_range_N
+    if needs.most_N > highest_N:
+        friction = f"contact.static_force_N = {rig.contact.static_force_N:g}, effects and motion included"
+        why = f"with {friction}, the drive pulls with {needs.most_N:.4g} N: must be more than that"
+        _refuse("sensors.force_range_N", highest_N, why, f"{_above(_ROOM * needs.most_N):g}")
+    if needs.least_N > -lowest_N:
+        why = f"the drive goes back within the run, and pushes with {needs.least_N:.4g} N: must be below that"
+        _refuse("sensors.force_lowest_N", lowest_N, why, f"{-max(_above(_ROOM * needs.least_N), highest_N):g}")
     if needs.drop_N == 0.0:
         return
     if sensors.force_resolution_N > needs.drop_N / _STEPS_A_DROP:
-        raise ValueError(
-            f"rig.sensors.force_resolution_N = {sensors.force_resolution_N:g}: friction falls by {needs.drop_N:.3g} N from rest "
-            f"to sliding, less than {_STEPS_A_DROP:g} steps of it; set it to {_below(needs.drop_N / _STEPS_A_DROP):g} or less"
-        )
+        why = f"friction falls by {needs.drop_N:.3g} N from rest to sliding, less than {_STEPS_A_DROP:g} steps of it"
+        most = f"{_below(needs.drop_N / _STEPS_A_DROP):g} or less"
+        _refuse("sensors.force_resolution_N", sensors.force_resolution_N, why, most)
     step_N = sensors.force_resolution_N / math.sqrt(12.0)
     # a mean over 1 ms has the noise of its samples over the root of their number; a slip falls by twice the drop
     by_fall_N = 2.0 * needs.drop_N / _SIGMAS * math.sqrt(max(_BIN_S / sample_s, 1.0))
     by_stick_N = needs.stiffness_N_per_m * _most_noise_m(needs.stick_s, needs.fastest_mps, sample_s)
     most_N = min(by_fall_N, by_stick_N)
     if math.hypot(sensors.force_noise_N, step_N) > most_N:
-        raise ValueError(
-            f"rig.sensors.force_noise_N = {sensors.force_noise_N:g}: a slip, in which the force falls by "
-            f"{2.0 * needs.drop_N:.3g} N after {needs.stick_s:.2g} s of stick, does not stand out from it; set it to "
-            f"{_below(math.sqrt(max(most_N**2 - step_N**2, 0.0))):g} or less"
+        fall = f"the force falls by {2.0 * needs.drop_N:.3g} N after {needs.stick_s:.2g} s of stick"
+        most = f"{_below(math.sqrt(max(most_N**2 - step_N**2, 0.0))):g} or less"
+        _refuse(
+            "sensors.force_noise_N", sensors.force_noise_N, f"a slip, in which {fall}, does not stand out from it", most
         )
     _band("sensors.force_bandwidth_Hz", sensors.force_bandwidth_Hz, needs.natural_Hz)
-    lag_s, slip_s = _lag_s(rig), 1.0 / (2.0 * math.pi * needs.natural_Hz)
-    if lag_s > slip_s:
-        told_s = float(rig.effects["force-sensor-lag"]["lag_s"])
-        raise ValueError(
-            f"rig.effects.force-sensor-lag.lag_s = {told_s:g}: the slide slips as it swings on its spring, at "
-            f"{needs.natural_Hz:.3g} Hz, and the force is {lag_s:g} s behind; set it to "
-            f"{_below(0.5 * slip_s * told_s / lag_s):g} or less"
+    swings = f"the slide slips as it swings on its spring, at {needs.natural_Hz:.3g} Hz"
+    lag = rig.effects.get("force-sensor-lag", {})
+    one_lag_s, slip_s = float(lag.get("lag_s", 0.0)), 1.0 / (2.0 * math.pi * needs.natural_Hz)
+    lags = _LAGS.get(str(lag.get("form", "")), 1.0)
+    if lags * one_lag_s > slip_s:
+        most, why = (
+            f"{_below(0.5 * slip_s / lags):g} or less",
+            f"{swings}, and the force is {lags * one_lag_s:g} s behind",
         )
+        _refuse("effects.force-sensor-lag.lag_s", one_lag_s, why, most)
     if 1.0 / sample_s < _FEWEST_SAMPLES * needs.natural_Hz:
         least = math.ceil(_FEWEST_SAMPLES * needs.natural_Hz * rig.solver.block_s)
-        raise ValueError(
-            f"rig.solver.samples_per_block = {rig.solver.samples_per_block}: the slide swings at {needs.natural_Hz:.3g} Hz on "
-            f"its spring, of which {1.0 / sample_s:g} samples a second show nothing; set it to {least} or more"
-        )
-
-
-def _lag_s(rig: RigConfig) -> float:
-    lag = rig.effects.get("force-sensor-lag", {})
-    orders = {"first-order": 1.0, "second-order": 2.0, "fourth-order": 4.0}
-    return float(lag.get("lag_s", 0.0)) * orders.get(str(lag.get("form", "")), 1.0)
+        why = f"{swings}, of which {1.0 / sample_s:g} samples a second show nothing"
+        _refuse("solver.samples_per_block", rig.solver.samples_per_block, why, f"{least} or more")
 
 
 def _band(name: str, band_Hz: float, natural_Hz: float) -> None:
     """Raise ValueError for a signal slower than a slip, which swings at the frequency of the slide on its spring."""
     if band_Hz < natural_Hz:
-        raise ValueError(
-            f"rig.{name} = {band_Hz:g}: the slide slips as it swings on its spring, at {natural_Hz:.3g} Hz, which is above what "
-            f"this sensor follows; set it to {_above(2.0 * natural_Hz):g} or more"
-        )
+        why = f"the slide slips as it swings on its spring, at {natural_Hz:.3g} Hz, which is above what this sensor follows"
+        _refuse(name, band_Hz, why, f"{_above(2.0 * natural_Hz):g} or more")
 
 
 def _most_noise_m(in_s: float, speed_mps: float, sample_s: float) -> float:
@@ -253,34 +252,25 @@ def _most_noise_m(in_s: float, speed_mps: float, sample_s: float) -> float:
 
 def _positions(rig: RigConfig, controller: ControllerConfig, needs: _Needs) -> None:
     sensors, sample_s = rig.sensors, rig.solver.block_s / rig.solver.samples_per_block
-    step_m = sensors.position_resolution_m
+    step_m, noise_m = sensors.position_resolution_m, sensors.position_noise_m
     if needs.slip_m > 0.0 and controller.estimator.use_slide_position:
+        slip = f"a slip of the slide, {needs.slip_m * 1e6:.3g} um long,"
         if step_m > needs.slip_m / _STEPS_A_SLIP:
-            raise ValueError(
-                f"rig.sensors.position_resolution_m = {step_m:g}: a slip of the slide is {needs.slip_m * 1e6:.3g} um long, less "
-                f"than a step of it; set it to {_below(needs.slip_m / _STEPS_A_SLIP):g} or less"
-            )
+            most = f"{_below(needs.slip_m / _STEPS_A_SLIP):g} or less"
+            _refuse("sensors.position_resolution_m", step_m, f"{slip} is less than a step of it", most)
         most_m = needs.slip_m / _SIGMAS_A_SLIP * math.sqrt(max(_BIN_S / sample_s, 1.0))
         if not controller.estimator.use_force:  # the position alone shows a stick
             most_m = min(most_m, _most_noise_m(needs.stick_s, needs.fastest_mps, sample_s) / math.sqrt(2.0))
-        if sensors.position_noise_m > most_m:
-            raise ValueError(
-                f"rig.sensors.position_noise_m = {sensors.position_noise_m:g}: a slip of the slide, {needs.slip_m * 1e6:.3g} um "
-                f"long, does not stand out from it; set it to {_below(most_m):g} or less"
-            )
+        if noise_m > most_m:
+            why = f"{slip} does not stand out from it"
+            _refuse("sensors.position_noise_m", noise_m, why, f"{_below(most_m):g} or less")
         _band("sensors.position_bandwidth_Hz", sensors.position_bandwidth_Hz, needs.natural_Hz)
-    most_m = _most_noise_m(_LONGEST_S, needs.slowest_mps, sample_s)
-    if math.hypot(sensors.position_noise_m, step_m / math.sqrt(12.0)) > most_m:
-        coarse = step_m / math.sqrt(12.0) > sensors.position_noise_m
-        name, value, number = (
-            ("position_resolution_m", step_m, most_m * math.sqrt(6.0))
-            if coarse
-            else ("position_noise_m", sensors.position_noise_m, most_m / math.sqrt(2.0))
-        )
-        raise ValueError(
-            f"rig.sensors.{name} = {value:g}: the drive's {needs.slowest_mps * 1e3:.3g} mm/s do not stand out from it within "
-            f"{_LONGEST_S:g} s; set it to {_below(number):g} or less"
-        )
+    most_m, rms_m = _most_noise_m(_LONGEST_S, needs.slowest_mps, sample_s), step_m / math.sqrt(12.0)
+    if math.hypot(noise_m, rms_m) > most_m:
+        why = f"the drive's {needs.slowest_mps * 1e3:.3g} mm/s do not stand out from it within {_LONGEST_S:g} s"
+        if rms_m > noise_m:
+            _refuse("sensors.position_resolution_m", step_m, why, f"{_below(most_m * math.sqrt(6.0)):g} or less")
+        _refuse("sensors.position_noise_m", noise_m, why, f"{_below(most_m / math.sqrt(2.0)):g} or less")
 
 
 def _base(rig: RigConfig, controller: ControllerConfig, needs: _Needs) -> None:
@@ -301,36 +291,28 @@ def _base(rig: RigConfig, controller: ControllerConfig, needs: _Needs) -> None:
 
     most_mps2, frequency_Hz = accel_mps2(needs.fastest_mps)
     slip_mps2 = needs.drop_N / rig.slide.mass_kg
-    for need_mps2, what in ((most_mps2, f"v_a shakes the base at {frequency_Hz:g} Hz with"), (slip_mps2, "a slip has")):
+    for need_mps2, motion in ((most_mps2, f"v_a at {frequency_Hz:g} Hz has"), (slip_mps2, "a slip has")):
         if need_mps2 > sensors.accel_range_mps2:
-            raise ValueError(
-                f"rig.sensors.accel_range_mps2 = {sensors.accel_range_mps2:g}: {what} {need_mps2:.3g} m/s2: must be more than "
-                f"that; set it to {_above(_ROOM * need_mps2):g}"
-            )
-    told_Hz = controller.amplitude.accel_bandwidth_Hz
-    if sensors.accel_bandwidth_Hz < frequency_Hz and not (
-        1.0 / _SAME_BAND <= told_Hz / sensors.accel_bandwidth_Hz <= _SAME_BAND
-    ):
-        raise ValueError(
-            f"rig.sensors.accel_bandwidth_Hz = {sensors.accel_bandwidth_Hz:g}: the base is shaken at {frequency_Hz:g} Hz, above "
-            f"it; set it to {_above(2.0 * frequency_Hz):g}, or controller.amplitude.accel_bandwidth_Hz to "
-            f"{sensors.accel_bandwidth_Hz:g}, which is corrected for"
-        )
+            why = f"{motion} an acceleration of {need_mps2:.3g} m/s2: must be more than that"
+            _refuse("sensors.accel_range_mps2", sensors.accel_range_mps2, why, f"{_above(_ROOM * need_mps2):g}")
+    band_Hz, corrected_Hz = sensors.accel_bandwidth_Hz, controller.amplitude.accel_bandwidth_Hz
+    if band_Hz < frequency_Hz and not 1.0 / _SAME_BAND <= corrected_Hz / band_Hz <= _SAME_BAND:
+        remedy = f"{_above(2.0 * frequency_Hz):g}, or controller.amplitude.accel_bandwidth_Hz to {band_Hz:g}, to correct for it"
+        _refuse("sensors.accel_bandwidth_Hz", band_Hz, f"the base vibrates at {frequency_Hz:g} Hz, above it", remedy)
     if sensors.accel_lowest_Hz > 0.5 * candidates_Hz[0]:
-        raise ValueError(
-            f"rig.sensors.accel_lowest_Hz = {sensors.accel_lowest_Hz:g}: the base is shaken from {candidates_Hz[0]:g} Hz on; set "
-            f"it to {_below(0.1 * float(candidates_Hz[0])):g} or less"
-        )
+        remedy = f"{_below(0.1 * float(candidates_Hz[0])):g} or less"
+        why = f"the base vibrates from {candidates_Hz[0]:g} Hz on"
+        _refuse("sensors.accel_lowest_Hz", sensors.accel_lowest_Hz, why, remedy)
     least_mps2, _ = accel_mps2(needs.slowest_mps)
     for name, most_mps2 in (
         ("accel_resolution_mps2", least_mps2 / _STEPS_AN_AMPLITUDE),
         ("accel_noise_mps2", least_mps2 / _LEAST_OVER_NOISE),
     ):
         if (value := getattr(sensors, name)) > most_mps2:
-            raise ValueError(
-                f"rig.sensors.{name} = {value:g}: at {needs.slowest_mps * 1e3:.3g} mm/s v_a shakes the base with "
-                f"{least_mps2:.3g} m/s2, which does not stand out from it; set it to {_below(most_mps2):g} or less"
+            why = (
+                f"at {needs.slowest_mps * 1e3:.3g} mm/s v_a has {least_mps2:.3g} m/s2, which does not stand out from it"
             )
+            _refuse(f"sensors.{name}", value, why, f"{_below(most_mps2):g} or less")
 
 
 def _above(value: float) -> float:

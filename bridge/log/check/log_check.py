@@ -1,6 +1,5 @@
 """Check of a run log in one pass; the memory does not grow with the log."""
 
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -9,14 +8,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bridge.faults import Fault
+from bridge.log.check.channel import Channel, channel_findings, channels_of
 from bridge.log.check.schema_check import schema_findings
-from bridge.log.check.signal_range import Signal, SignalLook
+from bridge.log.check.signal_range import Signal
 from bridge.log.damage import damage_findings
 from bridge.log.finding import Finding
 from bridge.log.in_charge import ChargeWatch
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, block_period_ns, check_log_file, iter_pieces
-from bridge.log.metadata import configuration_of, is_number, number_of
+from bridge.log.metadata import configuration_of, number_of
 from bridge.log.storage.chain import Chain, chain_findings
 from bridge.log.storage.parts import chain_of_log
 from bridge.log.topic_watch import TopicWatch
@@ -33,16 +33,7 @@ LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the nex
 # passes.
 LATE_SHARE = 0.01
 _MOST_EVENTS = 10  # of one source and code that are listed one by one
-_DEAD_S = 1.0  # a longer stretch of equal values is a dead sensor, as a live one has noise
 _OF_EVERY_BLOCK = {"plant": ("applied",), "controller": ("command", "trace")}  # topics by who sends them
-# the ends of a sensor's range in the rig's configuration; an acceleration's is the same both ways
-_RANGES = {
-    "drive_force_N": ("force_lowest_N", "force_range_N"),
-    "mass_accel_mps2": (None, "accel_range_mps2"),
-    "base_accel_mps2": (None, "accel_range_mps2"),
-    "mass_position_m": ("position_lowest_m", "position_range_m"),
-    "drive_position_m": ("position_lowest_m", "position_range_m"),
-}
 
 
 class LogCheck(NamedTuple):
@@ -74,6 +65,11 @@ class LogWatch:
         self.charge = ChargeWatch()
         self.events = EventWatch()
         self.unknown: dict[str, int] = {}
+
+    @property
+    def sample_s(self) -> float:
+        """Time between two samples."""
+        return self.period_ns / 1e9 / max(self.samples_per_block, 1)
 
     def add(self, topic: str, records: Records, log_time_ns: Integers) -> None:
         """Take messages of a streaming topic, [messages]."""
@@ -110,11 +106,10 @@ class LogWatch:
             findings += watch.findings()
         findings += _of_configurations(reader)
         absent = reader.metadata.get("import", {}).get("missing", "")
+        channels = _channels(reader)
         for name, signal in self.signals.items():
             if self.topics["sensors"].messages and name not in absent:
-                findings += _of_signal(
-                    "/sensors " + name, signal.result(), _sample_s(self), _ends(reader, *_RANGES[name])
-                )
+                findings += channel_findings(name, signal.result(), self.sample_s, channels[name])
         shares = {f"/{name}": late / max(self.topics[name].messages, 1) for name, late in self.late.items()}
         for where, share in shares.items():
             if share > LATE_SHARE:
@@ -145,22 +140,11 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
         return seen.result(reader, chain.result())
 
 
-def _sample_s(seen: LogWatch) -> float:
-    return seen.period_ns / 1e9 / max(seen.samples_per_block, 1)
-
-
-def _ends(reader: LogReader, lowest: str | None, highest: str) -> tuple[float, float]:
-    """The ends of a sensor's range; infinite where the plant does not tell, and at 0, where noise alone clips."""
+def _channels(reader: LogReader) -> dict[str, Channel]:
     try:
-        sensors = configuration_of(reader.metadata, "plant", reader.path)["rig"]["sensors"]
-        high = sensors[highest]
-        low = sensors.get(lowest, 0.0) if lowest else -high
-    except (Fault, KeyError, TypeError, IndexError, AttributeError):
-        return -math.inf, math.inf
-    return (
-        float(low) if is_number(low) and low < 0.0 else -math.inf,
-        float(high) if is_number(high) else math.inf,
-    )
+        return channels_of(configuration_of(reader.metadata, "plant", reader.path))
+    except Fault:
+        return channels_of(None)
 
 
 def _of_configurations(reader: LogReader) -> list[Finding]:
@@ -234,34 +218,3 @@ def _of_absent_topics(reader: LogReader, seen: LogWatch) -> list[Finding]:
         for name in names
         if role in reader.metadata and not seen.topics[name].messages
     ]
-
-
-def _of_signal(where: str, seen: SignalLook, sample_s: float, ends: tuple[float, float]) -> list[Finding]:
-    found: list[Finding] = []
-    if seen.not_finite:
-        at_s = seen.first_not_finite * sample_s
-        text = f"{counted(seen.not_finite, 'sample is', 'samples are')} no finite number, first after {at_s:.3f} s of samples"
-        found.append(Finding("not-finite", where, text, seen.not_finite))
-    if seen.constant:
-        found.append(Finding("dead", where, f"constant at {seen.lowest:g} over the whole log", seen.samples))
-        return found
-    if seen.longest_run * sample_s > _DEAD_S:
-        from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
-        text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s of samples on"
-        found.append(Finding("dead", where, text, seen.longest_run))
-    # a limit that float32 cannot hold exactly is missed by rounding
-    low, high = (end * (1.0 - 1e-6) for end in ends)
-    if seen.clipped_high or seen.clipped_low or seen.highest >= high or seen.lowest <= low:
-        clipped = [f"{counted(seen.clipped_high, 'sample')} at {seen.highest:g}"] if seen.clipped_high else []
-        clipped += [f"{counted(seen.clipped_low, 'sample')} at {seen.lowest:g}"] if seen.clipped_low else []
-        end = ends[1] if seen.highest >= high else ends[0]
-        text = " and ".join(clipped) or f"reaches the end of its range, {end:g}"
-        found.append(
-            Finding(
-                "clipped",
-                where,
-                f"{text}: more was there than the sensor tells",
-                max(seen.clipped_high + seen.clipped_low, 1),
-            )
-        )
-    return found

@@ -1,4 +1,4 @@
-"""Two functions on arrays that numpy has in a form that is slow for what a log needs."""
+"""What a log needs of arrays, and numpy has not, or in a form that is slow."""
 
 from typing import Any
 
@@ -21,3 +21,20 @@ def median(values: npt.NDArray[Any]) -> float:
     low, high = (len(values) - 1) // 2, len(values) // 2
     middle = np.partition(values, (low, high))
     return (float(middle[low]) + float(middle[high])) / 2.0
+
+
+class Longest:
+    """The longest run of true values in pieces of an array."""
+
+    def __init__(self) -> None:
+        self.longest = self._now = 0
+
+    def add(self, true: npt.NDArray[np.bool_]) -> None:
+        """Take the next piece, [rows]."""
+        edges = np.flatnonzero(np.diff(true.view(np.int8), prepend=np.int8(0), append=np.int8(0))).reshape(-1, 2)
+        runs = edges[:, 1] - edges[:, 0]
+        if len(runs) and true[0]:
+            runs[0] += self._now
+        self.longest = max(self.longest, int(runs.max(initial=0)))
+        if len(true):
+            self._now = int(runs[-1]) if true[-1] else 0

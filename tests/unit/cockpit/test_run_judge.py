@@ -27,7 +27,7 @@ from tests.logs import Tables, tables_of, verdict_of, write
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """6 s with one turn of the drive; the controller is in charge from 3 s on."""
     path = tmp_path_factory.mktemp("log") / "run.mcap"
-    profile = "rig.drive.profile=[[0.0, 0.0005], [3.9, 0.0005], [4.0, -0.0005]]"
+    profile = "rig.drive.profile=[[0.0, 0.001], [3.9, 0.001], [4.0, -0.001]]"
     settings = ["rig.sensors.force_lowest_N=-50.0", "duration_s=6.0", "controller.policy.enabled_from_s=3.0", profile]
     run_onboard(load_scenario("paper-c45-c45", settings), path, {})
     return path
@@ -154,7 +154,8 @@ def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path) -> Non
 
     verdict = judge(changed(run, tmp_path / "stalled.mcap", stalled))
     assert verdict.after is not None
-    assert (verdict.after.slips, verdict.stalled_slips, verdict.control, verdict.reason) == (0, 1, OK, "")
+    assert (verdict.after.slips, verdict.stalled_slips, verdict.control) == (0, 1, NOT_JUDGED)
+    assert "a slip came before" in verdict.reason  # the stall and its second leave 0.6 s
 
 
 def test_equal_warnings_are_one_line_with_a_count(run: RunData) -> None:
@@ -196,3 +197,20 @@ def test_a_run_that_a_fault_ends_is_judged_on_its_recorded_part(
     assert result.exit_code == 2
     assert "control  ok" in result.stderr
     assert "data     whole: " in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("profile", "why"),
+    [
+        ("[[0.0, 0.0005], [2.9, 0.0005], [2.95, 0.0]]", "the drive did not move"),
+        ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "a slip came before"),
+    ],
+)
+def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
+    tmp_path: Path, profile: str, why: str
+) -> None:
+    settings = ["duration_s=6.0", "controller.policy.enabled_from_s=3.0", f"rig.drive.profile={profile}"]
+    run_onboard(load_scenario("paper-c45-c45", settings), tmp_path / "run.mcap", {})
+    verdict = judge(tmp_path / "run.mcap")
+    assert verdict.control == NOT_JUDGED
+    assert why in verdict.reason

@@ -1,6 +1,8 @@
 """What a run's sensors say of themselves: sound logs stay without a finding, broken channels are found, three witnesses agree."""
 
 import itertools
+import json
+import math
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -9,17 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridge.log.log_reader import LogReader
-from bridge.log.logfile import RunData, iter_pieces, read_run
-from cockpit.judge.described import described
-from cockpit.judge.sensor_watch import SensorVerdict, SensorWatch
-from tests.logs import cycles_of
+from bridge.log.logfile import RunData, read_run
+from cockpit.judge import judged
+from cockpit.judge.judged import judge_log
+from cockpit.judge.sensor_watch import SensorVerdict
+from tests.logs import verdict_of
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 FORCE, SLIDE_MPS2, BASE_MPS2 = "drive_force_N", "mass_accel_mps2", "base_accel_mps2"
 SLIDE, DRIVE = "mass_position_m", "drive_position_m"
 CHANNELS = {"force": FORCE, "slide accel": SLIDE_MPS2, "base accel": BASE_MPS2, "slide": SLIDE, "drive": DRIVE}
-TOPICS = "applied", "trace"
 
 
 @cache
@@ -27,15 +28,11 @@ def golden(name: str) -> RunData:
     return read_run(GOLDEN / f"{name}.mcap")
 
 
-def watched(run: RunData, step: int = 997) -> SensorVerdict:
-    """What the watch finds in a log that was read, fed in pieces of so many messages."""
-    watch = SensorWatch(described(run.configuration("plant"), run.configuration("controller")))
-    for begin in range(0, len(run.sensors), step):
-        watch.sensors(run.sensors[begin : begin + step])
-        for topic in TOPICS:
-            getattr(watch, topic)(getattr(run, topic)[begin : begin + step])
-    cycles = cycles_of(run)
-    return watch.result(cycles.breakaway_t_s if cycles is not None else None)
+def watched(run: RunData) -> SensorVerdict:
+    """What the judge finds in a log that was read."""
+    found = verdict_of(run).sensors
+    assert found is not None
+    return found
 
 
 def with_channels(run: RunData, change: Callable[[Any], None]) -> RunData:
@@ -53,24 +50,20 @@ def test_a_sound_log_is_without_a_finding(name: str) -> None:
 
 def test_three_witnesses_count_the_same_slips() -> None:
     run = golden("slip-then-control")
-    watch = SensorWatch(described(run.configuration("plant"), run.configuration("controller")))
-    for piece in iter_pieces(LogReader(run.path)):
-        if piece.topic in {"sensors", *TOPICS}:
-            getattr(watch, piece.topic)(piece.records)
-    cycles = cycles_of(run)
-    assert cycles is not None
-    assert cycles.slips > 1
-    watch.result(cycles.breakaway_t_s)
-    assert watch.place_slips is not None
-    place_s, trace_s = watch.place_slips.times.all(), watch.trace_slips.slips.all()
-    assert len(place_s) == cycles.slips
-    assert abs(len(trace_s) - cycles.slips) <= 1
-    assert place_s == pytest.approx(cycles.breakaway_t_s, abs=0.05)
+    judge = judge_log(run.path).judge
+    verdict = judge.sensors_in([(0.0, math.inf)])
+    assert verdict is not None
+    assert verdict.by_force > 1
+    assert verdict.by_position == verdict.by_force
+    assert abs(verdict.by_trace - verdict.surges - verdict.by_force) <= 1
 
 
-def test_pieces_of_any_size_say_the_same() -> None:
+def test_pieces_of_any_size_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     run = golden("slip-then-control")
-    assert watched(run, 61) == watched(run, 100_000)
+    found = watched(run)
+    for rows in (61, 997):
+        monkeypatch.setattr(judged, "_PIECE_ROWS", rows)
+        assert watched(run) == found
 
 
 def stands(name: str) -> Callable[[Any], None]:
@@ -181,11 +174,30 @@ def test_channels_that_do_not_decide_are_named_and_leave_the_verdict() -> None:
     run = with_channels(golden("slip-then-control"), is_zero(FORCE))
     controller = run.configuration("controller")
     controller["estimator"] |= {"use_force": False}
-    of = described(run.configuration("plant"), controller)
-    watch = SensorWatch(of)
-    watch.sensors(run.sensors)
-    assert [(one.code, one.decides) for one in watch.result().findings] == [("SENSOR_ABSENT", False)]
-    foreign = described(None, run.configuration("controller"))
-    watch = SensorWatch(foreign)
-    watch.sensors(with_channels(golden("slip-then-control"), is_zero(SLIDE_MPS2)).sensors)
-    assert [(one.code, one.decides) for one in watch.result().findings] == [("SENSOR_ABSENT", False)]
+    run = run._replace(headers={**run.headers, "controller": {"configuration": json.dumps(controller)}})
+    assert [(one.code, one.decides) for one in watched(run).findings] == [("SENSOR_DEAD", False)]
+    run = with_channels(golden("slip-then-control"), is_zero(SLIDE_MPS2))
+    run = run._replace(headers={name: table for name, table in run.headers.items() if name != "plant"})
+    assert [(one.code, one.decides) for one in watched(run).findings] == [("SENSOR_DEAD", False)]
+
+
+def test_a_force_whose_noise_hides_a_slip_is_not_judged() -> None:
+    def change(sensors: Any) -> None:
+        sensors[FORCE] += 20.0 * np.random.default_rng(1).standard_normal(sensors[FORCE].shape).astype(np.float32)
+
+    found = watched(with_channels(golden("slip-then-control"), change)).findings
+    assert ("SENSOR_NOISE", True) in {(one.code, one.decides) for one in found}
+
+
+def test_accelerometers_that_are_swapped_for_the_controller_too_are_seen() -> None:
+    run = golden("slip-then-control")
+    base_mps2 = run.sensors[BASE_MPS2].copy()
+
+    def swap(sensors: Any) -> None:
+        sensors[BASE_MPS2], sensors[SLIDE_MPS2] = run.sensors[SLIDE_MPS2], base_mps2
+
+    trace = run.trace.copy()  # the controller sees the slide's vibration as v_a
+    at = np.searchsorted(run.sensors["sequence"], trace["block"])
+    trace["vibration_velocity_mps"] *= run.sensors[SLIDE_MPS2][at].std(axis=1) / base_mps2[at].std(axis=1).clip(1e-9)
+    found = watched(with_channels(run._replace(trace=trace), swap)).findings
+    assert any(one.code == "SENSOR_SWAPPED" and "vibrates more than the base" in one.text for one in found)

@@ -1,0 +1,54 @@
+"""Whether a run tests its controller at all: why not, in words."""
+
+from collections.abc import Mapping
+
+from cockpit.judge.phases import Phase, PhaseSum
+from cockpit.judge.setup import SETTLING_S, Setup
+from cockpit.judge.watches import StepWatch
+
+
+def untested(
+    setup: Setup, steps: StepWatch, recorded: bool, answered: bool, after: Phase | None, in_charge_s: float
+) -> str:
+    """Why nothing was tested, in words; empty where something was.
+
+    Args:
+        setup: of the run.
+        steps: of the controller.
+        recorded: whether there is a block.
+        answered: whether a block has a fresh command.
+        after: the stretch in which the controller is judged.
+        in_charge_s: time of the controller, its settling too.
+
+    """
+    if setup.imported:
+        return "measured data of another program: no controller was there to be judged"
+    if not recorded:
+        return "no block was recorded"
+    if not steps.steps:
+        return "no step of a controller was recorded: nothing was tested"
+    if not steps.armed:
+        return "the rig was never armed: `stickslip arm`, or `arm = true` in the scenario of a simulated rig"
+    if not steps.moved:
+        return "the drive never moved: nothing was tested"
+    if after is not None:
+        return ""
+    if in_charge_s <= 0.0 or not answered:
+        return "the controller was not in charge in this run"
+    why = f"too short to judge: it has {SETTLING_S:g} s to settle"
+    if in_charge_s > SETTLING_S:  # the force is no number, or stops and stalls left it no second to settle in
+        why = "but nothing there can be judged"
+    return f"the controller was in charge for {in_charge_s:.2g} s, {why}"
+
+
+def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: float) -> str:
+    """Why the motion with the controller in charge shows nothing; empty where a slip would have come in it."""
+    if after is None:
+        return ""
+    moving_s, before = phases["after"].moving * block_s, phases["before"]
+    if not moving_s:
+        return f"the drive did not move in the {after.seconds:.2g} s with the controller in charge"
+    if before.slips and moving_s < (period_s := before.moving * block_s / before.slips):
+        line = f"the drive moved for {moving_s:.2g} s with the controller in charge"
+        return f"{line}: must be {period_s:.2g} s at least, in which a slip came before"
+    return ""
