@@ -71,6 +71,7 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly  # 6 s of CPU
 def test_a_form_that_leads_nowhere_is_left_early():
     fitter = fitter_of(*prepared("short", {"drive-damping": {"damping_Ns_per_m": 12.0}}))
     described = np.zeros(len(fitter.nuisances))

@@ -38,7 +38,9 @@ def test_a_clean_rig_leaves_its_noise(clean):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", LIT)
+@pytest.mark.parametrize(  # tests/unit/diagnosis/relations has the relations of the others
+    "effect", [pytest.param(one, marks=[pytest.mark.nightly] * (place > 1)) for place, one in enumerate(LIT)]
+)
 def test_an_effect_lights_its_relation(effect, clean):
     numbers, name, variable = LIT[effect]
     evidence, runs = prepared("ladder", {effect: numbers})
