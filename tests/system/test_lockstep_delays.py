@@ -23,7 +23,7 @@ SETTINGS = (
 
 
 @pytest.mark.slow
-@pytest.mark.nightly  # 14 s of CPU; tests/unit/plant/test_loop_delay.py has the delays, tests/determinism/test_contract.py the bus
+@pytest.mark.nightly  # 14 s of CPU; tests/unit/plant/test_loop_delay.py and tests/determinism/test_contract.py have the parts
 def test_over_the_bus_as_in_one_process(tmp_path: Path) -> None:
     told = [part for setting in SETTINGS for part in ("--set", setting)]
     for way in (["--lockstep", "--endpoint", free_endpoint()], ["--in-process"]):
