@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.log.watches.arrays import median
+from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.described import Described
 from cockpit.judge.window import Rows, Window
 
@@ -124,7 +125,8 @@ class SameRelation:
         base_mps2, slide_mps2 = window.blocks.base_mps2[rows], window.blocks.slide_mps2[rows]
         self._vibrating += int(np.count_nonzero(vibrating))
         self._louder += int(np.count_nonzero(vibrating & (slide_mps2 > _LOUDER * base_mps2)))
-        both = seen & vibrating & (v_a_mps > 0.0)
+        # while the rig checks its loop the controller does not follow the vibration
+        both = seen & vibrating & (v_a_mps > 0.0) & (trace["mode"] == wire.EXCITE)
         ratio = math.sqrt(2.0) * base_mps2[both] / (omega[both] * v_a_mps[both])
         self._v_a += len(ratio)
         self._other_v_a += int(np.count_nonzero(~((ratio > 1.0 / _SAME_V_A) & (ratio < _SAME_V_A))))

@@ -35,7 +35,7 @@ def made(ratio: Any) -> tuple[Any, Any]:
 def watched(applied: Any, trace: Any, per_window: int = 2500) -> RatioVerdict:
     """In windows of so many blocks, each with what came before and comes after."""
     watch, count = RatioWatch(described(None, CONTROLLER), BLOCK_S), len(trace)
-    blocks = Blocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 4))
+    blocks = Blocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 5))
     rows = rows_of(trace, TRACE_ROW), rows_of(applied, APPLIED_ROW), np.empty(0, COMMAND_ROW)
     for first in range(0, count, per_window):
         end = min(first + per_window, count)
