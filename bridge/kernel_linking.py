@@ -139,7 +139,7 @@ class SharedKernel(_CPUDispatcher):
 
 
 def _called_by(function: Any) -> set[object]:
-    """A kernel's function, and those of all kernels that it calls, and they, and so on; found by their names."""
+    """The functions of a kernel and of all kernels below it in the call tree; found by their names."""
     found, ahead = set[object](), [function]
     while ahead:
         one = ahead.pop()

@@ -24,8 +24,8 @@ from controller.records import LAYOUT_ID, STATE, build
 from controller.replay_steps import NO_ROW, Difference, StepComparer, Stretch
 
 # Steps that a message may come late in the log, 10 s of blocks of 1 ms. What is not there by then counts as lost. Larger: a log
-# that lacks messages needs more memory, 0.8 MB a second. Smaller: a log whose recorder was told of a block by its controller
-# more than this before its rig told it is read twice, the second time in whole.
+# that lacks messages needs more memory. Smaller: a log in which a step stands further from its block is read a second time, in
+# whole. The value was not swept.
 WINDOW: Final = 10_000
 _DEFAULT_SAMPLES = 20
 

@@ -38,8 +38,8 @@ _ANYWAY_BYTES = 1 << 24
 _FOOTER_BYTES = 20
 # of chunks that are taken apart at once; with less the calls cost more than the work, as a chunk of 0.1 s holds 0.1 MB
 AT_ONCE_BYTES = 1 << 19
-# Groups that the second thread works on, ahead of the caller. With 1 it waits while the caller takes a group in; more cost
-# 2 MB each and save no time.
+# Groups that the second thread works on, ahead of the caller. With 1 it waits while the caller takes a group in; more hold
+# more memory. The value was not swept.
 _GROUPS_AHEAD = 2
 _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 _MOST_NAMES = 3  # of the schemas of another program's file that are told

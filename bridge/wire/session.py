@@ -23,7 +23,7 @@ from bridge.wire.bus_config import BusConfig, is_loopback
 # lost 129 to 877 blocks in eight of ten runs with stops of 5 to 100 ms, 1.5 s none with 500 ms. Longer: a frozen controller is
 # replaced later, and 2 s are the most (docs/method/bridge.md).
 LEASE_S = 1.5
-# Nobody is late in lockstep, and no message may be lost: Zenoh's default.
+# In lockstep no process has a deadline and no message may be lost, so the lease is Zenoh's default.
 _LOCKSTEP_LEASE_S = 10.0
 DIAL_S = 2.0  # largest duration of one attempt; longer delays a stop, as Zenoh cannot be stopped while it dials
 # Bytes of a message that a session puts together from its parts; Zenoh drops a longer one. It is that of the longest message that

@@ -9,7 +9,7 @@ from bridge.kernel import Record, kernel
 from controller.codes import LATE, STALE
 from controller.trips.age import MARGIN_NS
 
-# Without a stall until v_a is compared with the command again. After a stop of 0.5 s the rig has its vibration back within 0.3 s.
+# Time without a stall until v_a is compared with the command again. The value is that of the issue and was not swept.
 # Shorter than that: PIEZO_WEAK of a sound piezo. Longer: a fault that begins with the stall is told later.
 SETTLED_S = 1.0
 # Longest time without a comparison. Shorter: three stalls in a row end in a false doubt. Longer: a link that stays late, or a
