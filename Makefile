@@ -94,22 +94,29 @@ blind: $(READY) ## hours; what has a result is not done again: make blind CASES=
 real: $(READY) ## some minutes; needs the public logs in ../shared/data: make real OUT=runs/real ARGS="--known"
 	@$(BIN)/python -m tests.real --out $(or $(OUT),runs/real) $(ARGS)
 
+# Both installers print each package. An environment that was made for uv has no pip.
+define install
+@if command -v uv > /dev/null; then uv pip install --python $(BIN)/python --no-deps $(1); \
+else $(BIN)/python -m ensurepip > /dev/null && $(BIN)/python -m pip install --disable-pip-version-check --no-compile --no-deps $(1); fi
+endef
+
 # 46 packages: what runs, records, replays and judges
 $(SMALL): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v >= (3, 11) else f"$(PYTHON) is {v[0]}.{v[1]}: stickslip needs Python 3.11 or later; try make PYTHON=python3.11")'
 	@echo "making $(VENV), once: 190 MB to download, 600 MB on disk"
 	@$(PYTHON) -m venv $$(command -v uv > /dev/null && echo --without-pip) $(VENV)
-	@$(BIN)/python .ci/install.py requirements.lock --project
+	$(call install,--require-hashes --requirement requirements.lock)
+	$(call install,--no-build-isolation --editable .)
 	@touch $@
 
-# 95 more: the developers' tools
+# 96 more: the developers' tools
 $(READY): $(SMALL) requirements-dev.lock
 	@echo "adding the developers' tools to $(VENV), once: 600 MB on disk"
-	@$(BIN)/python .ci/install.py requirements-dev.lock
+	$(call install,--require-hashes --requirement requirements-dev.lock)
 	@touch $@
 
 $(VENV)/.ready-nightly: $(READY) requirements-nightly.lock
-	@$(BIN)/python .ci/install.py requirements-nightly.lock
+	$(call install,--require-hashes --requirement requirements-nightly.lock)
 	@touch $@
 
 LOCK = uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet

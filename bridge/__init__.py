@@ -9,5 +9,5 @@ files     checks before reading, atomic writing    units    units in names, numb
 provenance   what made a page or a picture: version, command, date, hashes
 kernel, kernel_cache   compiled code; where it is kept, and what renews it
 kernel_linking   how kernels that call each other are compiled once
-compiling   how many kernels are left to compile, and what a command guards that time with
+compiling   the progress of compilation, and signals during it
 """

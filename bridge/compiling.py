@@ -1,4 +1,4 @@
-"""While kernels are compiled: how many are left, on stderr, and what a command guards that time with."""
+"""While kernels are compiled: the number of kernels left, on stderr, and the guard of a command, which a signal ends at once."""
 
 import sys
 from collections.abc import Callable, Generator
@@ -9,7 +9,7 @@ from bridge.plain import say
 PROGRESS = "compiling kernels, once for this version: "  # and then `12 of 163 left`
 _LINES = 8  # where stderr is no terminal, for all kernels
 _BAR = 20  # characters
-# of a command, which ends at once where a signal comes in here; elsewhere signals act as ever
+# of a command: a signal ends it at once in here; elsewhere signals act as ever
 guard: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
@@ -18,21 +18,19 @@ class Progress:
 
     def __init__(self) -> None:
         self._on_terminal = sys.stderr is not None and sys.stderr.isatty()  # pyright: ignore[reportUnnecessaryComparison]
-        self._shown = ""
-        self._part = -1
+        self._step = -1  # the last one that was shown
 
     def show(self, left: int, total: int) -> None:
         """Show how many kernels are left; with none left the line is over."""
-        part = _LINES * (total - left) // max(total, 1)
+        step = (total if self._on_terminal else _LINES) * (total - left) // max(total, 1)
+        if step == self._step or (not left and self._step < 0):
+            return
+        self._step = step if left else -1
         words = f"{PROGRESS}{left} of {total} left"
         if self._on_terminal:
             bar = "#" * (_BAR * (total - left) // max(total, 1))
-            line = f"\r{words:<70}[{bar:<{_BAR}}]"
-            if line != self._shown and (left or self._shown):
-                self._shown = line if left else ""
-                print(line, end="" if left else "\n", file=sys.stderr, flush=True)
-        elif part != self._part and (left or self._part >= 0):
-            self._part = part if left else -1
+            print(f"\r{words:<70}[{bar:<{_BAR}}]", end="" if left else "\n", file=sys.stderr, flush=True)
+        else:
             say(f"stickslip: {words}")
 
 
@@ -46,7 +44,7 @@ def left_in(line: str) -> tuple[int, int] | None:
 
 
 class _Work:
-    """What this process has to compile now."""
+    """The kernels that this process has to compile now."""
 
     def __init__(self) -> None:
         self.depth = 0
@@ -65,7 +63,7 @@ _work = _Work()
 
 
 def expect(kernels: set[object]) -> None:
-    """Count these as what is to be compiled."""
+    """Count these kernels as not yet compiled."""
     _work.total |= kernels
 
 
@@ -81,7 +79,7 @@ def compiling(module: str = "") -> Generator[str]:
     """Kernels are compiled or loaded in here, which the command guards; the progress is over at the end.
 
     Args:
-        module: whose kernels these are, where that is known; it is given back to whoever comes inside.
+        module: of these kernels, where it is known; a nested call gets it.
 
     """
     _work.depth += 1

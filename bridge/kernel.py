@@ -1,6 +1,7 @@
 """Compilation of hot code: numba, cached on disk, without the flags that change bits."""
 
 import hashlib
+import importlib
 import os
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
@@ -50,6 +51,14 @@ def _written_once(layout: Any, write: Callable[[Any], str] = _layouts.__repr__) 
 
 
 _layouts.__repr__ = _written_once
+
+# When it loads its first kernel, numba imports SciPy's linear algebra, to know whether it could compile a product of matrices:
+# 0.3 s of CPU in every process that controls, simulates or replays. Where it compiles one it asks again.
+_linear_algebra: Any = importlib.import_module("numba.np.linalg")
+_ask: Any = _linear_algebra.ensure_blas
+_linear_algebra.ensure_blas = lambda: None
+importlib.import_module("numba.np.arraymath")
+_linear_algebra.ensure_blas = _ask
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

@@ -39,8 +39,8 @@ _SAID_AGAIN_S = 0.4  # between two answers to one word of an operator, who says 
 _MOST_SAID = 16  # answers to operators a second; a flood of words is obeyed, and answered so often
 _LONGEST_WHO = 200  # letters of a name
 _UNSEEN = "is its transducer at the end of its range, or loose? without v_d nothing is vibrated"
-# Wait for another controller to leave. Shorter: one that is frozen refuses this one, though its lease is about to end. Longer: a
-# second controller is told later that there is one.
+# Wait for another controller to leave. Shorter: a frozen controller refuses this one, though its lease is about to end. Longer: a
+# second controller is refused later.
 _OTHER_GONE_S = LEASE_S + 0.2
 
 
@@ -136,7 +136,7 @@ class ControllerProcess:
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
         self._rig_lost = ""  # why, from when it was told until blocks come again
-        self._paused_s = 0.0  # for which this process stood still, and has not told
+        self._paused_s = 0.0  # for which this process stalled, and has not reported
         self._stale = False  # told, and not yet FRESH
         self._in_time = 0  # blocks in a row without a stale step, of those that FRESH waits for
         self._unreadable = False  # told, and not yet FRESH
@@ -224,13 +224,13 @@ class ControllerProcess:
             due_s = time.monotonic() + (self._block_s if silent else self._stale_after_s)
 
     def _tell_fresh(self) -> None:
-        """Blocks are back once as many came in time as make a silence stale; those that waited meanwhile are late."""
+        """Blocks are back once as many came in time as make a silence stale; those that waited during it are late."""
         if not self._stale:
             return
         self._in_time = 0 if self._node.is_late else self._in_time + 1
         if self._in_time * self._block_s >= self._stale_after_s:
             if self._paused_s:  # now, as the link may have been down before
-                text = f"this controller stalled for {self._paused_s:.2f} s; the rig had no command meanwhile"
+                text = f"this controller stalled for {self._paused_s:.2f} s; the rig had no command during that time"
                 self.event("PAUSED", text)
                 self._paused_s = 0.0
             self.event("FRESH", f"blocks arrive again, {self._in_time} in time")

@@ -21,7 +21,16 @@ from bridge.wire.messages import ANNOUNCE, COMMAND, TRACE, Records, sensor_block
 from controller.codes import BLOCK
 from controller.config import ControllerConfig
 from controller.records import LAYOUT_ID, STATE, build
-from controller.replay_steps import NO_ROW, Difference, StepComparer, Stretch
+from controller.replay_steps import (
+    AGAIN,
+    DIFFERS,
+    GAP,
+    NO_ANNOUNCEMENT,
+    NO_BLOCK,
+    NO_COMMAND,
+    Difference,
+    StepComparer,
+)
 
 # Steps that a message may come late in the log, 10 s of blocks of 1 ms. What is not there by then counts as lost. Larger: a log
 # that lacks messages needs more memory. Smaller: a log in which a step stands further from its block is read a second time, in
@@ -60,6 +69,7 @@ class _Waiting:
     def __init__(self, empty: Records) -> None:
         self._parts = [empty]
         self.passed = -1  # largest sequence that no step will use any more
+        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences without which steps went on
 
     def add(self, records: Records) -> None:
         """Messages in the order of the log."""
@@ -70,12 +80,12 @@ class _Waiting:
         """All that wait; of several with one sequence the first of the log comes first."""
         if len(self._parts) > 1:
             parts = [part for part in self._parts if len(part)]
-            # joined and moved as bytes: numpy would drop the tags between the fields
-            whole = parts[0] if len(parts) == 1 else _joined(parts)
+            dtype = parts[0].dtype
+            raw = f"V{dtype.itemsize}"  # joined and moved as bytes: numpy would drop the tags between the fields
+            whole = parts[0] if len(parts) == 1 else np.concatenate([part.view(raw) for part in parts]).view(dtype)
             sequence = whole["sequence"]
             if not (sequence[1:] > sequence[:-1]).all():
-                order = np.argsort(sequence, kind="stable")
-                whole = whole.view(f"V{whole.dtype.itemsize}")[order].view(whole.dtype)
+                whole = whole.view(raw)[np.argsort(sequence, kind="stable")].view(dtype)
             self._parts = [whole]
         return self._parts[0]
 
@@ -91,21 +101,6 @@ class _Waiting:
         self.forget(int(np.searchsorted(self.records()["sequence"], np.uint64(sequence), "right")))
         self.passed = max(self.passed, sequence)
 
-    def rows(self, sequence: npt.NDArray[np.uint64]) -> npt.NDArray[np.int64]:
-        """The place of each sequence among those that wait, NO_ROW where it is not there."""
-        known = self.records()["sequence"]
-        if len(known) >= len(sequence) and np.array_equal(known[: len(sequence)], sequence):
-            return np.arange(len(sequence))
-        if not len(known):
-            return np.full(len(sequence), NO_ROW)
-        place = np.minimum(np.searchsorted(known, sequence), len(known) - 1)
-        return np.where(known[place] == sequence, place, NO_ROW)
-
-
-def _joined(parts: list[Records]) -> Records:
-    raw = f"V{parts[0].dtype.itemsize}"
-    return np.concatenate([part.view(raw) for part in parts]).view(parts[0].dtype)
-
 
 class Replayer:
     """A replay that takes a log piece by piece, in its order. Methods raise OutOfOrder, but not with `whole`.
@@ -118,29 +113,23 @@ class Replayer:
     """
 
     def __init__(self, changes: list[Change], from_s: float = 0.0, whole: bool = False) -> None:
-        self._changes = [(change.t_ns, build(change.config)[0]) for change in changes]
+        built = [build(change.config) for change in changes]
+        params, from_ns = np.concatenate([one for one, _ in built]), np.array([change.t_ns for change in changes])
         self._from_s, self._from_ns = from_s, round(from_s * 1e9)
         self._whole = whole
-        self._memory = build(changes[0].config)[1]
-        self._comparer = StepComparer(self._memory, from_s)
-        self._trace = _Waiting(TRACE.blank(0))
-        self._command = _Waiting(COMMAND.blank(0))
-        self._sensors = _Waiting(sensor_block(_DEFAULT_SAMPLES).blank(0))
-        self._announce = _Waiting(ANNOUNCE.blank(0))
+        self._memory = built[0][1]
+        self._comparer = StepComparer(params.view(built[0][0].dtype), from_ns, self._memory, from_s)
+        self._trace, self._sensors, self._command, self._announce = (
+            _Waiting(layout.blank(0)) for layout in (TRACE, sensor_block(_DEFAULT_SAMPLES), COMMAND, ANNOUNCE)
+        )
         self._tables = {
-            "trace": self._trace, "command": self._command, "sensors": self._sensors, "announce": self._announce,
+            "trace": self._trace, "sensors": self._sensors, "command": self._command, "announce": self._announce,
         }  # fmt: skip
         self._snapshots: deque[wire.Snapshot] = deque()
         self._before: wire.Snapshot | None = None  # the last one before `from_s`
         self._newest_step = -1  # of a snapshot
         self._phase: Callable[[int], bool] = self._start
-        self._next = 0  # step that follows the memory
         self._lost_from = 0  # step; the memory is that of a snapshot at or after it
-        self._lacking: dict[str, list[npt.NDArray[np.uint64]]] = {
-            "sensors": [],
-            "command": [],
-        }  # steps went on without them
-        self._lacks_announcements = False
         self._compared = self._skipped = 0
         self._newest = 0  # steps of the newest piece, the other topics of which may follow
 
@@ -181,15 +170,15 @@ class Replayer:
     def _in_time(self, topic: str, waiting: _Waiting, records: Records) -> Records:
         """Those that can still be used; one that comes twice is passed over, as the first counts."""
         sequence = records["sequence"]
-        if topic == "announce":
-            known = waiting.records()["sequence"]
-            if self._lacks_announcements or (np.diff(sequence, prepend=known[-1:]).astype(np.int64) <= 0).any():
+        if topic == "announce":  # they are counted
+            steps = np.diff(sequence, prepend=waiting.records()["sequence"][-1:]).astype(np.int64)
+            if waiting.lacked or (steps <= 0).any():
                 raise OutOfOrder
             return records
         late = sequence <= np.uint64(max(waiting.passed, 0))
         if waiting.passed < 0 or not late.any():
             return records
-        if topic == "trace" or any(np.isin(sequence[late], lacking).any() for lacking in self._lacking[topic]):
+        if topic == "trace" or any(np.isin(sequence[late], lacked).any() for lacked in waiting.lacked):
             raise OutOfOrder
         return records.view(f"V{records.dtype.itemsize}")[~late].view(records.dtype)
 
@@ -233,36 +222,35 @@ class Replayer:
         return True
 
     def _run(self, sure: int) -> bool:
-        """Take the steps that follow the memory, up to one that cannot be rebuilt."""
-        trace = self._trace.records()
-        events, gaps, t_ns, announced = (
-            trace[name].astype(np.int64) for name in ("events", "gap_blocks", "t_ns", "announcements")
-        )
-        sequence, block = trace["sequence"], trace["block"]
-        consumes = events & BLOCK != 0
-        rows = np.where(consumes, self._sensors.rows(block), NO_ROW)
-        command_rows = self._command.rows(sequence)
-        self._must_wait(block[consumes & (rows == NO_ROW)], self._sensors)
-        self._must_wait(sequence[command_rows == NO_ROW], self._command)
-        lost = consumes & (rows == NO_ROW)
-        broken = lost.copy()
-        broken[0] |= int(sequence[0]) != self._next
-        broken[1:] |= np.diff(sequence) != 1
-        incomplete = broken | (command_rows == NO_ROW) | (announced > len(self._announce.records()))
-        incomplete[:sure] = broken[:sure]
-        end = int(np.argmax(incomplete)) if incomplete.any() else len(trace)
-        if end and not len(self._sensors.records()) and self._sensors.passed < 0 and not sure:
+        """Take the steps that follow the memory, up to one that cannot be rebuilt, and forget them."""
+        trace, sensors, command, announce = (waiting.records() for waiting in self._tables.values())
+        if not len(sensors) and self._sensors.passed < 0 and not sure:
             return False  # of how many samples a block is, is not known
-        stretch = Stretch(trace, rows, command_rows, events, gaps, t_ns, announced)
-        self._feed(stretch.part(0, end))
-        if end == len(trace) or not broken[end] or end >= sure:
-            return False
-        if lost[end]:
-            self._lacking["sensors"].append(block[end : end + 1].copy())
-            self._sensors.forget_until(int(block[end]))
-        self._lost_from = int(sequence[end])
-        self._phase = self._lost
-        return True
+        known_from = [0, 0] if self._whole else [self._sensors.passed + 1, self._command.passed + 1]
+        taken = self._comparer.take((trace, sensors, command, announce), sure, *known_from)
+        if taken.why == AGAIN:
+            raise OutOfOrder
+        self._compared += taken.compared
+        steps = trace["sequence"][: taken.steps]
+        if taken.lacks & NO_COMMAND:
+            self._command.lacked.append(np.setdiff1d(steps, command["sequence"]))
+        if taken.lacks & NO_ANNOUNCEMENT:
+            self._announce.lacked.append(steps[-1:].copy())
+        if taken.why in {GAP, NO_BLOCK}:
+            self._lost_from = int(trace["sequence"][taken.steps])
+            self._phase = self._lost
+        if taken.steps:
+            step = int(steps[-1])
+            self._sensors.forget(taken.blocks)
+            self._command.forget_until(step)
+            self._trace.forget(taken.steps)
+            while self._snapshots and self._snapshots[0].step <= step:
+                self._snapshots.popleft()
+        if taken.why == NO_BLOCK:
+            block = trace["block"][taken.steps : taken.steps + 1].copy()
+            self._sensors.lacked.append(block)
+            self._sensors.forget_until(int(block[0]))
+        return taken.why in {GAP, NO_BLOCK, DIFFERS}
 
     def _lost(self, sure: int) -> bool:
         """Pass over steps until a snapshot gives the memory back."""
@@ -271,13 +259,13 @@ class Replayer:
             snapshot = self._snapshots[0]
             following = snapshot.step + 1
             if snapshot.step >= self._lost_from:
-                self._must_wait(np.array([following], np.uint64), self._trace)
+                if not self._whole and following <= self._trace.passed:
+                    raise OutOfOrder
                 place = int(np.searchsorted(sequence, np.uint64(following)))
                 if place < len(sequence) and int(sequence[place]) == following:
                     self._snapshots.popleft()
                     self._pass_over(place)
                     self._memory[:] = np.frombuffer(snapshot.memory, STATE)
-                    self._next = following
                     self._phase = self._run
                     return True
                 if sure <= place and sure < len(sequence):  # it may still come
@@ -288,48 +276,17 @@ class Replayer:
         self._pass_over(sure)
         return False
 
-    def _must_wait(self, sequence: npt.NDArray[np.uint64], waiting: _Waiting) -> None:
-        """Refuse messages that are forgotten, as steps came again or in another order than their blocks."""
-        if not self._whole and waiting.passed >= 0 and (sequence <= np.uint64(waiting.passed)).any():
-            raise OutOfOrder
-
-    def _feed(self, steps: Stretch) -> None:
-        """Take steps whose memory is there, and forget them."""
-        count = len(steps.rows)
-        if not count:
-            return
-        command, sequence = self._command.records(), steps.trace["sequence"]
-        announce, sensors = self._announce.records(), self._sensors.records()
-        starts = [int(np.searchsorted(steps.t_ns, t_ns)) if t_ns > 0 else 0 for t_ns, _ in self._changes]
-        for (_, params), start, end in zip(self._changes, starts, [*starts[1:], count], strict=True):
-            if start < end:
-                self._comparer.feed(params, sensors, announce, command, steps.part(start, end))
-        self._compared += self._counted(steps.t_ns)
-        self._next = int(sequence[-1]) + 1
-        lacking = steps.command_rows == NO_ROW
-        if lacking.any():
-            self._lacking["command"].append(sequence[lacking])
-        self._lacks_announcements |= bool((steps.announced > len(announce)).any())
-        self._sensors.forget(int(steps.rows.max()) + 1)
-        self._command.forget_until(self._next - 1)
-        self._trace.forget(count)
-        while self._snapshots and self._snapshots[0].step < self._next:
-            self._snapshots.popleft()
-
     def _pass_over(self, count: int) -> None:
         """Forget the first steps, which cannot be rebuilt."""
         steps = self._trace.records()[:count]
         if not len(steps):
             return
-        self._skipped += self._counted(steps["t_ns"].astype(np.int64))
+        self._skipped += int((steps["t_ns"] >= self._from_s * 1e9).sum())
         consumed = steps["block"][steps["events"] & BLOCK != 0]
         if len(consumed):
             self._sensors.forget_until(int(consumed.max()))
         self._command.forget_until(int(steps["sequence"][-1]))
         self._trace.forget(count)
-
-    def _counted(self, t_ns: npt.NDArray[np.int64]) -> int:
-        return int((t_ns >= self._from_s * 1e9).sum())
 
 
 def replay(run: RunData, changes: list[Change], from_s: float = 0.0) -> Replay:

@@ -1,17 +1,23 @@
 """Steps of today's controller beside those of a log: each answer is compared as soon as it is there, and kept nowhere."""
 
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from bridge.kernel import Record, unlocked_kernel
+from bridge.kernel import Record, kernel, unlocked_kernel
 from bridge.wire.messages import COMMAND, TRACE, Layout, Records
 from controller.announced import take_announcement
+from controller.codes import BLOCK
 from controller.core import step
 
-NO_ROW = -1
 _OF_A_CLOCK = "lateness_ns"  # the field that is not compared
+
+# why steps end: more may come, a step or its block is lost, something came again, a bit differs
+WAITS, GAP, NO_BLOCK, AGAIN, DIFFERS = range(5)
+NO_COMMAND: Final = 1  # bits of what steps went on without
+NO_ANNOUNCEMENT: Final = 2
 
 
 class Difference(NamedTuple):
@@ -26,132 +32,170 @@ class Difference(NamedTuple):
     replayed: float
 
 
-class Stretch(NamedTuple):
-    """Steps of a log, one after the other without a gap."""
+class Taken(NamedTuple):
+    """The steps that were taken."""
 
-    trace: Records  # [steps], logged
-    rows: npt.NDArray[np.int64]  # [steps], of the sensor block that each consumed; NO_ROW for a step without a block
-    command_rows: npt.NDArray[np.int64]  # [steps], NO_ROW where the log lacks the command
-    events: npt.NDArray[np.int64]  # [steps]
-    gap_blocks: npt.NDArray[np.int64]  # [steps]
-    t_ns: npt.NDArray[np.int64]  # [steps]
-    announced: npt.NDArray[np.int64]  # [steps], announcements that had come by then
+    steps: int
+    why: int  # they end there
+    compared: int
+    blocks: int  # places of sensor blocks up to the last that was used
+    lacks: int  # bits of what they went on without
 
-    def part(self, start: int, end: int) -> "Stretch":
-        """Some of the steps."""
-        return Stretch(*(column[start:end] for column in self))
+
+@kernel
+def _place(records: npt.NDArray[Any], likely: int, sequence: int) -> int:
+    """The place of the first message with this sequence, -1 where there is none."""
+    if likely < records.shape[0] and records[likely].sequence == sequence:
+        return likely
+    low, high = 0, records.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if records[middle].sequence < sequence:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < records.shape[0] and records[low].sequence == sequence else -1
 
 
 @unlocked_kernel
 def _steps(
     params: npt.NDArray[Any],
+    params_from_ns: npt.NDArray[np.int64],
     state: npt.NDArray[Any],
+    logged_trace: npt.NDArray[Any],
     sensors: npt.NDArray[Any],
-    rows: npt.NDArray[np.int64],
-    events: npt.NDArray[np.int64],
-    gap_blocks: npt.NDArray[np.int64],
-    t_ns: npt.NDArray[np.int64],
-    announced: npt.NDArray[np.int64],
+    logged_command: npt.NDArray[Any],
     announce: npt.NDArray[Any],
+    sure: int,
+    first_block: np.uint64,
+    first_command: np.uint64,
+    compares: bool,
     compared_from_ns: float,
-    logged_command: npt.NDArray[np.uint8],
-    command_rows: npt.NDArray[np.int64],
-    command_mask: npt.NDArray[np.uint8],
-    command: npt.NDArray[Any],
-    command_bytes: npt.NDArray[np.uint8],
-    logged_trace: npt.NDArray[np.uint8],
+    logged_trace_bytes: npt.NDArray[np.uint8],
+    logged_command_bytes: npt.NDArray[np.uint8],
     trace_mask: npt.NDArray[np.uint8],
+    command_mask: npt.NDArray[np.uint8],
     trace: npt.NDArray[Any],
+    command: npt.NDArray[Any],
     trace_bytes: npt.NDArray[np.uint8],
-) -> int:
-    """Steps up to the first that differs; `command` and `trace` then hold its answer."""
+    command_bytes: npt.NDArray[np.uint8],
+) -> tuple[int, int, int, int, int]:
+    """Steps up to the first that differs, whose answer `command` and `trace` then hold, or that cannot be taken; see `Taken`."""
     s: Record = state[0]
-    for i in range(rows.shape[0]):
-        while s.announced_count < min(announced[i], announce.shape[0]):
+    compared, lacks, block_at, command_at = 0, 0, -1, -1
+    for i in range(logged_trace.shape[0]):
+        t: Record = logged_trace[i]
+        # of the type that the process has: for another the whole step would be compiled once more
+        events: Any = np.int64(t.events)
+        gap_blocks: Any = np.int64(t.gap_blocks)
+        if t.sequence != s.steps:
+            return i, GAP if i < sure else WAITS, compared, block_at + 1, lacks
+        found = _place(sensors, block_at + 1, t.block) if events & BLOCK != 0 else max(block_at, 0)
+        if found < 0:
+            why = AGAIN if t.block < first_block else NO_BLOCK if i < sure else WAITS
+            return i, why, compared, block_at + 1, lacks
+        command_at = _place(logged_command, command_at + 1, t.sequence)
+        announced = min(np.int64(t.announcements), announce.shape[0])
+        lacking = (NO_COMMAND if command_at < 0 else 0) | (NO_ANNOUNCEMENT if announced < t.announcements else 0)
+        if command_at < 0 and t.sequence < first_command:
+            return i, AGAIN, compared, block_at + 1, lacks
+        if lacking != 0 and i >= sure:
+            return i, WAITS, compared, block_at + 1, lacks
+        lacks |= lacking
+        block_at = found if events & BLOCK != 0 else block_at
+        while s.announced_count < announced:
             said: Record = announce[s.announced_count]
             take_announcement(s, said.holds_from_ns, said.drive_velocity_mps)
-        row = max(rows[i], 0)  # a step without a block does not read its row
-        step(params, state, sensors[row : row + 1], events[i], gap_blocks[i], t_ns[i], command, trace)
-        if t_ns[i] < compared_from_ns:
+        change = params.shape[0] - 1
+        while change > 0 and t.t_ns < params_from_ns[change]:
+            change -= 1
+        # a step without a block does not read its place
+        own, block = params[change : change + 1], sensors[found : found + 1]
+        step(own, state, block, events, gap_blocks, t.t_ns, command, trace)
+        if t.t_ns < compared_from_ns:
             continue
+        compared += 1
         different = 0
-        for j in range(trace_bytes.shape[0]):
-            different |= (logged_trace[i, j] ^ trace_bytes[j]) & trace_mask[j]
-        at = command_rows[i]
-        if at >= 0:
-            for j in range(command_bytes.shape[0]):
-                different |= (logged_command[at, j] ^ command_bytes[j]) & command_mask[j]
+        if compares:
+            for j in range(trace_mask.shape[0]):
+                different |= (logged_trace_bytes[i, j] ^ trace_bytes[0, j]) & trace_mask[j]
+            if command_at >= 0:
+                for j in range(command_mask.shape[0]):
+                    different |= (logged_command_bytes[command_at, j] ^ command_bytes[0, j]) & command_mask[j]
         if different != 0:
-            return i
-    return rows.shape[0]
+            return i + 1, DIFFERS, compared, block_at + 1, lacks
+    return logged_trace.shape[0], WAITS, compared, block_at + 1, lacks
 
 
 class StepComparer:
-    """Today's controller, fed with the frames of a log.
+    """Today's controller, fed with the frames of a log; what follows the first difference is not compared.
 
     Args:
+        params: of the controller, [changes].
+        params_from_ns: the times from which they hold, [changes].
         memory: of the controller, one record; it is changed in place.
         compared_from_s: steps before are fed and not compared.
 
     """
 
-    def __init__(self, memory: npt.NDArray[Any], compared_from_s: float) -> None:
+    def __init__(
+        self,
+        params: npt.NDArray[Any],
+        params_from_ns: npt.NDArray[np.int64],
+        memory: npt.NDArray[Any],
+        compared_from_s: float,
+    ) -> None:
         self.difference: Difference | None = None
-        self._memory = memory
+        self._controller = params, params_from_ns, memory
         self._from_ns = compared_from_s * 1e9
-        self._command, self._trace = COMMAND.blank(), TRACE.blank()
-        self._masks = _mask(COMMAND), _mask(TRACE)
+        self._answer = TRACE.blank(), COMMAND.blank()
+        self._masks = _mask(TRACE), _mask(COMMAND)
 
-    def feed(self, params: npt.NDArray[Any], sensors: Records, announce: Records, command: Records, s: Stretch) -> None:
-        """Go through a stretch up to the first difference, behind which nothing is compared any more.
+    def take(self, tables: Iterable[Records], sure: int, first_block: int, first_command: int) -> Taken:
+        """Take steps from the first one on.
 
         Args:
-            params: of the controller.
-            sensors, announce, command: of the log; the rows of the stretch are places in them.
-            s: the stretch.
+            tables: trace, sensors, command and announcements of the log, each in order of sequence.
+            sure: steps for which nothing can come any more.
+            first_block, first_command: sequences from which on nothing was forgotten.
 
         """
-        if self.difference is not None:
-            return
-        at = _steps(
-            params, self._memory, writable(sensors), s.rows, s.events, s.gap_blocks, s.t_ns, s.announced,
-            writable(announce), self._from_ns,
-            _rows_of_bytes(command, COMMAND), s.command_rows, self._masks[0], self._command, self._command.view(np.uint8),
-            _rows_of_bytes(s.trace, TRACE), self._masks[1], self._trace, self._trace.view(np.uint8),
-        )  # fmt: skip
-        if at < len(s.rows):
-            logged = command[s.command_rows[at] :][:1] if s.command_rows[at] != NO_ROW else self._command
-            self.difference = self._found("trace", TRACE, s.trace[at : at + 1], self._trace) or self._found(
-                "command", COMMAND, logged, self._command
+        trace, sensors, command, announce = map(writable, tables)
+        taken = Taken(
+            *_steps(
+                *self._controller, trace, sensors, command, announce, sure, np.uint64(first_block), np.uint64(first_command),
+                self.difference is None, self._from_ns, *map(_rows_of_bytes, (trace, command)), *self._masks,
+                *self._answer, *map(_rows_of_bytes, self._answer),
             )
+        )  # fmt: skip
+        if taken.why == DIFFERS:
+            trace = trace[taken.steps - 1 :][:1]
+            command = command[command["sequence"] == trace["sequence"]][:1]
+            self.difference = self._found("trace", TRACE, trace, self._answer[0]) or self._found(
+                "command", COMMAND, command, self._answer[1]
+            )
+        return taken
 
     def _found(self, table: str, layout: Layout, logged: Records, again: Records) -> Difference | None:
         """The first field of a message with a bit that differs."""
+        step = self._answer[0][0]
         for name in (field.name for field in layout.message.DESCRIPTOR.fields if field.name != _OF_A_CLOCK):
             if logged[name].tobytes() != again[name].tobytes():
-                return Difference(
-                    table=table,
-                    step=int(self._trace["sequence"][0]),
-                    block=int(self._trace["block"][0]),
-                    t_s=float(self._trace["t_ns"][0]) * 1e-9,
-                    field=name,
-                    logged=float(logged[name][0]),
-                    replayed=float(again[name][0]),
-                )
+                numbers = int(step["sequence"]), int(step["block"]), float(step["t_ns"]) * 1e-9
+                return Difference(table, *numbers, name, float(logged[name][0]), float(again[name][0]))
         return None
 
 
 def _mask(layout: Layout) -> npt.NDArray[np.uint8]:
     """Which bytes of a message are compared, [size]: those of its fields, but for the field of a clock."""
-    message = np.zeros(1, f"V{layout.size}").view(layout.dtype)
-    for name in layout.dtype.names or ():
-        width = layout.dtype[name].itemsize
-        message[name] = np.frombuffer(b"\xff" * width, layout.dtype[name])[0] if name != _OF_A_CLOCK else 0
-    return message.view(np.uint8)
+    mask = np.zeros(layout.size, np.uint8)
+    for name, (kind, first, *_) in (layout.dtype.fields or {}).items():
+        mask[first : first + kind.itemsize] = 0 if name == _OF_A_CLOCK else 0xFF
+    return mask
 
 
-def _rows_of_bytes(records: Records, layout: Layout) -> npt.NDArray[np.uint8]:
-    return writable(records).view(np.uint8).reshape(-1, layout.size)
+def _rows_of_bytes(records: Records) -> npt.NDArray[np.uint8]:
+    return records.view(np.uint8).reshape(-1, records.dtype.itemsize)
 
 
 def writable(records: Records) -> Records:

@@ -65,7 +65,7 @@ _FILES: tuple[tuple[str, str, type[Strict]], ...] = (
         ImportMap,
     ),
 )
-_VALUES = {"str": "TEXT", "int": "N", "float": "NUMBER", "Path": "PATH"}
+_VALUES = {"String": "TEXT", "Int": "N", "Float": "NUMBER", "Path": "PATH"}
 
 
 def pages() -> dict[str, str]:
@@ -138,10 +138,7 @@ def _spelt(one: Any) -> str:
     if not one.opts[0].startswith("-"):
         name = (one.metavar or one.opts[0]).upper()
         return f"`{name.rstrip('.')}{'...' if one.nargs == -1 else ''}`"
-    annotation = one.type_descriptor.annotation
-    kind = next(
-        (word for known, word in _VALUES.items() if known in str(getattr(annotation, "__args__", annotation))), ""
-    )
+    kind = next((word for known, word in _VALUES.items() if known in type(one.type).__name__), "")
     value = "" if one.is_flag else f" {one.metavar or kind or 'VALUE'}"
     return f"`{', '.join((*one.opts, *one.secondary_opts))}{value}`"
 

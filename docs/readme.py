@@ -1,10 +1,11 @@
-"""The outputs that README.md shows: `make readme` runs the commands, keeps all that they print, and copies lines of it.
+"""The outputs and the picture of README.md: `make readme` runs the commands, keeps their outputs, and copies lines of them.
 
 tests/unit/test_docs.py compares README.md with the kept output, tests/system/test_readme.py the kept output with the commands.
 """
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -13,6 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 KEPT = Path(__file__).parent / "start" / "example.txt"
+PICTURE = KEPT.with_name("demo.png")
 # In simulated time, so that the same scenario prints the same lines on each computer.
 DEMO = "stickslip run --in-process --scenario paper-c45-c45 --log runs/demo.mcap"
 _EXAMPLE = re.compile(r"^    (stickslip example .*?)(?: +#.*)?$", re.MULTILINE)
@@ -28,7 +30,7 @@ def commands(readme: str) -> list[str]:
 
 
 def run(command: str, folder: Path) -> str:
-    """What a command prints on stdout, run in a folder by this Python.
+    """The stdout of a command, run in a folder by this Python.
 
     Raises subprocess.CalledProcessError where it fails.
     """
@@ -37,11 +39,14 @@ def run(command: str, folder: Path) -> str:
     return subprocess.run(words, cwd=folder, env=usual, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
-def kept(readme: str) -> str:
-    """The whole output of all commands, each below its command."""
+def kept(readme: str, picture: Path) -> str:
+    """The whole output of all commands, each below its command; the picture shows the demo."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "runs").mkdir()
-        return "\n".join(f"$ {one}\n{run(one, Path(folder))}" for one in commands(readme))
+        text = "\n".join(f"$ {command}\n{run(command, Path(folder))}" for command in commands(readme))
+        run("stickslip plot runs/demo.mcap", Path(folder))
+        shutil.copyfile(Path(folder) / "runs" / "demo.png", picture)
+    return text
 
 
 def block(text: str) -> str:
@@ -53,9 +58,9 @@ def block(text: str) -> str:
 
 
 def main() -> None:
-    """Run the commands, and write the kept output and the README's block."""
+    """Run the commands, and write the kept output, the picture and the README's block."""
     readme = README.read_text(encoding="utf-8")
-    text = kept(readme)
+    text = kept(readme, PICTURE)
     KEPT.write_text(text, encoding="utf-8")
     README.write_text(_BLOCK.sub(lambda _: block(text), readme), encoding="utf-8")
 

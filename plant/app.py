@@ -140,7 +140,7 @@ class PlantProcess:
         self._answers = Inbox(64)
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)
         self._events = 0
-        self._paused_ns = 0  # for which this process stalled, and has not told
+        self._paused_ns = 0  # for which this process stalled, and has not reported
         self._send_sensors = bus.publisher(SENSORS)
         self._send_applied = bus.publisher(APPLIED)
         self._send_announce = bus.publisher(ANNOUNCE)

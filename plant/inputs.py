@@ -42,13 +42,13 @@ class Inputs(NamedTuple):
     def part(self, blocks: slice) -> "Inputs":
         """Some of these blocks, of a slice without a step."""
         first, last, _ = blocks.indices(len(self.noise))
-        said = slice(int(self.announcements[:first].sum()), int(self.announcements[:last].sum()))
+        announced = slice(int(self.announcements[:first].sum()), int(self.announcements[:last].sum()))
         return Inputs(
             self.velocity_mps[blocks],
             self.noise[blocks],
             self.delay_blocks[blocks],
             self.announcements[blocks],
-            self.announce[said],
+            self.announce[announced],
         )
 
 
@@ -119,7 +119,7 @@ class InputsAhead:
     """The numbers of `RigInputs`, drawn by a second thread while those drawn before are used: a sixth of a run's time.
 
     Args:
-        inputs: nobody else draws from them.
+        inputs: drawn from here alone.
 
     """
 
@@ -129,7 +129,7 @@ class InputsAhead:
         self._ahead: Future[Inputs] | None = None
 
     def draw(self, blocks: int) -> Inputs:
-        """The inputs of the next blocks; as many blocks after them are drawn meanwhile."""
+        """The inputs of the next blocks; the thread begins to draw as many blocks after them."""
         ahead = self._inputs.draw(blocks) if self._ahead is None else self._ahead.result()
         if (missing := blocks - len(ahead.noise)) > 0:
             ahead = ahead.joined(self._inputs.draw(missing))

@@ -16,14 +16,15 @@ pytest_plugins = ["tests.cpu_limit", "tests.stall_report"]
 settings.register_profile("stickslip", deadline=None, derandomize=True)
 settings.load_profile("stickslip")
 # A suite that a script starts with `&` inherits an ignored SIGINT, one under `nohup` an ignored SIGHUP, and so would all that the
-# tests start; the ends of commands are tested. A handler of Python is none in a child, and a closed terminal still ends no suite.
+# tests start; the ends of commands are tested.
+# A child does not inherit a handler of Python, and a closed terminal does not end the suite.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
 # where rigs leave their passwords: a folder that is gone afterwards, with a short name as in a login
 os.environ["XDG_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 atexit.register(shutil.rmtree, os.environ["XDG_RUNTIME_DIR"], ignore_errors=True)
-_NIGHTLY_S = 3600.0  # a whole diagnosis beside other work
+_NIGHTLY_S = 3600.0  # a whole diagnosis while other programs run
 _REALTIME_S = 180.0  # a process that hangs is reported soon
 
 

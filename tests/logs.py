@@ -1,5 +1,6 @@
 """Small logs for tests: one short run, and copies of it with something wrong."""
 
+import math
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bridge.log.logfile import STREAMING, RunData, read_run
-from bridge.log.runlog import RunLog
+from bridge.log.runlog import NO_ROTATION, Rotation, RunLog
 from bridge.wire.messages import ANNOUNCE, APPLIED, COMMAND, STATE, TRACE, sensor_block
 from bridge.wire.topics import BY_NAME
 from cockpit.judge.judged import judge_tables
@@ -69,9 +70,10 @@ def with_tags(name: str, table: Any) -> Any:
     return messages
 
 
-def write(path: Path, tables: Tables, run: RunData, blocks: int = 40) -> None:
+def write(path: Path, tables: Tables, run: RunData, blocks: int = 40, rotation: Rotation = NO_ROTATION) -> None:
     """Write messages in the order of their rows, a chunk every `blocks` of them."""
-    log = RunLog(path, lockstep=True)
+    log = RunLog(path, lockstep=True, rotation=rotation)
+    log._due_s = math.inf  # no chunk ends by the clock: on a busy computer the two ENDs would be in two chunks
     for name, fields in run.headers.items():
         log._add_table(name, fields)
     for event in run.events:

@@ -41,7 +41,7 @@ class Stops(NamedTuple):
 
 
 class Came(NamedTuple):
-    """What came of one run."""
+    """The result of one run."""
 
     program: str
     status: int
@@ -95,7 +95,7 @@ class Run:
         return {}
 
     def stop_one(self, pid: int, for_s: float) -> None:
-        """Stop one of its processes for a while; it goes on whatever happens meanwhile."""
+        """Stop one of its processes for a while; it goes on even if this program is interrupted."""
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGSTOP)
             try:
@@ -105,7 +105,7 @@ class Run:
             self.stops.append(for_s)
 
     def end(self) -> Came:
-        """Wait for its end, and read what came of it."""
+        """Wait for its end, and read its verdict and log."""
         try:
             out, _ = self.process.communicate(timeout=START_S)
         except subprocess.TimeoutExpired:
@@ -174,7 +174,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=3, help="of each program")
     parser.add_argument(
-        "--program", action="append", help=f"a stickslip; {HERE!r}, the default, is that of this folder"
+        "--program", action="append", help=f"a stickslip; {HERE!r}, the default: the one in this folder"
     )
     parser.add_argument(
         "--pairs", type=int, default=1, help="rigs at the same time, each with its controller and recorder"

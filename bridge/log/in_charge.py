@@ -1,6 +1,6 @@
 """Who was in charge of the rig, block by block: fallback, missing commands, a controller that left, a weak exciter."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -171,12 +171,3 @@ class ChargeWatch:
             controller_until_s=until_ns * 1e-9 if left and until_ns is not None else None,
             reasons_s={wire.Reason.Name(reason): count * block_s for reason, count in self._reasons.items() if count},
         )
-
-
-def in_charge(run: Any) -> InCharge:
-    """Who was in charge in a log that was read."""
-    watch = ChargeWatch()
-    watch.applied(run.applied)
-    watch.command(run.command)
-    watch.trace(run.trace)
-    return watch.result()

@@ -38,8 +38,8 @@ _ANYWAY_BYTES = 1 << 24
 _FOOTER_BYTES = 20
 # of chunks that are taken apart at once; with less the calls cost more than the work, as a chunk of 0.1 s holds 0.1 MB
 AT_ONCE_BYTES = 1 << 19
-# Groups that the second thread works on, ahead of the caller. With 1 it waits while the caller takes a group in; more hold
-# more memory. The value was not swept.
+# Groups that the second thread works on, ahead of the caller. No effect seen: with 1, 2, 4 and 8 a log of 95 s is judged in
+# 0.96 to 1.02 s of CPU, while both cores are busy; 4 hold 4 MB more than 2, and 8 hold 13 MB more.
 _GROUPS_AHEAD = 2
 _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 _MOST_NAMES = 3  # of the schemas of another program's file that are told

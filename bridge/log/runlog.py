@@ -95,7 +95,7 @@ class RunLog:
         return self._tables
 
     def chain(self) -> Chain:
-        """What its hash chain says once the log is closed, known from writing: nothing is read back but the last bytes."""
+        """The hash chain of the closed log, known from writing; only the last bytes are read back."""
         files = self._files
         return Chain(files.links, files.begins, files.last_link, [], 0, True, file_end(self.path), True)
 

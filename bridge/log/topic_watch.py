@@ -11,6 +11,9 @@ from bridge.wire.messages import Records
 _CLOCK_TOLERANCE_NS = 1000
 _REMEMBERED_NUMBERS = 1 << 20  # missing numbers that are kept, to tell a late message from a duplicate; costs memory
 
+# Numbers by which a message may come late; one that goes back to 0 from further on begins another run, as the recorder has it.
+_LATEST = 256
+
 
 class TopicWatch:
     """Checks one topic, message by message, in file order."""
@@ -35,6 +38,16 @@ class TopicWatch:
         self._last_number = -1
         self._last_log_time_ns = 0
 
+    @property
+    def missing(self) -> int:
+        """Messages between the first and the last that never came."""
+        return len(self._missing_numbers) + sum(map(len, self._gaps_for_good))
+
+    @property
+    def end(self) -> int:
+        """The number after the highest."""
+        return self._highest + 1
+
     def add(self, records: Records, log_time_ns: Integers, period_ns: float) -> None:
         """Check the next messages.
 
@@ -56,8 +69,16 @@ class TopicWatch:
         step = steps(number, self._last_number)
         step_ns = steps(t_ns.astype(np.int64), self.last_t_ns)
         arrival_ns = steps(log_time_ns, self._last_log_time_ns)
-        for i in np.flatnonzero(step != 1):
-            self._odd_number(int(number[i]), int(number[i]) - int(step[i]))
+        for i in np.flatnonzero(np.concatenate([[True], step[1:] != 1])):
+            at = int(i)
+            if step[at] != 1:
+                self._odd_number(int(number[at]), int(number[at]) - int(step[at]))
+                at += 1
+            while (
+                at < len(number) and step[at] == 1 and number[at] <= self._highest
+            ):  # late ones that follow one another
+                self._odd_number(int(number[at]), int(number[at]) - 1)
+                at += 1
         # the running maximum; `_odd_number` sets it back at a restart
         self._highest = max(self._highest, int(number[-1]))
         forward = step > 0
@@ -80,25 +101,30 @@ class TopicWatch:
     def _odd_number(self, number: int, before: int) -> None:
         self._highest = max(self._highest, before)
         if number > self._highest + 1:
-            gap = range(self._highest + 1, number)
-            if len(self._missing_numbers) + len(gap) < _REMEMBERED_NUMBERS:
-                self._missing_numbers.update(gap)
-            else:
-                self._gaps_for_good.append(gap)
+            self._gap(range(self._highest + 1, number))
             self._highest = number
-        elif number == 0 and before > 0:
+        elif number == 0 and self._highest > _LATEST:
             self.restarts += 1
             self._restarted_at.append(before)
             self._gaps_for_good += _ranges(self._missing_numbers)
             self._missing_numbers.clear()
             self._highest = 0
-        elif number in self._missing_numbers:
-            self._missing_numbers.remove(number)
+        elif number in self._missing_numbers or number < self.first_number:
+            self._missing_numbers.discard(number)
+            if number < self.first_number:
+                self._gap(range(number + 1, self.first_number))
+                self.first_number = number
             self._first_late = self._first_late if self._late else number
             self._late += 1
         elif number <= self._highest:
             self._first_duplicate = self._first_duplicate if self._duplicates else number
             self._duplicates += 1
+
+    def _gap(self, gap: range) -> None:
+        if len(self._missing_numbers) + len(gap) < _REMEMBERED_NUMBERS:
+            self._missing_numbers.update(gap)
+        elif gap:
+            self._gaps_for_good.append(gap)
 
     def findings(self) -> list[Finding]:
         """A finding for each kind of fault of the topic."""
@@ -118,12 +144,8 @@ class TopicWatch:
             )
         gaps = [*self._gaps_for_good, *_ranges(self._missing_numbers)]
         if gaps:
-            missing = sum(len(gap) for gap in gaps)
-            add(
-                "gap",
-                f"{counted(missing, 'message')} missing in {counted(len(gaps), 'gap')}, first {gaps[0][0]} to {gaps[0][-1]}",
-                missing,
-            )
+            where_to = f"{counted(len(gaps), 'gap')}, first {gaps[0][0]} to {gaps[0][-1]}"
+            add("gap", f"{counted(self.missing, 'message')} missing in {where_to}", self.missing)
         if self.topic == "sensors" and self.first_number > 0:
             add("gap", f"begins with block {self.first_number}: those before were not recorded", self.first_number)
         times = counted(self._duplicates, "place")

@@ -3,7 +3,7 @@
 from enum import Enum
 
 # Messages that a late one may be behind, and that may be lost at once without a doubt. Smaller: a loss is doubted for 8 blocks.
-# Larger: a stranger whose count is as near is believed at once.
+# Larger: another sender whose count is as near is believed at once.
 WINDOW = 256
 # Another count is believed after so many messages in a row, each one further, while the present count has been silent for so
 # long. Smaller: a burst of a stranger takes over. Larger: a rig that was restarted waits for longer.

@@ -240,7 +240,8 @@ EVENTS = {
             "CANNOT_HELP",
             "controller",
             OUTSIDE,
-            "slips go on under the strongest vibration, or whenever v_d changes",
+            "slips go on with the strongest vibration, or whenever v_d changes: allow more (limits.amplitude_max_m, "
+            "policy.most_ratio), or stiffen the drive",
         ),
         EventCode("HARMFUL", "controller", OUTSIDE, "the motion was worse with the vibration, twice: there is none"),
         EventCode(

@@ -103,7 +103,7 @@ class Layout:
 
     def all_canonical(self, payloads: npt.NDArray[np.uint8]) -> bool:
         """The same of many payloads of the message's size, [payloads, size]."""
-        return bool((payloads.take(self._tag_places, axis=1) == self._tag_bytes).all())
+        return bool((payloads[:, self._tag_places] == self._tag_bytes).all())
 
     def canonical(self, payload: bytes, topic: str) -> bytes:
         """The same message with every field written, in order. Raises Fault BAD_MESSAGE naming `topic`."""

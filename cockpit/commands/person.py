@@ -102,12 +102,3 @@ def status(
         return 0 if seen.controlled else 1
 
     carry_out(work, as_json)
-
-
-WORDS = {"arm": arm, "disarm": disarm, "stop": stop, "reset": reset, "status": status}
-
-
-def add_words(app: typer.Typer) -> None:
-    """Add these commands to others."""
-    for name, command in WORDS.items():
-        app.command(name)(command)

@@ -14,7 +14,7 @@ watches         latency, samples that are no numbers, the controller's steps
 tested          whether a run tests its controller at all
 ratio_watch     v_a/v_d at both ends
 described       the sensors and the axis as the log describes them
-relations       the spring's law; the log against the controller and the exciter
+relations       second by second: force and spring, vibration of base, slide and controller
 sensor_watch    whether the sensors can carry a verdict; three witnesses of slips
 margins         the stability margins of the amplitude loop
 stability_map   where a rig sticks and slips, as a picture

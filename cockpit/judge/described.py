@@ -7,65 +7,65 @@ from typing import Any, NamedTuple
 from bridge.log.check.channel import Channel, channels_of
 from bridge.log.metadata import is_number
 
-# Factor by which force over extension may be off the described stiffness, either way. Smaller: the bank's force sensor that shows
-# 0.6 of the force is doubted; larger: pounds for newtons, 0.22, pass. Twice that for effects that bend the relation; with
-# backlash, and for a rig that is not described, of whose stiffness the controller may have a tenth, the sign alone counts.
-_OFF, _OFF_BENT = 2.0, 4.0
-_BENT = {"drive-hardening", "frame-compliance", "drive-damping", "force-sensor-lag"}
-_LOOSE = "drive-backlash"
+# Share of the larger of force and spring by which they may differ. Smaller: a stiffness that is described 30 % wrong is doubted;
+# larger: a force sensor that shows a half or the double, 0.5, passes. With effects that bend the relation, and for a rig that is
+# not described, of whose stiffness the controller may have a tenth, the sign alone counts.
+_APART, _APART_SIGN = 0.4, 1.05
+_BENT = {"drive-hardening", "frame-compliance", "drive-damping", "force-sensor-lag", "drive-backlash"}
 
 
 class Described(NamedTuple):
     """Of a rig and its controller; NaN for a number that is not known."""
 
     channels: dict[str, Channel]
-    stiffness_N_per_m: float  # of the drive, as the force sensor shows it
-    of_rig: bool  # whether the stiffness is the rig's own; the controller may be told a wrong one
-    off: float  # factor by which force over extension may be off that stiffness
+    stiffness_N_per_m: float  # of the drive, as the force sensor shows it; without a rig, as the controller is told
+    apart: float  # share by which force and spring may differ
     drop_N: float  # F_s - F_c
+    slip_m: float  # way of a slip, 2 (F_s - F_c) / k_d
+    mass_kg: float  # of the slide
+    contact_per_s2: float  # stiffness of the contact over the mass
     uses_force: bool
     uses_slide: bool
     enabled_from_s: float
     v_ratio: float  # set point of v_a / v_d
     most_ratio: float  # to which the controller may raise it, after slips in spite of the vibration
 
-    @property
-    def slip_m(self) -> float:
-        """Way of a slip, 2 (F_s - F_c) / k_d; NaN where it is not known."""
-        return 2.0 * self.drop_N / self.stiffness_N_per_m if self.of_rig else math.nan
-
 
 def described(plant: Mapping[str, Any] | None, controller: Mapping[str, Any] | None) -> Described:
     """From the configurations in a log; None for one that it does not hold."""
-    rig = _table(plant or {}, "rig")
-    sensors, effects, ours = _table(rig, "sensors"), _table(rig, "effects"), controller or {}
-    k_d = _number(_table(rig, "drive"), "stiffness_N_per_m")
-    of_rig = math.isfinite(k_d) and k_d > 0.0
-    gain = _number(sensors, "force_gain", 1.0) * (1.0 + _number(_table(effects, "force-sensor-gain"), "ratio", 0.0))
-    k_d *= gain * (1.0 + _number(_table(effects, "drive-stiffness"), "ratio", 0.0))
-    contact = _table(rig, "contact")
-    sliding_N = _number(contact, "coulomb_force_N") * (1.0 + _number(_table(effects, "coulomb-level"), "ratio", 0.0))
-    static_N = _number(contact, "static_force_N") * (1.0 + _number(_table(effects, "static-level"), "ratio", 0.0))
-    estimator = _table(ours, "estimator")
+    tables = {"rig": (plant or {}).get("rig"), "controller": controller}
+
+    def number(path: str, otherwise: float = math.nan) -> float:
+        found = _at(tables, path)
+        return float(found) if is_number(found) else otherwise
+
+    def grown(effect: str) -> float:
+        return 1.0 + number(f"rig.effects.{effect}.ratio", 0.0)
+
+    effects = _at(tables, "rig.effects")
+    names = effects.keys() if isinstance(effects, Mapping) else set[str]()
+    gain = number("rig.sensors.force_gain", 1.0) * grown("force-sensor-gain")
+    k_d = number("rig.drive.stiffness_N_per_m") * gain * grown("drive-stiffness")
+    static_N = number("rig.contact.static_force_N") * grown("static-level")
+    sliding_N = number("rig.contact.coulomb_force_N") * grown("coulomb-level")
+    mass_kg = number("rig.slide.mass_kg") or math.nan
     return Described(
         channels=channels_of(plant),
-        stiffness_N_per_m=k_d if of_rig else _number(ours, "drive_stiffness_N_per_m"),
-        of_rig=of_rig,
-        off=math.inf if _LOOSE in effects or not of_rig else _OFF_BENT if _BENT & effects.keys() else _OFF,
+        stiffness_N_per_m=k_d if k_d > 0.0 else number("controller.drive_stiffness_N_per_m"),
+        apart=_APART if k_d > 0.0 and not _BENT & names else _APART_SIGN,
         drop_N=(static_N - sliding_N) * gain,
-        uses_force=estimator.get("use_force") is not False,
-        uses_slide=estimator.get("use_slide_position") is not False,
-        enabled_from_s=_number(_table(ours, "policy"), "enabled_from_s", 0.0),
-        v_ratio=_number(_table(ours, "limits"), "v_ratio"),
-        most_ratio=_number(_table(ours, "policy"), "most_ratio"),
+        slip_m=2.0 * (static_N - sliding_N) * gain / k_d if k_d > 0.0 else math.nan,
+        mass_kg=mass_kg,
+        contact_per_s2=number("rig.contact.stiffness_N_per_m") / mass_kg,
+        uses_force=_at(tables, "controller.estimator.use_force") is not False,
+        uses_slide=_at(tables, "controller.estimator.use_slide_position") is not False,
+        enabled_from_s=number("controller.policy.enabled_from_s", 0.0),
+        v_ratio=number("controller.limits.v_ratio"),
+        most_ratio=number("controller.policy.most_ratio"),
     )
 
 
-def _table(of: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    found = of.get(name)
-    return found if isinstance(found, Mapping) else {}
-
-
-def _number(of: Mapping[str, Any], name: str, otherwise: float = math.nan) -> float:
-    found: Any = of.get(name)
-    return float(found) if is_number(found) else otherwise
+def _at(table: Any, path: str) -> Any:
+    for name in path.split("."):
+        table = table.get(name) if isinstance(table, Mapping) else None
+    return table

@@ -1,14 +1,12 @@
 """Judging a run from its log, or from the arrays of a log that was read."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
-from bridge.log.check.log_check import LogCheck
+from bridge.log.check.log_check import LogCheck, feed
 from bridge.log.log_reader import LogReader
-from bridge.log.logfile import STREAMING, RunData, check_log_file, iter_pieces
-from bridge.log.storage.parts import chain_of_log
+from bridge.log.logfile import RunData, check_log_file
 from cockpit.judge.run_judge import RunJudge
 from cockpit.judge.verdict import RunVerdict
 from diagnosis.features.cycles import Cycles
@@ -41,17 +39,9 @@ def judge_log(
     check_log_file(path)
     reader = LogReader(path)
     judge = RunJudge(path, reader.metadata, margins=margins, stretch_from_s=stretch_from_s)
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        chain = beside.submit(chain_of_log, path)
-        for piece in iter_pieces(reader):
-            if piece.topic in STREAMING:
-                judge.add(piece.topic, piece.records, piece.log_time_ns)
-            else:
-                judge.add_others(piece.topic, piece.payloads)
-            if progress is not None:
-                progress(reader.position_bytes / max(reader.size_bytes, 1))
-        verdict = judge.result(reader.damage, chain.result(), reader.foreign)
-        return Judged(verdict, judge.log.result(reader, verdict.chain), judge)
+    chain = feed(reader, judge, progress)
+    verdict = judge.result(reader.damage, chain, reader.foreign)
+    return Judged(verdict, judge.log.result(reader, chain), judge)
 
 
 def judge(path: Path) -> RunVerdict:

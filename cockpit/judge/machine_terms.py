@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.log.watches.arrays import median
+from bridge.log.watches.arrays import noise_of
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.window import Moved, Window
 
@@ -233,11 +233,3 @@ def _reversal(t_s: Floats, slide_m: Floats, drive_m: Floats, seen_m: float) -> R
     error_m = drive_m - slide_m
     peak_m = error_m[: 2 * first + 1].max()
     return Reversal(float(t_s[0]), float(t_s[first] - t_s[0]), max(float(peak_m - error_m[first:].mean()), 0.0))
-
-
-def noise_of(place_m: Floats) -> float:
-    """Standard deviation of white noise on what moves smoothly most of the time, from second differences."""
-    if len(place_m) < 3:
-        return 0.0
-    bend_m: Any = np.abs(np.diff(place_m, 2))
-    return median(bend_m) / 0.6745 / np.sqrt(6.0)

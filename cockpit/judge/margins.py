@@ -45,9 +45,7 @@ class MarginSum:
 
     def add(self, window: Window) -> None:
         """The commands of a window that are to be judged."""
-        from_ns, until_ns = window.own_ns
-        command = window.command
-        command = command[(command["t_ns"] >= from_ns) & (command["t_ns"] < until_ns)]
+        command = window.command[window.own(window.command)]
         self._amplitude_m = max(self._amplitude_m, float(command["amplitude_m"].max(initial=0.0)))
         _, at_trace, at_command = np.intersect1d(window.trace["block"], command["block"], return_indices=True)
         trace, command = window.trace[at_trace], command[at_command]

@@ -18,7 +18,7 @@ from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.described import Described
 from cockpit.judge.setup import SETTLING_S, settled_from_s
 from cockpit.judge.watches import STANDSTILL_MPS
-from cockpit.judge.window import Window
+from cockpit.judge.window import Rows, Window
 from controller.codes import GAP, LATE, STALE
 
 Floats = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ class RatioVerdict(NamedTuple):
     lowest: float
     highest: float
     judged_s: float
-    below_s: float  # under 1.05
+    below_s: float  # under 1.05, which is a warning: where no slip came of it the run is good
     above_s: float  # over 1.5 set points, in all
     longest_above_s: float  # the same, in one stretch
     left_out_s: float  # vibration in stalls and the second after them
@@ -52,17 +52,12 @@ class RatioVerdict(NamedTuple):
         """Whether v_a / v_d was never above 1.5 set points for more than 0.2 s."""
         return self.longest_above_s <= MOST_ABOVE_S
 
-    @property
-    def low(self) -> bool:
-        """Whether it was below 1.05, which is a warning: where no slip came of it the run is good."""
-        return self.below_s > 0.0
-
     def in_words(self) -> str:
         """A line; empty where nothing was judged."""
         if not self.judged_s:
             return ""
         wrong: list[str] = []
-        if self.low:
+        if self.below_s:
             wrong.append(f"below {ALARM_RATIO} for {self.below_s:.2f} s: stick-slip may return")
         if not self.ok:
             wrong.append(f"above {_MOST_SET_POINTS:g} set points for {self.longest_above_s:.2f} s: more than is needed")
@@ -71,77 +66,58 @@ class RatioVerdict(NamedTuple):
 
 
 class RatioWatch:
-    """v_a over v_d, window by window.
-
-    Args:
-        of: the description in the log, with the set point.
-        block_s: length of a block.
-
-    """
+    """v_a over v_d, window by window."""
 
     def __init__(self, of: Described, block_s: float) -> None:
-        self._block_s = block_s
-        self._set_point = of.v_ratio if math.isfinite(of.v_ratio) else math.inf
-        self._most_ratio = of.most_ratio if math.isfinite(of.most_ratio) else 0.0
-        self._from_s = settled_from_s(of.enabled_from_s)
-        self._back = max(round(_STEADY_S / block_s), 1)
-        self._stretch = Longest()
+        self._of, self._block_s = of, block_s
+        self._above = Longest()
         self._lowest, self._highest = math.inf, 0.0
-        self._judged = self._below = self._above = self._left_out = 0
+        self._judged = self._below = self._all_above = self._left_out = 0
 
     def add(self, window: Window) -> None:
         """Take the steps of a window; ramp and stalls before them are in the rows before it."""
-        trace, applied = window.trace, window.applied
+        trace = window.trace
         t_s, speed_mps = trace["t_ns"] * 1e-9, np.abs(trace["drive_velocity_mps"])
-        from_ns, until_ns = window.own_ns
-        own = (trace["t_ns"] >= from_ns) & (trace["t_ns"] < until_ns)
-        if not own.any():
-            return
+        own = window.own(trace)
         excited = (trace["mode"] == wire.EXCITE) & ~np.isin(trace["limit"], _RAMPED_DOWN)
         counts = own & excited & (_since_begin(excited) * self._block_s > _RAMP_S) & self._steady(speed_mps)
-        counts &= (t_s > self._from_s) & np.isfinite(trace["vibration_velocity_mps"])
-        # before its first command a rig is on its own, and did not stall
-        answers = applied["command_block"] != np.uint64(NO_COMMAND)
-        stalls = ((applied["fallback"] != 0) & answers) | (applied["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)
-        stalled = (trace["events"] & (GAP | STALE | LATE)) != 0
-        after = self._after_stall(t_s, np.concatenate([applied["t_ns"][stalls] * 1e-9, t_s[stalled]]))
+        counts &= (t_s > settled_from_s(self._of.enabled_from_s)) & np.isfinite(trace["vibration_velocity_mps"])
+        after = self._after_stall(t_s, trace, window.applied)
         self._left_out += int(np.count_nonzero(counts & after))
         counts &= ~after
         ratio = np.divide(trace["vibration_velocity_mps"], speed_mps, out=np.zeros(len(trace)), where=counts)
-        if counts.any():
-            self._lowest = min(self._lowest, float(ratio[counts].min()))
-            self._highest = max(self._highest, float(ratio[counts].max()))
-            self._judged += int(np.count_nonzero(counts))
-            self._below += int(np.count_nonzero(ratio[counts] < ALARM_RATIO))
-        set_point = np.maximum(np.minimum(trace["velocity_ratio"], self._most_ratio), self._set_point)
+        self._lowest = min(self._lowest, float(ratio[counts].min(initial=math.inf)))
+        self._highest = max(self._highest, float(ratio[counts].max(initial=0.0)))
+        self._judged += int(np.count_nonzero(counts))
+        self._below += int(np.count_nonzero(ratio[counts] < ALARM_RATIO))
+        raised = np.minimum(trace["velocity_ratio"], np.nan_to_num(self._of.most_ratio))
+        set_point = np.maximum(raised, np.nan_to_num(self._of.v_ratio, nan=math.inf))
         above = (counts & (ratio > _MOST_SET_POINTS * set_point))[own]
-        self._above += int(np.count_nonzero(above))
-        self._stretch.add(above)
+        self._all_above += int(np.count_nonzero(above))
+        self._above.add(above)
 
     def _steady(self, speed_mps: Floats) -> Bools:
-        steady, back = np.zeros(len(speed_mps), bool), self._back
+        steady, back = np.zeros(len(speed_mps), bool), max(round(_STEADY_S / self._block_s), 1)
         now_mps = speed_mps[back:]
         changed_mps = np.abs(now_mps - speed_mps[: len(now_mps)])
         steady[back:] = (now_mps > STANDSTILL_MPS) & (changed_mps < _STEADY_SHARE * now_mps)
         return steady
 
-    def _after_stall(self, t_s: Floats, stalls_s: Floats) -> Bools:
+    def _after_stall(self, t_s: Floats, trace: Rows, applied: Rows) -> Bools:
         """Steps in a stall of either side, or within a second after it."""
-        at_s = np.sort(np.append(stalls_s, -math.inf))
+        # before its first command a rig is on its own, and did not stall
+        answers = applied["command_block"] != np.uint64(NO_COMMAND)
+        stalls = ((applied["fallback"] != 0) & answers) | (applied["late_ns"] > _LATE_BLOCKS * self._block_s * 1e9)
+        stalled_s = t_s[(trace["events"] & (GAP | STALE | LATE)) != 0]
+        at_s = np.sort(np.concatenate([[-math.inf], applied["t_ns"][stalls] * 1e-9, stalled_s]))
         last = np.searchsorted(at_s, t_s + 0.5 * self._block_s, side="right") - 1
         return np.asarray(t_s - at_s[last] <= SETTLING_S)
 
     def result(self) -> RatioVerdict:
         """All of it, at the end of the log."""
-        return RatioVerdict(
-            lowest=self._lowest if self._judged else 0.0,
-            highest=self._highest,
-            judged_s=self._judged * self._block_s,
-            below_s=self._below * self._block_s,
-            above_s=self._above * self._block_s,
-            longest_above_s=self._stretch.longest * self._block_s,
-            left_out_s=self._left_out * self._block_s,
-        )
+        steps = self._judged, self._below, self._all_above, self._above.longest, self._left_out
+        lowest = self._lowest if self._judged else 0.0
+        return RatioVerdict(lowest, self._highest, *(count * self._block_s for count in steps))
 
 
 def _since_begin(excited: Bools) -> Floats:

@@ -1,7 +1,8 @@
-"""What the sensors of an axis must have to do with each other: force and spring, and the log with what its controller saw.
+"""What the sensors of an axis must have to do with each other, second by second: force and spring, and vibration of base,
+slide and controller.
 
-A channel that is swapped with another one, of the wrong sign or scale, or not connected breaks a relation of physics that the
-other channels keep. A relation says nothing where nothing moves enough to stand out from noise.
+A channel that is swapped with another one, of the wrong sign or scale, or not connected breaks a relation that the other channels
+keep. A relation says nothing in a second in which nothing stands out from noise; one second in which it does not hold is a doubt.
 """
 
 import math
@@ -10,37 +11,34 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.log.watches.arrays import median
+from bridge.log.watches.arrays import noise_of
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.judge.described import Described
-from cockpit.judge.window import Rows, Window
+from cockpit.judge.window import Rows, Window, means
 
 Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
-# Force and spring are compared about their means in parts of this length: drift and zeros of the sensors fall out. Longer: drift
-# counts; shorter: fewer parts stand out from noise.
-_PART_S = 0.25
-_PARTS = 4  # with a result of their own, 1 s. More: a channel that fails late passes; fewer: the slope is less sure
-# Variance of the spring's extension over that of its noise, from which a part counts. Smaller: noise makes k_d too small, by 4 %
-# at 25; larger: less of a run is compared.
+# Force and spring are compared about their means in this many parts of a second: drift, zeros and scales of both positions fall
+# out. One part: positions whose scales differ by 0.2 % are doubted at 1 mm/s; more: fewer seconds stand out from noise.
+_PARTS = 4
+# Power of force or extension over that of the noise of both, from which a second is compared. Smaller: noise is a difference, of
+# 4 % of the power at 25; larger: less of a run is compared.
 _EXCITED = 25.0
-_SIGMAS = 5.0  # of the slope by which it is outside. Smaller: chance counts; larger: a wrong scale in noise passes
-_EXPLAINED = (
-    0.25  # of the force's variance by a spring of the wrong sign. Smaller: inertia counts; larger: a swap passes
-)
 # Least vibration that is compared, in noise of the accelerometer. Smaller: noise counts; larger: nothing is left of slow feeds.
 _SEEN = 100.0
-# Change of the amplitude from block to block. Larger: ramps count, in which v_a is behind; smaller: few blocks are left.
-_STEADY = 0.02
-# Factor between v_a in the log and in the controller, either way. Smaller: the accelerometer's roll-off, which the controller
-# corrects for, counts; larger: a scale of 0.4 passes. In the bank: 0.97 to 1.1.
-# rms of the slide over that of the base under vibration, and the share of the blocks in which it is more. Smaller: slips under a
-# vibration that is too weak, 5 % of the blocks in the bank, count; larger: a swap in the last fifth of a run passes.
-_LOUDER, _LOUDER_SHARE = 1.3, 0.2
-_SAME_V_A = 2.2
-_SAME_FORCE = 0.02  # of the force, up to which log and controller have the same: equal to the last bit in a sound log
-# Blocks that differ. Larger: a channel that fails late passes; smaller: v_a after ramps counts, 0.014 where a drive inches.
-_OTHER_SHARE = 0.05
+# Share of a second in which the rig vibrates, from which it is compared. Larger: nothing is left of a drive that inches; smaller:
+# ramps of the vibration are most of a second, at 0.05 one of `mount-stops` in the bank; at 0.25 they are a twelfth at most.
+_COMPARED = 0.25
+# Factor between v_a in the log and in the controller, either way: 0.90 to 1.03 in the bank. Smaller: the accelerometer's
+# roll-off, which the controller corrects for, counts, 0.71 at its own band; larger: a scale of 2 passes.
+_SAME_V_A = 1.5
+# rms of the slide over that of the base under vibration: 0.5 at most in the bank, but for slips. Smaller: a stiff contact counts;
+# larger: swapped accelerometers pass.
+_LOUDER = 1.3
+# Noise of the slide's accelerometer: up to the first it shows nothing else, from the second on friction must show. In the bank it
+# shows 0.16 of the expected or more. Second smaller: the one long slip of `drill-string`, 11, counts; larger: less is compared.
+_QUIET, _SHAKEN = 2.0, 20.0
 
 
 class Doubt(NamedTuple):
@@ -51,108 +49,90 @@ class Doubt(NamedTuple):
     decides: bool
 
 
-class SpringRelation:
-    """F = k_d (drive - slide), in parts of a quarter of a second."""
+class Relations:
+    """All relations of a run, window by window."""
 
-    def __init__(self, of: Described) -> None:
-        self._of = of
-        self.compared = 0  # seconds with motion
-        self._wrong: list[tuple[float, float]] = []  # time and ratio, of the first second and of as many as were wrong
-
-    def add(self, t_s: Floats, force_N: Floats, behind_m: Floats, bin_s: float) -> None:
-        """Take the bins of a window, [bins]; behind_m is drive less slide."""
-        width = max(round(_PART_S / bin_s), 8)
-        seconds = len(t_s) // (width * _PARTS)
-        parts = (one[: seconds * _PARTS * width].reshape(seconds, _PARTS, width) for one in (force_N, behind_m))
-        force_N, behind_m = (one - one.mean(axis=2, keepdims=True) for one in parts)
-        for at, (force, behind) in enumerate(zip(force_N, behind_m, strict=True)):
-            noise_m = median(np.abs(np.diff(behind, 2)).ravel()) / 0.6745 / math.sqrt(6.0)
-            excited = (behind**2).mean(axis=1) > _EXCITED * max(noise_m, 1e-12) ** 2
-            if excited.any():
-                self._compare(float(t_s[at * _PARTS * width]), force[excited].ravel(), behind[excited].ravel())
-
-    def _compare(self, at_s: float, force_N: Floats, behind_m: Floats) -> None:
-        slope = float(force_N @ behind_m / (behind_m @ behind_m))
-        left_N2 = float(np.square(force_N - slope * behind_m).sum())
-        spread = _SIGMAS * math.sqrt(left_N2 / len(force_N) / float(behind_m @ behind_m)) / self._of.stiffness_N_per_m
-        ratio = slope / self._of.stiffness_N_per_m
-        if not math.isfinite(ratio):
-            return
-        self.compared += 1
-        opposite = ratio + spread < 0.0 and left_N2 < (1.0 - _EXPLAINED) * float(force_N @ force_N)
-        if opposite or 0.0 < ratio + spread < 1.0 / self._of.off or ratio - spread > self._of.off:
-            self._wrong.append((at_s, ratio))
-
-    def doubts(self) -> list[Doubt]:
-        """What does not hold."""
-        if not self._wrong:
-            return []
-        (from_s, ratio), k_d = self._wrong[0], self._of.stiffness_N_per_m
-        text = (
-            f"the drive force changes by {ratio * k_d:.3g} N per m of drive less slide, the spring has {k_d:.3g} N/m "
-            f"(in {len(self._wrong)} of {self.compared} s with motion, first at {from_s:.1f} s): the force or a position has "
-            "another sign or scale, is another signal, or not connected"
-        )
-        return [Doubt("SENSOR_SCALE" if ratio > 0.0 else "SENSOR_SWAPPED", text, True)]
-
-
-class SameRelation:
-    """The log holds the force and the base's vibration with which the controller worked, and the base vibrates, not the slide."""
-
-    def __init__(self, of: Described) -> None:
-        self._of = of
+    def __init__(self, of: Described, block_s: float) -> None:
+        self._of, self._count = of, round(1.0 / block_s)
+        position_N = of.stiffness_N_per_m * of.channels["drive_position_m"].step
+        steps_N = [position_N, position_N, of.channels["drive_force_N"].step]
+        self._steps_N2 = float(np.nansum(np.square(steps_N))) / 12.0  # noise by the resolution of positions and force
         self.vibrated = False
-        self._forces = self._other_forces = self._v_a = self._other_v_a = self._vibrating = self._louder = 0
+        self.noise_N = math.inf  # of the force in means of 1 ms, in the second with the least
+        self._found: dict[str, tuple[str, int]] = {}  # by code: the text of the first second, and how many there are
 
-    def add(self, window: Window, rows: slice, force_N: Floats) -> None:
-        """Take the rows of a window, with the mean forces of their blocks, [blocks]."""
-        number = window.blocks.sequence[rows]
-        trace, seen = _rows_at(window.trace, "block", number)
-        applied, known = _rows_at(window.applied, "sequence", number)
-        amplitude_m, omega = np.where(known, applied["amplitude_m"], np.nan), 2.0 * math.pi * applied["frequency_Hz"]
+    def add(self, window: Window) -> None:
+        """Take a window, cut into seconds from its end on; its first second may reach into the window before."""
+        count, blocks, of = self._count, window.blocks, self._of
+        if window.end < count:
+            return
+        begins = np.maximum(np.arange(window.end - count, window.first - count, -count)[::-1], 0)
+        at, t_s, bins = begins[:, None] + np.arange(count), blocks.t_ns[begins] * 1e-9, blocks.drive_m.shape[1]
+        force_N = means(blocks.force_N[at].reshape(at.size, -1), bins).reshape(len(at), -1)
+        self.noise_N = float(np.fmin(self.noise_N, np.fmin.reduce(noise_of(force_N))))
+        if of.uses_force and of.uses_slide:
+            behind_m = (blocks.drive_m[at] - blocks.slide_m[at]).reshape(len(at), -1)
+            self._spring(t_s, force_N, behind_m * of.stiffness_N_per_m)
+        self._vibration(t_s, window, at, np.abs(force_N.reshape(*at.shape, bins).mean(axis=2)))
+
+    def _spring(self, t_s: Floats, force_N: Floats, spring_N: Floats) -> None:
+        """F = k_d (drive - slide), [seconds, bins]."""
+        noise_N2 = noise_of(force_N) ** 2 + noise_of(spring_N) ** 2 + self._steps_N2
+        width = force_N.shape[1] // _PARTS
+        parts = (signal[:, : _PARTS * width].reshape(-1, _PARTS, width) for signal in (force_N, spring_N))
+        force_N, spring_N = (part - part.mean(axis=2, keepdims=True) for part in parts)
+        force, spring, apart = (np.square(part).mean(axis=(1, 2)) for part in (force_N, spring_N, force_N - spring_N))
+        larger = np.maximum(force, spring)
+        text = "drive_force_N varies by {:.3g} N, the described stiffness times drive_position_m - mass_position_m by {:.3g} N, "
+        text += "and not alike: one of them has another sign or scale, is another signal, or not connected"
+        broken = (larger > _EXCITED * noise_N2) & (apart > self._of.apart**2 * larger)
+        self._take("SENSOR_SCALE", t_s, broken, text, np.sqrt(force), np.sqrt(spring))
+
+    def _vibration(self, t_s: Floats, window: Window, at: Rows, force_N: Floats) -> None:
+        """Base, slide and controller while the rig vibrates, [seconds, blocks]."""
+
+        def most(code: str, compared: Bools, holds: Bools, text: str, *shown: Floats) -> None:
+            wrong, blocks = compared & ~holds, compared.sum(axis=1)
+            broken = (blocks >= _COMPARED * self._count) & (wrong.sum(axis=1) > 0.5 * blocks)
+            self._take(code, t_s, broken, text, *(values[np.arange(len(at)), wrong.argmax(axis=1)] for values in shown))
+
+        base_noise_mps2, noise_mps2 = (self._of.channels[name].noise for name in ("base_accel_mps2", "mass_accel_mps2"))
+        base_mps2, slide_mps2 = window.blocks.base_mps2[at], window.blocks.slide_mps2[at]
+        applied = _rows_at(window.applied, "sequence", window.blocks.sequence[at])
+        amplitude_m, omega = applied["amplitude_m"], 2.0 * math.pi * applied["frequency_Hz"]
         self.vibrated |= bool((amplitude_m > 0.0).any())
-        least_N = float(np.nan_to_num(self._of.channels["drive_force_N"].noise))
-        seen_N = trace["drive_force_N"]
-        other = np.abs(force_N - seen_N) > np.maximum(
-            _SAME_FORCE * np.maximum(np.abs(force_N), np.abs(seen_N)), least_N
-        )
-        self._forces += int(np.count_nonzero(seen))
-        self._other_forces += int(np.count_nonzero(seen & other))
-        noise_mps2 = float(np.nan_to_num(self._of.channels["base_accel_mps2"].noise))
-        steady = np.abs(np.diff(amplitude_m, prepend=np.nan)) < _STEADY * amplitude_m
-        v_a_mps = trace["vibration_velocity_mps"]
-        vibrating = steady & (omega**2 * amplitude_m > _SEEN * noise_mps2)
-        base_mps2, slide_mps2 = window.blocks.base_mps2[rows], window.blocks.slide_mps2[rows]
-        self._vibrating += int(np.count_nonzero(vibrating))
-        self._louder += int(np.count_nonzero(vibrating & (slide_mps2 > _LOUDER * base_mps2)))
+        vibrates = omega**2 * amplitude_m > _SEEN * np.nan_to_num(base_noise_mps2)
+        text = "mass_accel_mps2 vibrates by {:.3g} m/s2, more than base_accel_mps2 by {:.3g} m/s2: they are swapped, or the "
+        text += "latter is another signal or not connected"
+        most("SENSOR_SWAPPED", vibrates, slide_mps2 <= _LOUDER * base_mps2, text, slide_mps2, base_mps2)
+        per_omega_s = np.divide(1.0, omega, out=np.zeros(at.shape), where=vibrates)
+        # by a contact that holds, and by one that slides
+        shaken_mps2 = np.minimum(self._of.contact_per_s2 * base_mps2 * per_omega_s**2, force_N / self._of.mass_kg)
+        shakes = vibrates & (shaken_mps2 > _SHAKEN * noise_mps2)
+        text = "mass_accel_mps2 shows {:.3g} m/s2, its noise, where friction shakes the slide by {:.3g} m/s2: is it connected?"
+        most("SENSOR_DEAD", shakes, slide_mps2 >= _QUIET * noise_mps2, text, slide_mps2, shaken_mps2)
         # while the rig checks its loop the controller does not follow the vibration
-        both = seen & vibrating & (v_a_mps > 0.0) & (trace["mode"] == wire.EXCITE)
-        ratio = math.sqrt(2.0) * base_mps2[both] / (omega[both] * v_a_mps[both])
-        self._v_a += len(ratio)
-        self._other_v_a += int(np.count_nonzero(~((ratio > 1.0 / _SAME_V_A) & (ratio < _SAME_V_A))))
+        trace = _rows_at(window.trace, "block", window.blocks.sequence[at])
+        v_a_mps = trace["vibration_velocity_mps"]
+        both = vibrates & (v_a_mps > 0.0) & (trace["mode"] == wire.EXCITE)
+        shown_mps = math.sqrt(2.0) * base_mps2 * per_omega_s
+        same = (shown_mps > v_a_mps / _SAME_V_A) & (shown_mps < v_a_mps * _SAME_V_A)
+        text = "v_a is {:.3g} m/s by base_accel_mps2 and {:.3g} m/s in the controller: it worked with another signal"
+        most("SENSOR_OTHER", both, same, text, shown_mps, v_a_mps)
+
+    def _take(self, code: str, t_s: Floats, broken: Bools, text: str, *shown: Floats) -> None:
+        for second in np.flatnonzero(broken).tolist():
+            first = f"from {t_s[second]:.1f} s on {text.format(*(values[second] for values in shown))}"
+            first, seconds = self._found.get(code, (first, 0))
+            self._found[code] = first, seconds + 1
 
     def doubts(self) -> list[Doubt]:
-        """What is not the same."""
-        found: list[Doubt] = []
-        for what, other, blocks in (
-            ("drive force", self._other_forces if self._of.uses_force else 0, self._forces),
-            ("vibration of the base accelerometer", self._other_v_a, self._v_a),
-        ):
-            if other > _OTHER_SHARE * blocks:
-                text = f"the {what} in {other} of {blocks} blocks is not the one with which the controller worked"
-                found.append(Doubt("SENSOR_OTHER", text, True))
-        if self._louder > _LOUDER_SHARE * self._vibrating:
-            text = (
-                f"the slide vibrates more than the base in {self._louder} of {self._vibrating} blocks with vibration: both "
-                "accelerometers are swapped, or the base's is another signal"
-            )
-            found.append(Doubt("SENSOR_SWAPPED", text, True))
-        return found
+        """Relations that do not hold."""
+        return [Doubt(code, f"{text} ({seconds} s)", True) for code, (text, seconds) in self._found.items()]
 
 
-def _rows_at(rows: Rows, name: str, number: Rows) -> tuple[Rows, npt.NDArray[np.bool_]]:
-    """The rows with these numbers of blocks, [blocks], and whether there is one; else the row is one of zeros."""
+def _rows_at(rows: Rows, name: str, number: Rows) -> Rows:
+    """The rows with these numbers of blocks, [seconds, blocks]; zeros where there is none."""
     rows = np.concatenate([rows, np.zeros(1, rows.dtype)])
     at = np.minimum(np.searchsorted(rows[name][:-1], number), len(rows) - 1)
-    known = (rows[name][at] == number) & (at < len(rows) - 1)
-    return rows[np.where(known, at, -1)], known
+    return rows[np.where(rows[name][at] == number, at, -1)]

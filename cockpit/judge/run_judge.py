@@ -4,35 +4,35 @@ It is a composition of watches, each with a method for every topic that it looks
 messages goes into `_watches`, one that needs blocks and steps together into `_judge_window`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from bridge.log.check.channel import not_finite
 from bridge.log.check.log_check import LogWatch
 from bridge.log.damage import Damage, damage_findings, foreign_in_words
 from bridge.log.in_charge import GONE_S, InCharge
 from bridge.log.metadata import Metadata, configuration_of
 from bridge.log.storage.chain import Chain, chain_findings
-from bridge.log.watches.loss_watch import LossWatch
 from bridge.units import counted
 from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import WEAK_REASONS, harms, is_told
-from bridge.wire.messages import Records
+from bridge.wire.messages import CHANNELS, Records
 from cockpit.judge.described import described
 from cockpit.judge.machine_terms import MotionOf
-from cockpit.judge.pauses import CommandSum, Pauses, StallSum
+from cockpit.judge.pauses import CommandSum, StallSum
 from cockpit.judge.phases import Phase, PhaseSum, Stretches, apart, together, within
 from cockpit.judge.ratio_watch import RatioWatch
-from cockpit.judge.sensor_watch import SensorVerdict, SensorWatch
+from cockpit.judge.sensor_watch import SensorWatch
 from cockpit.judge.setup import SETTLING_S, Setup, is_known, setup_of
 from cockpit.judge.slips import bins_of, forces_of
 from cockpit.judge.tested import too_little, untested
 from cockpit.judge.verdict import MISSING_SHARE, RunVerdict
-from cockpit.judge.watches import FiniteWatch, FrozenWatch, LatencyWatch, StepWatch
+from cockpit.judge.watches import FrozenWatch, LatencyWatch, StepWatch
 from cockpit.judge.window import Moved, Waiting, reduced
 from diagnosis.features.cycles import Cycles
 
@@ -40,14 +40,8 @@ if TYPE_CHECKING:
     from cockpit.judge.margins import Margins, MarginSum
 
 _COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}  # from the blocks and steps themselves
-_COUNTED = ("applied", "command", "trace", "state")  # topics besides the blocks whose missing messages count
-
-
-def _margin_sum() -> "MarginSum":
-    """Imported where it is wanted alone, as the controller's design comes with it."""
-    from cockpit.judge.margins import MarginSum
-
-    return MarginSum()
+_OF_EVERY_BLOCK = ("applied", "command", "trace")
+_CONTROLLED = tuple(name for name in CHANNELS if name != "mass_accel_mps2")  # channels that the controller works with
 
 
 class RunJudge:
@@ -74,13 +68,15 @@ class RunJudge:
         self._stretch_from_s = stretch_from_s
         self._path, self._headers = path, headers
         self._waiting = Waiting()
-        self._losses = {name: LossWatch() for name in ("sensors", *_COUNTED)}
-        self._latency, self._finite, self._steps = LatencyWatch(), FiniteWatch(), StepWatch()
-        self._frozen = FrozenWatch()
-        self._watches: Sequence[Any] = (self._latency, self._finite, self._frozen, self._steps)
+        self._latency, self._steps, self._frozen = LatencyWatch(), StepWatch(), FrozenWatch()
+        self._watches: Sequence[Any] = (self._latency, self._frozen, self._steps)
         self._motion, self._moved = MotionOf(), Moved()
         self._commands, self._stalls = CommandSum(), StallSum()
-        self._margins = _margin_sum() if margins else None
+        self._margins: MarginSum | None = None
+        if margins:  # imported here, as the controller's design comes with it
+            from cockpit.judge import margins as of_loop
+
+            self._margins = of_loop.MarginSum()
         self._sensor_watch: SensorWatch | None = None  # made, with the next, at the first window
         self._ratio: RatioWatch | None = None
         self._setup: Setup | None = None
@@ -102,8 +98,6 @@ class RunJudge:
         if not len(records):
             return
         self.log.add(topic, records, log_time_ns)
-        if topic in self._losses:
-            self._losses[topic].add(records)
         for watch in self._watches:
             take: Callable[[Records], None] | None = getattr(watch, topic, None)
             if take is not None:
@@ -149,7 +143,8 @@ class RunJudge:
         }
         plant = configuration_of(self._headers, "plant", self._path) if "plant" in self._headers else None
         of = described(plant, configuration_of(self._headers, "controller", self._path))
-        self._sensor_watch, self._ratio = SensorWatch(of, self.log, self._frozen), RatioWatch(of, setup.block_s)
+        self._sensor_watch = SensorWatch(of, self.log, self._frozen, setup.block_s)
+        self._ratio = RatioWatch(of, setup.block_s)
         if self._stretch_from_s is not None:
             self._phases["stretch"] = PhaseSum(self._stretch_from_s, np.inf)
 
@@ -195,8 +190,7 @@ class RunJudge:
 
     def _without(self, setup: Setup, is_last: bool) -> Stretches:
         """What is no part of the controller's time: it has a second to settle after it was stopped, or was not there."""
-        stops = self._steps.stops(setup.block_s, is_last)
-        return [*stops, *((from_s, until_s + SETTLING_S) for from_s, until_s in self._fallbacks())]
+        return [*self._steps.stops(setup.block_s, is_last), *_settling(self._fallbacks())]
 
     def result(self, damage: Damage, chain: Chain, foreign: dict[str, int]) -> RunVerdict:
         """The verdict, at the end of the log. Raises Fault BAD_LOG."""
@@ -211,27 +205,33 @@ class RunJudge:
         phases = {name: sum_.result(setup.block_s) for name, sum_ in self._phases.items()}
         self.stretch = phases.get("stretch")
         after, seconds = phases.get("after"), self._last_ns / 1e9
-        stops = self._steps.stops(setup.block_s, is_last=True) if not setup.imported else []
+        stops = self._steps.stops(setup.block_s, is_last=True)
         stopped_s = sum(min(until_s - SETTLING_S, seconds) - from_s for from_s, until_s in stops)
-        gone = self._gone()
+        gone, settled_s = self._gone(), setup.settled_from_s
+        spans = ((max(from_s, settled_s), until_s, until_s - from_s) for from_s, until_s in self.log.charge.stretches)
+        short = [(from_s, until_s) for from_s, until_s, length_s in spans if length_s <= GONE_S]
         enabled_s = min(setup.enabled_from_s, seconds) if setup.imported else setup.enabled_from_s
         in_charge_s = seconds - enabled_s - stopped_s - sum(until_s - from_s for from_s, until_s in gone)
+        planned_s = self._planned_s(setup)
         lost_blocks, all_known = self._lost_blocks(damage)
-        latency = self._latency.result() if not setup.imported else None
-        not_watched = self.log.events.not_watched if latency is not None else ""
+        latency = self._latency.result()
+        events = self.log.events
+        not_watched = events.not_watched if latency is not None else ""
         faults, told = self._lines(charge, damage, chain, foreign)
-        missing = self._phases["after"].missing + self._lost_at_the_end() if "after" in self._phases else 0
-        why_untested = untested(setup, self._steps, self._first_ns is not None, self._answered, after, in_charge_s)
         ratio = self._ratio.result() if self._ratio is not None else None
+        watch = self._sensor_watch
+        slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
+        counted_s = apart((settled_s, seconds), self._without(setup, is_last=True))
         return RunVerdict(
             log=str(self._path),
             seconds=seconds,
+            planned_s=planned_s,
             blocks=self.log.topics["sensors"].messages,
             lost_blocks=lost_blocks,
-            lost_messages=lost_blocks + sum(self._losses[name].missing for name in _COUNTED),
-            all_losses_known=all_known,
+            lost_messages=lost_blocks + sum(self.log.topics[name].missing for name in (*_OF_EVERY_BLOCK, "state")),
+            all_losses_known=all_known and not planned_s,
+            absent=[name for name in _OF_EVERY_BLOCK if not (setup.imported or self.log.topics[name].messages)],
             controller_missed=self._steps.missed,
-            missing=missing,
             enabled_from_s=enabled_s,
             stopped_s=stopped_s,
             charge=charge,
@@ -241,15 +241,18 @@ class RunJudge:
             after=after,
             unsure_slips=self._phases["after"].unsure if after is not None else 0,
             stopped_slips=self._slips_in(stops),
-            stalled_slips=self._slips_in_stalls(setup, stops, gone),
+            stalled_slips=self._slips_in(_settling(short), [*stops, *_settling(gone)]),
             drive_velocity_max_mps=self._steps.drive_velocity_max_mps,
             velocity_ratio_min=ratio.lowest if ratio is not None else 0.0,
             velocity_ratio_max=ratio.highest if ratio is not None else 0.0,
             ratio=ratio,
-            sensors=self._sensor_verdict(setup, seconds),
+            highest_set_point=self._steps.highest_set_point,
+            sensors=watch.result(slips_s, counted_s) if watch is not None else None,
             latency=latency,
             late_commands=self._latency.late,
-            pauses=self._pauses() if latency is not None and not not_watched else None,
+            pauses=self._commands.result(self._latency, sorted(events.pauses), self._applied_ns)
+            if latency is not None and not not_watched
+            else None,
             computer=self._stalls.result() if latency is not None else None,
             not_watched=not_watched,
             faults=faults,
@@ -257,13 +260,13 @@ class RunJudge:
             chain=chain,
             normal_scheduling=[
                 event.source
-                for event in self.log.events.kept
+                for event in events.kept
                 if event.code == "START" and event.text.startswith(realtime.NORMAL)
             ],
-            untested=why_untested,
-            doubts=self._doubts(charge, after, missing, setup.block_s, chain, damage, all_known)
-            if not setup.imported
-            else [],
+            untested=untested(setup, self._steps, seconds, self._answered, after, in_charge_s),
+            doubts=[]
+            if setup.imported
+            else self._doubts(charge, after, setup.block_s, chain, damage, all_known or planned_s > 0),
             imported=setup.imported,
             gain_verified=setup.known_gain or self._gain_seen,
         )
@@ -274,49 +277,30 @@ class RunJudge:
             raise ValueError("margins: must be wanted when the judge is made")
         return self._margins.result(self._headers, self._path, self._steps.loop_delay_s)
 
-    def _sensor_verdict(self, setup: Setup, seconds: float) -> SensorVerdict | None:
-        """What the sensors can carry; None for an imported log, and for one without a block."""
-        return self.sensors_in(apart((setup.settled_from_s, seconds), self._without(setup, is_last=True)))
+    def _planned_s(self, setup: Setup) -> float:
+        """Length of a run whose log ends before it, and without the plant's END; 0 for any other."""
+        early = self._last_ns * 1e-9 < setup.duration_s - 0.5 * setup.block_s
+        return setup.duration_s if early and not self.log.events.has("plant", "END") else 0.0
 
-    def sensors_in(self, judged: Stretches) -> SensorVerdict | None:
-        """The same, with the slips in these stretches [s] counted, once `result` was called."""
-        slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
-        return self._sensor_watch.result(slips_s, judged) if self._sensor_watch is not None else None
-
-    def _pauses(self) -> Pauses:
-        return self._commands.result(sorted(self.log.events.pauses), self._applied_ns)
-
-    def _slips_in(self, stretches: Stretches) -> int:
-        """Slips in any of the stretches, each counted once."""
-        return int(np.count_nonzero(within(self.cycles.breakaway_t_s, stretches))) if self.cycles is not None else 0
-
-    def _slips_in_stalls(self, setup: Setup, stops: Stretches, gone: Stretches) -> int:
-        """Slips with the controller enabled in short fallbacks and in the second after each."""
-        apart = [*stops, *((from_s, until_s + SETTLING_S) for from_s, until_s in gone)]
-        short = [
-            (max(from_s, setup.settled_from_s), until_s + SETTLING_S)
-            for from_s, until_s in self.log.charge.stretches
-            if until_s - from_s <= GONE_S
-        ]
-        if self.cycles is None or not short:
-            return 0
-        at_s = self.cycles.breakaway_t_s
-        return int(np.count_nonzero(within(at_s, short) & ~within(at_s, apart)))
+    def _slips_in(self, stretches: Stretches, without: Iterable[tuple[float, float]] = ()) -> int:
+        """Slips in any of the stretches and in none of the others, each counted once."""
+        at_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
+        return int(np.count_nonzero(within(at_s, stretches) & ~within(at_s, without)))
 
     def _lost_blocks(self, damage: Damage) -> tuple[int, bool]:
         """Blocks that are not in the log, and whether it tells of all.
 
         A damaged chunk may hold the first blocks or the last ones: then the plant's END counts, which says how many there were.
         """
-        watch, whole = self._losses["sensors"], damage.whole and not damage.before
+        watch, whole = self.log.topics["sensors"], damage.whole and not damage.before
         if self.log.events.blocks_sent is None:
             return watch.missing, whole
-        first = 0 if whole else watch.first  # a recorder may have come late
+        first = 0 if whole else watch.first_number  # a recorder may have come late
         return watch.missing + first + self._lost_at_the_end(), True
 
     def _lost_at_the_end(self) -> int:
         """Blocks after the last one in the log, by the plant's END."""
-        return max((self.log.events.blocks_sent or 0) - self._losses["sensors"].end, 0)
+        return max((self.log.events.blocks_sent or 0) - self.log.topics["sensors"].end, 0)
 
     def _lines(
         self, charge: InCharge, damage: Damage, chain: Chain, foreign: dict[str, int]
@@ -331,13 +315,26 @@ class RunJudge:
                 continue
             listed.add(key)
             many = f" (the first of {counts[key]})" if counts[key] > 1 else ""
-            (faults if harms(event.code) else told).append(f"{event.code}: {event.text}{many}")
+            text = self._open_loop(event) if event.code == "OPEN_LOOP" else event.text
+            (faults if harms(event.code) else told).append(f"{event.code}: {text}{many}")
         told += foreign_in_words(foreign)
         for code, text, is_fault in charge.sentences():
             (faults if is_fault else told).append(f"{code}: {text}")
-        faults += [line for line in (self._clock(), *self._finite.faults(), self._steps.unseen()) if line]
+        looks = {name: self.log.signals[name].result() for name in _CONTROLLED}
+        gone = [found for name, seen in looks.items() for found in not_finite(name, seen, self.log.sample_s)]
+        left_out = (f"NOT_FINITE: {finding.where}: {finding.text}; left out" for finding in gone)
+        faults += [line for line in (self._clock(), *left_out, self._steps.unseen()) if line]
         findings = [*damage_findings(damage, self._path), *chain_findings(chain, self._path.name)]
         return [*faults, *(f"{finding.kind}: {finding.text}" for finding in findings)], told
+
+    def _open_loop(self, event: wire.Event) -> str:
+        """The text of the controller's trip; where the rig had no fresh command just before, that is why v_a was low."""
+        at_s = event.t_ns * 1e-9
+        for from_s, until_s in self._fallbacks():
+            if from_s <= at_s <= until_s + SETTLING_S:
+                why = f"less v_a than commanded, as no fresh command reached the rig from {from_s:.2f} s on"
+                return f"{why}: look at the link to the controller, then `stickslip reset`"
+        return event.text
 
     def _clock(self) -> str:
         """What is wrong with the time of the blocks, in words; empty where it follows their numbers."""
@@ -350,30 +347,27 @@ class RunJudge:
         return f"CLOCK: t_ns of /sensors {how}, first {first} by {off_ns * 1e-6:g} ms: times are wrong from there"
 
     def _doubts(
-        self,
-        charge: InCharge,
-        after: Phase | None,
-        missing: int,
-        block_s: float,
-        chain: Chain,
-        damage: Damage,
-        all_known: bool,
+        self, charge: InCharge, after: Phase | None, block_s: float, chain: Chain, damage: Damage, all_known: bool
     ) -> list[str]:
         """Why a run cannot be judged although something was tested."""
         doubts = [line for line in (self._clock(), too_little(after, self._phases, block_s)) if line]
-        doubts += [
-            f"no message of /{name} is in the log"
-            for name in ("applied", "command")
-            if not self.log.topics[name].messages
-        ]
         if charge.controller_until_s is not None:
             doubts.append(f"no step of the controller is in the log after {charge.controller_until_s:.2f} s")
-        if after is not None and missing * block_s > MISSING_SHARE * (after.seconds + missing * block_s):
-            share = 100.0 * missing * block_s / (after.seconds + missing * block_s)
-            doubts.append(f"{share:.1f} % of the judged blocks are missing, more than {100 * MISSING_SHARE:g} %")
+        if after is not None:
+            missing_s = block_s * (self._phases["after"].missing + self._lost_at_the_end())
+            share = missing_s / (after.seconds + missing_s)
+            if share > MISSING_SHARE:
+                doubts.append(
+                    f"{100 * share:.1f} % of the judged blocks are missing, more than {100 * MISSING_SHARE:g} %"
+                )
         if chain.changes:
             doubts.append("bytes of the log were changed after it was written")
         if not all_known:
             kinds = [f"{finding.kind}: {finding.text}" for finding in damage_findings(damage, self._path)]
             doubts.append(f"how many blocks are missing is not known; {'; '.join(kinds)}")
         return doubts
+
+
+def _settling(stretches: Iterable[tuple[float, float]]) -> Stretches:
+    """Stretches with the second after each, which the controller has to settle."""
+    return [(from_s, until_s + SETTLING_S) for from_s, until_s in stretches]

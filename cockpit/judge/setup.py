@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bridge.log.metadata import Metadata, configuration_of, number_of, source_of_import, texts_of
+from bridge.log.metadata import Metadata, configuration_of, is_number, number_of, source_of_import, texts_of
 
 SETTLING_S = 1.0  # after the controller is enabled, was stopped or was not there, it has this long
 
@@ -18,6 +18,7 @@ class Setup(NamedTuple):
     slowest_fall_s: float  # of a slip
     absent: list[str]  # channels that the file of another program did not hold; they are zeros in its log
     known_gain: bool  # of the exciter, by the configuration
+    duration_s: float  # of the whole run, by the plant's configuration; 0: it has no end, or another rig does not tell
 
     @property
     def settled_from_s(self) -> float:
@@ -38,16 +39,18 @@ def is_known(headers: Metadata) -> bool:
 def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
     """Of a log; `period_ns` of its blocks counts where no controller tells it. Raises Fault BAD_LOG."""
     absent = absent_channels(headers, path)
+    plant = configuration_of(headers, "plant", path) if "plant" in headers else {}
     if source := source_of_import(headers, path):
-        return Setup(source, period_ns * 1e-9, math.inf, _slowest_fall_s(headers, path), absent, True)
+        return Setup(source, period_ns * 1e-9, math.inf, _slowest_fall_s(plant), absent, True, 0.0)
     controller = configuration_of(headers, "controller", path)
     return Setup(
         imported="",
         block_s=number_of(controller, "block_s", path),
         enabled_from_s=number_of(controller, "policy.enabled_from_s", path),
-        slowest_fall_s=_slowest_fall_s(headers, path),
+        slowest_fall_s=_slowest_fall_s(plant),
         absent=absent,
         known_gain=bool(controller.get("amplitude", {}).get("known_gain")),
+        duration_s=plant["duration_s"] if is_number(plant.get("duration_s")) else 0.0,
     )
 
 
@@ -56,11 +59,9 @@ def absent_channels(headers: Metadata, path: Path) -> list[str]:
     return texts_of(headers, "import", "missing", path)
 
 
-def _slowest_fall_s(headers: Metadata, path: Path) -> float:
+def _slowest_fall_s(plant: Any) -> float:
     """How long a slip may last: 1.6 times that of the plant's slide on its spring, and never less than 0.1 s."""
-    if "plant" not in headers:
-        return 0.1
-    rig: Any = configuration_of(headers, "plant", path).get("rig")
+    rig = plant.get("rig")
     try:
         return max(0.1, 3.0 * math.sqrt(rig["slide"]["mass_kg"] / rig["drive"]["stiffness_N_per_m"]))
     except (KeyError, TypeError, ValueError, ArithmeticError):  # another rig need not tell

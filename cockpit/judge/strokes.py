@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridge.log.watches.arrays import median
-from cockpit.judge.machine_terms import noise_of
+from bridge.log.watches.arrays import median, noise_of
 from diagnosis.look.turns import turns
 
 Floats = npt.NDArray[np.floating[Any]]

@@ -8,14 +8,14 @@ from cockpit.judge.watches import StepWatch
 
 
 def untested(
-    setup: Setup, steps: StepWatch, recorded: bool, answered: bool, after: Phase | None, in_charge_s: float
+    setup: Setup, steps: StepWatch, seconds: float, answered: bool, after: Phase | None, in_charge_s: float
 ) -> str:
     """Why nothing was tested, in words; empty where something was.
 
     Args:
         setup: of the run.
         steps: of the controller.
-        recorded: whether there is a block.
+        seconds: end of the last block; 0 without any.
         answered: whether a block has a fresh command.
         after: the stretch in which the controller is judged.
         in_charge_s: time of the controller, its settling too.
@@ -23,7 +23,7 @@ def untested(
     """
     if setup.imported:
         return "measured data of another program: no controller was there to be judged"
-    if not recorded:
+    if not seconds:
         return "no block was recorded"
     if not steps.steps:
         return "no step of a controller was recorded: nothing was tested"
@@ -33,6 +33,8 @@ def untested(
         return "the drive never moved: nothing was tested"
     if after is not None:
         return ""
+    if seconds < setup.enabled_from_s:
+        return f"ended before the controller was enabled (at {setup.enabled_from_s:.1f} s)"
     if in_charge_s <= 0.0 or not answered:
         return "the controller was not in charge in this run"
     why = f"too short to judge: it has {SETTLING_S:g} s to settle"

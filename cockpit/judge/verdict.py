@@ -28,12 +28,13 @@ class RunVerdict(NamedTuple):
 
     log: str
     seconds: float
+    planned_s: float  # of a run whose log ends before, and without the plant's END; 0 for any other
     blocks: int
     lost_blocks: int
     lost_messages: int  # at least: of blocks alone it is known how many there were
     all_losses_known: bool  # False: a log that is cut or damaged may lack more than it shows
+    absent: list[str]  # topics of every block that have no message in the log
     controller_missed: int  # blocks that never came to the controller, by its own count
-    missing: int  # blocks that are missing, or hold no force, where the controller is judged
     enabled_from_s: float
     stopped_s: float  # by an operator, and no part of `after`
     charge: InCharge  # when the rig was on its own, which is no part of `after` either, and blocks without an answer
@@ -48,6 +49,7 @@ class RunVerdict(NamedTuple):
     velocity_ratio_min: float
     velocity_ratio_max: float
     ratio: RatioVerdict | None  # v_a over v_d, judged at both ends; None for an imported log
+    highest_set_point: float  # of v_a over v_d while it vibrated: the controller raises it at the start and after slips
     sensors: SensorVerdict | None  # whether they can carry a verdict; None for an imported log
     latency: Latency | None
     late_commands: int  # that took more than 1 ms
@@ -74,6 +76,11 @@ class RunVerdict(NamedTuple):
         return self._judged()[1]
 
     @property
+    def cut(self) -> str:
+        """Where the log ends, in words, if that is before the run did; else empty."""
+        return f"the log ends at {self.seconds:.2f} of {self.planned_s:.2f} s" if self.planned_s else ""
+
+    @property
     def good(self) -> bool:
         """Whether control is OK; of an imported log, which has no controller, whether it is whole."""
         if self.imported:
@@ -98,11 +105,11 @@ class RunVerdict(NamedTuple):
 
     def exit_status(self, strict: bool) -> int:
         """Of a command that judges: 0 ok, 1 not ok, 14 not judged; `strict`: 1 with any loss or late command, too."""
-        if self.imported or self.control == NOT_OK:
-            return 0 if self.good else 1
-        if self.control == NOT_JUDGED:
+        if strict and self.losses():
+            return 1
+        if self.control == NOT_JUDGED and not self.imported:
             return FAULTS["NOT_JUDGED"].exit_status
-        return 1 if strict and self.losses() else 0
+        return 0 if self.good else 1
 
     def losses(self) -> list[str]:
         """What was lost or late on the way, in words; what an acceptance test does not allow."""
@@ -112,7 +119,8 @@ class RunVerdict(NamedTuple):
             (self.late_commands, "late command", "late commands"),
             (self.charge.unanswered, "block without a command", "blocks without a command"),
         )
-        found = [counted(number, *names) for number, *names in counts if number]
+        found = [f"no message of /{name} in the log" for name in self.absent]
+        found += [counted(number, *names) for number, *names in counts if number]
         return [*found, *([] if self.all_losses_known else ["how many messages are lost is not known"])]
 
     def _judged(self) -> tuple[str, str]:
@@ -131,7 +139,9 @@ class RunVerdict(NamedTuple):
             if self.unsure_slips
             else []
         )
-        doubts = [*blind, *self.doubts, *unsure]
+        cut = [f"{self.cut} and does not say why; record the run again"] if self.cut else []
+        absent = [f"no message of /{name} is in the log" for name in self.absent]
+        doubts = [*cut, *blind, *absent, *self.doubts, *unsure]
         return (NOT_JUDGED, "; ".join(doubts)) if doubts else (OK, "")
 
     @property

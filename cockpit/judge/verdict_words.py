@@ -10,7 +10,7 @@ from bridge.wire import realtime
 from cockpit.judge.machine_terms import Following
 from cockpit.judge.pauses import computer_in_words, pauses_in_words
 from cockpit.judge.phases import Phase
-from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, RunVerdict
+from cockpit.judge.verdict import NOT_JUDGED, NOT_OK, OK, RunVerdict
 
 VERDICT = "verdict"  # the metadata record of a log that `stickslip run` has judged
 _MOST_WARNINGS = 3  # in the short form; more would push the six lines off the screen of a run on a busy computer
@@ -31,20 +31,21 @@ def in_words(verdict: RunVerdict, verbose: bool, without: Phase | None = None) -
     if v.imported:
         lines.append(f"imported from {v.imported}: {v.untested}")
     else:
-        lines.append(f"control  {v.control}{': ' if v.reason else ''}{v.reason}")
+        vibrated = v.ratio is not None and v.ratio.judged_s > 0.0
+        unsure = "; the exciter's gain was not verified" if v.control == OK and vibrated and not v.gain_verified else ""
+        lines.append(f"control  {v.control}{': ' if v.reason else ''}{v.reason}{unsure}")
     lines.append(f"data     {data_in_words(v)}")
     if not v.imported:
         lines.append(computer_in_words(v.computer, v.not_watched))
     if v.before is not None:
-        rate = f"{v.before.slips_per_min:.0f} per minute{'' if v.imported else ' of this phase'}"
-        lines.append(
-            f"{'whole ' if v.imported else 'before'}   {counted(v.before.slips, 'slip')} in {v.before.seconds:.1f} s ({rate}), "
-            f"{_swing(v.before)}"
-        )
+        rate = f" ({v.before.slips_per_min:.0f} per minute{'' if v.imported else ' of this phase'})"
+        lines.append(f"{'whole' if v.imported else 'before':<8} {_slips(v.before, rate)}")
     if v.after is not None:
-        lines.append(f"after    {counted(v.after.slips, 'slip')} in {v.after.seconds:.1f} s, {_swing(v.after)}")
+        lines.append(f"after    {_slips(v.after)}")
     if without is not None:
-        lines.append(_without_in_words(without))
+        lines.append(
+            f"without  {_slips(without)}{_errors(without)}: the stretch after, simulated without the controller"
+        )
     if verbose:
         return [*lines, *_figures(v)]
     return [*lines, *shortened([f"warning  {line}" for line in (*v.trips, *v.warnings)], verbose)]
@@ -63,37 +64,30 @@ def _figures(verdict: RunVerdict) -> list[str]:
     v = verdict
     lines: list[str] = []
     if v.taking_over is not None and v.taking_over.slips:
-        lines.append(
-            f"settling {counted(v.taking_over.slips, 'slip')} in the first {v.taking_over.seconds:.1f} s after hand-over "
-            "(counted neither before nor after)"
-        )
+        when = f"in the first {v.taking_over.seconds:.1f} s after hand-over (counted neither before nor after)"
+        lines.append(f"settling {counted(v.taking_over.slips, 'slip')} {when}")
     lines.extend(_machine_terms(v.before, v.after))
     if v.alone is not None:
-        lines.append(
-            f"alone    {counted(v.alone.slips, 'slip')} in {v.alone.seconds:.2f} s without a controller, {_swing(v.alone)}"
-        )
+        lines.append(f"alone    {_slips(v.alone, ' without a controller')}")
     if v.stalled_slips:
-        lines.append(
-            f"stalled  {counted(v.stalled_slips, 'slip')} while the rig had no fresh command for a moment, or in the second after"
-        )
+        when = "while the rig had no fresh command for a moment, or in the second after"
+        lines.append(f"stalled  {counted(v.stalled_slips, 'slip')} {when}")
     if v.stopped_s > _FADE_S:
         slips = f"; {counted(v.stopped_slips, 'slip')} then" if v.stopped_slips else ""
         lines.append(
-            f"stopped  by an operator, or not armed, for {v.stopped_s:.1f} s, which is no part of what came after{slips}"
+            f"stopped  by an operator, or not armed, for {v.stopped_s:.1f} s (counted neither before nor after){slips}"
         )
     if v.ratio is not None and v.ratio.judged_s:
-        lines.append(f"v_a/v_d  {v.ratio.in_words()}")
+        lines.append(f"v_a/v_d  {v.ratio.in_words()}; set point at most {v.highest_set_point:.2f}")
         if not v.gain_verified:
             lines.append(
                 "exciter  gain not verified: v_a comes from the base accelerometer alone. Run the loop check "
                 "(`stickslip arm`) or set amplitude.known_gain."
             )
     if v.latency is not None:
-        latency = v.latency
-        lines.append(
-            f"latency  block to command p50 {latency.p50_us:.0f} us, p99 {latency.p99_us:.0f} us, p99.9 "
-            f"{latency.p999_us:.0f} us; {100 * latency.within_1_ms:.2f} % within 1 ms"
-        )
+        p50, p99, p999, share = v.latency
+        quantiles = f"p50 {p50:.0f} us, p99 {p99:.0f} us, p99.9 {p999:.0f} us"
+        lines.append(f"latency  block to command {quantiles}; {100 * share:.2f} % within 1 ms")
     lines.extend(pauses_in_words(v.pauses))
     if v.normal_scheduling:
         who = " and ".join(v.normal_scheduling)
@@ -108,28 +102,28 @@ def _figures(verdict: RunVerdict) -> list[str]:
 
 def strictly(verdict: RunVerdict, strict: bool) -> list[str]:
     """A line with what an acceptance test does not allow; none where it asks for nothing more, or all is there."""
-    losses = verdict.losses() if strict and verdict.exit_status(strict=False) == 0 else []
+    losses = verdict.losses() if strict and verdict.exit_status(strict=False) != 1 else []
     return [f"strict   not ok: {', '.join(losses)}"] if losses else []
 
 
 def data_in_words(verdict: RunVerdict) -> str:
     """What of the run is in the log, and whether the controller had what is not."""
     v = verdict
-    total = v.blocks + v.lost_blocks
+    total, missed = v.blocks + v.lost_blocks, f"the controller missed {v.controller_missed}"
+    parts = [f"{v.seconds:.2f} of {v.planned_s:.2f} s; the rest is not in the log"] if v.planned_s else []
     if v.lost_blocks:
-        had = (
-            "the controller had them all" if not v.controller_missed else f"the controller missed {v.controller_missed}"
-        )
+        had = missed if v.controller_missed else "the controller had them all"
         few = "" if v.all_losses_known else "at least "
-        text = f"{few}{v.lost_blocks} of {total} blocks missing in the log{'' if v.imported else f' ({had})'}"
-    elif not v.all_losses_known:
-        text = f"{total} blocks; how many are missing is not known"
+        parts.append(f"{few}{v.lost_blocks} of {total} blocks missing in the log{'' if v.imported else f' ({had})'}")
     else:
-        text = f"whole: {counted(total, 'block')}"
-        if v.controller_missed:
-            text += f"; the controller missed {v.controller_missed}"
+        if not parts:
+            known = v.all_losses_known
+            parts = [
+                f"whole: {counted(total, 'block')}" if known else f"{total} blocks; how many are missing is not known"
+            ]
+        parts += [missed] if v.controller_missed else []
     others = v.lost_messages - v.lost_blocks
-    return text + (f"; {counted(others, 'other message')} missing" if others else "")
+    return "; ".join([*parts, *([f"{counted(others, 'other message')} missing"] if others else [])])
 
 
 def _machine_terms(before: Phase | None, after: Phase | None) -> list[str]:
@@ -139,39 +133,36 @@ def _machine_terms(before: Phase | None, after: Phase | None) -> list[str]:
     was = before.following if before is not None else None
     lines = following_in_words(after.following, was, "before")
     if after.vibration_dose_mm2_per_s > 0.0:
-        rms_mm_per_s = math.sqrt(after.vibration_dose_mm2_per_s / after.seconds)
-        lines.append(
-            f"dose     v_a^2 over the {after.seconds:.1f} s after is {after.vibration_dose_mm2_per_s:.3g} mm2/s, "
-            f"{rms_mm_per_s:.2f} mm/s rms"
-        )
+        dose, rms = after.vibration_dose_mm2_per_s, math.sqrt(after.vibration_dose_mm2_per_s / after.seconds)
+        lines.append(f"dose     v_a^2 over the {after.seconds:.1f} s after is {dose:.3g} mm2/s, {rms:.2f} mm/s rms")
     return lines
 
 
 def following_in_words(now: Following, other: Following | None, name: str) -> list[str]:
     """Following error and reversals of a stretch as lines, beside those of another stretch called `name`, if there is one."""
-    lines = [
-        f"error    following error {_um(now.error_rms_m)} um rms, {_um(now.error_peak_m)} um peak, "
-        f"{_um(now.error_ripple_m)} um rms about its mean"
-    ]
+    lines = [f"error    {_error(now)}"]
     if other is not None:
-        sizes_m = other.error_rms_m, other.error_peak_m, other.error_ripple_m
-        lines[0] += f" ({name}: {', '.join(map(_um, sizes_m))})"
+        lines[0] += f" ({name}: {_um(other.error_rms_m)}, {_um(other.error_peak_m)}, {_um(other.error_ripple_m)})"
     if now.reversals:
         line = f"reversal quadrant error {_worst_reversal(now)}"
         lines.append(line + (f" ({name}: {_worst_reversal(other)})" if other is not None and other.reversals else ""))
     return lines
 
 
-def _without_in_words(without: Phase) -> str:
-    line = f"without  {counted(without.slips, 'slip')} in {without.seconds:.1f} s, {_swing(without)}"
-    if (following := without.following) is not None:
-        line += (
-            f", following error {_um(following.error_rms_m)} um rms, {_um(following.error_peak_m)} um peak, "
-            f"{_um(following.error_ripple_m)} um rms about its mean"
-        )
-        if following.reversals:
-            line += f", quadrant error {_worst_reversal(following)}"
-    return f"{line}: the stretch after, simulated without the controller"
+def _error(of: Following) -> str:
+    rms, peak, ripple = _um(of.error_rms_m), _um(of.error_peak_m), _um(of.error_ripple_m)
+    return f"following error {rms} um rms, {peak} um peak, {ripple} um rms about its mean"
+
+
+def _errors(without: Phase) -> str:
+    if (following := without.following) is None:
+        return ""
+    reversal = f", quadrant error {_worst_reversal(following)}" if following.reversals else ""
+    return f", {_error(following)}{reversal}"
+
+
+def _slips(phase: Phase, more: str = "") -> str:
+    return f"{counted(phase.slips, 'slip')} in {phase.seconds:.1f} s{more}, {_swing(phase)}"
 
 
 def _swing(phase: Phase) -> str:
@@ -190,17 +181,18 @@ def _um(size_m: float) -> str:
 
 def noted(verdict: RunVerdict) -> dict[str, Any]:
     """The fields of the table `verdict` in a log: what came of the run, as its end was judged."""
-    figures = verdict.as_dict()
     apart = "log", "chain", "good", "headline"  # the first two change when the file is moved, or written again
-    return {
-        "good": verdict.good,
-        "headline": headline(verdict),
-        "figures": {name: value for name, value in figures.items() if name not in apart},
-    }
+    figures = {name: value for name, value in verdict.as_dict().items() if name not in apart}
+    return {"good": verdict.good, "headline": headline(verdict), "figures": figures}
 
 
 def headline(verdict: RunVerdict) -> str:
-    """The answer in one line."""
+    """The answer in one line; of a log that is cut, where it ends comes first."""
+    answer = _answer(verdict)
+    return f"{verdict.cut}; {answer}" if verdict.cut and verdict.cut not in answer else answer
+
+
+def _answer(verdict: RunVerdict) -> str:
     v = verdict
     if v.imported:
         return _what_is_there(v)
@@ -225,10 +217,8 @@ def headline(verdict: RunVerdict) -> str:
         rest = f"; but {v.reason.partition('; ')[0]}"
     if v.before is not None and v.before.slips:
         then = v.taking_over.slips if v.taking_over is not None else 0
-        over = (
-            f", {then} while the controller took over, none after" if then else ", none with the controller in charge"
-        )
-        return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before{over}{rest}"
+        over = f"{then} while the controller took over, none after" if then else "none with the controller in charge"
+        return f"stick-slip is gone: {counted(v.before.slips, 'slip')} before, {over}{rest}"
     return f"no stick-slip with the controller in charge{rest}"
 
 
@@ -237,9 +227,5 @@ def _what_is_there(verdict: RunVerdict) -> str:
     whole = verdict.before
     if whole is None:
         return f"{verdict.seconds:.1f} s of measured data without a drive force: slips cannot be counted"
-    many = (
-        f"{counted(whole.slips, 'slip')} in {whole.seconds:.1f} s"
-        if whole.slips
-        else f"no slip in {whole.seconds:.1f} s"
-    )
-    return f"{many}, {_swing(whole)}"
+    many = counted(whole.slips, "slip") if whole.slips else "no slip"
+    return f"{many} in {whole.seconds:.1f} s, {_swing(whole)}"

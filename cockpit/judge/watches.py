@@ -13,7 +13,6 @@ from bridge.wire.messages import CHANNELS, Records
 from cockpit.judge.setup import SETTLING_S
 
 STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
-_CONTROLLED = ("drive_force_N", "mass_position_m", "base_accel_mps2", "drive_position_m")
 # A drive that turns stands for a moment, and a slip may come then: 17 in an hour of the belt axis, which has 718 turns. Smaller:
 # they count as slips with a dead transducer; larger: a transducer at the end of its range is found later.
 _TURN_S = 0.2
@@ -34,12 +33,12 @@ class LatencyWatch:
     def __init__(self) -> None:
         self.took_us = Histogram()
         self.late = 0  # commands that took more than 1 ms
-        self._rows = self._commands = 0
+        self.blocks = self.commands = 0
 
     def applied(self, records: Records) -> None:
         """Take what the rig did, [blocks]."""
-        self._rows += len(records)
-        self._commands += int(records["commands"].sum())
+        self.blocks += len(records)
+        self.commands += int(records["commands"].sum())
         self.late += int(records["commands_late"].sum())
         round_trip_ns = records["round_trip_ns"][records["commands"] > 0]
         self.took_us.add(round_trip_ns[round_trip_ns > 0] * 1e-3)
@@ -49,34 +48,9 @@ class LatencyWatch:
         if not self.took_us.count:
             return None
         # a command that never came is a late one; the last block's comes after the end
-        in_time = min((self._commands - self.late) / max(self._rows - 1, 1), 1.0)
+        in_time = min((self.commands - self.late) / max(self.blocks - 1, 1), 1.0)
         p50_us, p99_us, p999_us = (self.took_us.quantile(share) for share in (0.5, 0.99, 0.999))
         return Latency(p50_us, p99_us, p999_us, in_time)
-
-
-class FiniteWatch:
-    """Samples of the controlled channels that are no numbers."""
-
-    def __init__(self) -> None:
-        self._found: dict[str, tuple[int, int]] = {}  # by channel: blocks, and the first
-
-    def sensors(self, records: Records) -> None:
-        """Take sensor blocks, [blocks]."""
-        for name in _CONTROLLED:
-            finite = np.isfinite(records[name])
-            if finite.all():
-                continue
-            bad = ~finite.all(axis=1)
-            blocks, first = self._found.get(name, (0, int(records["sequence"][bad][0])))
-            self._found[name] = blocks + int(np.count_nonzero(bad)), first
-
-    def faults(self) -> list[str]:
-        """A line for each channel."""
-        return [
-            f"NOT_FINITE: /sensors {name}: {counted(blocks, 'block holds', 'blocks hold')} a sample that is no number, "
-            f"first {first}; left out"
-            for name, (blocks, first) in self._found.items()
-        ]
 
 
 class FrozenWatch:
@@ -105,6 +79,7 @@ class StepWatch:
         self.steps = 0
         self.missed = 0  # blocks that never came to the controller
         self.armed = self.moved = False
+        self.highest_set_point = 0.0  # of v_a / v_d while it vibrated
         self.drive_velocity_max_mps = 0.0
         self.loop_delay_s = 0.0
         self._slips: int | None = None
@@ -127,6 +102,8 @@ class StepWatch:
         stands = ~(np.abs(v_d_mps) > STANDSTILL_MPS)
         self.moved = self.moved or not stands.all()
         self.drive_velocity_max_mps = max(self.drive_velocity_max_mps, float(v_d_mps.max()))
+        set_points = records["velocity_ratio"][records["mode"] == wire.EXCITE]
+        self.highest_set_point = max(self.highest_set_point, float(set_points.max(initial=0.0)))
         self.loop_delay_s = max(self.loop_delay_s, float(records["loop_delay_s"].max()))
         slips = records["slips"].astype(np.int64)
         moved_s = np.maximum.accumulate(np.where(stands, self._moved_s, t_s))

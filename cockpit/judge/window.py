@@ -36,7 +36,7 @@ COMMAND_ROW = np.dtype([("t_ns", "i8"), ("block", "i8"), ("frequency_Hz", "f8"),
 APPLIED_ROW = np.dtype(
     [
         ("t_ns", "i8"), ("sequence", "i8"), ("amplitude_m", "f8"), ("command_block", "u8"), ("late_ns", "i8"),
-        ("commands", "i8"), ("commands_late", "i8"), ("fallback", "u1"), ("frequency_Hz", "f8"), ("guard_state", "u1"),
+        ("commands_late", "i8"), ("fallback", "u1"), ("frequency_Hz", "f8"), ("guard_state", "u1"),
     ]
 )  # fmt: skip
 
@@ -120,6 +120,11 @@ class Window(NamedTuple):
         far = np.iinfo(np.int64)
         from_ns = int(t_ns[self.first]) if self.first else far.min
         return from_ns, far.max if self.is_last else int(t_ns[self.end])
+
+    def own(self, rows: Rows) -> npt.NDArray[np.bool_]:
+        """Which of the rows, by their times, are to be judged."""
+        from_ns, until_ns = self.own_ns
+        return np.asarray((rows["t_ns"] >= from_ns) & (rows["t_ns"] < until_ns))
 
 
 class Waiting:

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.log.finding import Finding
-from diagnosis.look.record import noise_of
+from bridge.log.watches.arrays import noise_of
 
 Floats = npt.NDArray[np.float64]
 _FIRST = 20  # samples, from which the level is read

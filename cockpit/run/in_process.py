@@ -67,7 +67,7 @@ def run_onboard(
         changes: of the controller's configuration during the run, in order of time.
         words: of an operator during the run, in order of time.
         stopped: asked before every stretch of blocks; the run then ends as it does at its full duration.
-        judge: takes every message as it is written, so that nothing is read back.
+        judge: takes every message when it is written; the log is not read back.
 
     """
     loop = ClosedLoop(scenario.rig, scenario.seed, scenario.controller, scenario.arm)
@@ -102,17 +102,22 @@ def run_onboard(
                 written = writer.submit(_write, log, say, loop.block, loop.block_ns, made, loop.controller_state.copy())
                 if loop.block < min(ends):
                     written.result()
+                    _end(say, loop)
                     raise no_number(scenario.rig, loop.block)
                 if progress is not None:
                     progress(loop.block * scenario.rig.solver.block_s)
             if written is not None:
                 written.result()
-        t_ns = loop.block * loop.block_ns
-        say("plant", t_ns, "END", f"blocks={loop.block}")
-        say("controller", t_ns, "END", f"steps={loop.block} duplicates=0 dropped=0")
+        _end(say, loop)
     finally:
         log.close()
     return log.chain()
+
+
+def _end(say: "_Events", loop: ClosedLoop) -> None:
+    t_ns = loop.block * loop.block_ns
+    say("plant", t_ns, "END", f"blocks={loop.block}")
+    say("controller", t_ns, "END", f"steps={loop.block} duplicates=0 dropped=0")
 
 
 def log_of(scenario: Scenario, path: Path, about: dict[str, Any]) -> RunLog:

@@ -80,7 +80,7 @@ class Obeyed(NamedTuple):
 def tell(bus_config: BusConfig, name: str) -> Obeyed:
     """Say a word until the rig has done it or refuses.
 
-    Raises Fault NO_PEER where no rig answers, it falls silent meanwhile, does not take the word, or goes on as before.
+    Raises Fault NO_PEER where no rig answers, or it falls silent, does not confirm the word, or goes on as before.
     """
     where = bus_config.endpoint
     action = wire.Operator.Action.Value(name)
@@ -129,8 +129,8 @@ def tell(bus_config: BusConfig, name: str) -> Obeyed:
         alone=alone,
     )
     if not (obeyed.done or obeyed.taken) and last.guard_state != wire.NO_GUARD:
-        line = f"{where}: the rig did not say that it took {name} within {_ANSWER_S:g} s, and is {before}: must take it"
-        raise Fault("NO_PEER", f"{line}; {_BY_HAND if action in _QUIETENS else 'say it again'}")
+        line = f"{where}: the rig did not confirm {name} within {_ANSWER_S:g} s, and is {before}: must take it"
+        raise Fault("NO_PEER", f"{line}; {_BY_HAND if action in _QUIETENS else 'send it again'}")
     if action == wire.Operator.STOP and not obeyed.done:
         raise Fault("NO_PEER", f"{where}: the rig is {before} after a stop: must be at rest; {_BY_HAND}")
     return obeyed
@@ -185,7 +185,7 @@ class _Exchange:
         self._until_s = began_s + _ANSWER_S
         while True:
             now_s = time.monotonic()
-            if realtime.was_paused(heard_s, heard_s + _HEARS_S):  # what the rig did meanwhile waits to be read
+            if realtime.was_paused(heard_s, heard_s + _HEARS_S):  # messages of the rig wait to be read
                 self._until_s = now_s + _ANSWER_S
             if now_s >= self._until_s:
                 break

@@ -96,7 +96,7 @@ def _show(bus: Bus, duration_s: float, over: threading.Event) -> None:
     for topic in (APPLIED, COMMAND):  # a thousand a second, of which the newest ten are looked at
         bus.listen(topic, lambda received: newest_of.__setitem__(received.topic.name, received))
     pauses, paused_ms = 0, 0.0
-    # shown from the first state on: until then the terminal's line is that of the kernels
+    # shown from the first state on: until then the terminal shows the progress of compilation
     live = Live(console=Console(stderr=True), refresh_per_second=8, transient=True)
     with contextlib.ExitStack() as shown:
         while not over.wait(_LOOK_S):

@@ -1,7 +1,6 @@
 """`stickslip replay`: is it the same, what if, and a log back on the bus."""
 
 import contextlib
-import json
 import math
 import re
 from pathlib import Path
@@ -20,7 +19,7 @@ from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.payloads import parsed
 from controller.codes import RESET, STOP
 from controller.config import ControllerConfig
-from controller.replay import Change, Difference, OutOfOrder, Replay, Replayer
+from controller.replay import Change, Difference, OutOfOrder, Replay, Replayer, replay
 
 if TYPE_CHECKING:
     from cockpit.run.in_process import Word
@@ -135,15 +134,14 @@ class Replayed(NamedTuple):
 def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
     """Replay one log from a time on; whether today's controller does the same. Raises Fault BAD_LOG and CONFIG."""
     check_log_file(path)
-    first = _Pass(path, from_s, settings)
-    if not first.steps:
+    reader = LogReader(path)
+    steps, end_ns, held, result = _one_pass(reader, from_s, settings)
+    if not steps:
         raise Fault("BAD_LOG", f"{path}: holds no trace: no controller was recorded, so nothing can be replayed")
-    reader = first.reader
-    changes = _changes_of(reader.metadata, path, settings, first.end_ns)
-    result = first.result
-    if result is None or first.changes != changes:  # a message or a configuration came late
-        result = _Pass(path, from_s, settings, changes).result
-    if result is None or result.compared == 0:
+    changes = _changes_of(reader.metadata, path, settings, end_ns)
+    if result is None or held != changes:  # a message or a configuration came late
+        result = replay(read_run(path), changes, from_s)
+    if result.compared == 0:
         line = f"{path}: no step from {from_s:g} s on can be rebuilt: the log ends before, or holds no usable snapshot"
         raise Fault("BAD_LOG", f"{line}; use an earlier --from")
     return Replayed(
@@ -158,44 +156,38 @@ def replay_log(path: Path, from_s: float, settings: list[str]) -> Replayed:
     )
 
 
-class _Pass:
-    """One pass over a log, with a replay as it goes.
+def _one_pass(
+    reader: LogReader, from_s: float, settings: list[str]
+) -> tuple[int, int, list[Change] | None, Replay | None]:
+    """Replay a log as it is read, in memory that does not grow with it, by the configuration before its first step.
 
-    Args:
-        path, from_s, settings: of the replay.
-        changes: of the whole log, where they are known: it is taken into memory, and its messages may be in any order. Else the
-            configuration is the one that the log holds before its first step, and the memory does not grow with the log.
-
+    Its steps, the time of the last one, the configurations, and the answer; None where messages are out of order, or where the
+    configuration comes late.
     """
-
-    def __init__(self, path: Path, from_s: float, settings: list[str], changes: list[Change] | None = None) -> None:
-        self.reader = LogReader(path)
-        self.changes = changes
-        self.result: Replay | None = None  # None where its messages are out of order, or its configuration comes late
-        self.steps = self.end_ns = 0
-        replayer = Replayer(changes, from_s, whole=True) if changes is not None else None
-        waiting: list[Piece] = []  # for the configuration
-        out_of_order = False
-        for piece in iter_pieces(self.reader):
-            if piece.topic == "trace" and len(piece.records):
-                self.steps += len(piece.records)
-                self.end_ns = max(self.end_ns, int(piece.records["t_ns"].max()))
-            if out_of_order or piece.topic not in _REPLAYED:
-                continue
-            waiting.append(piece)
-            try:
-                if replayer is None and (self.steps or "controller" in self.reader.metadata):
-                    self.changes = _changes_of(self.reader.metadata, path, settings, None)
-                    replayer = Replayer(self.changes, from_s)
-                if replayer is not None:
-                    for one in waiting:
-                        _add(replayer, one)
-                    waiting = []
-            except (OutOfOrder, Fault):  # a fault of the configuration may be no more one when all of it was read
-                out_of_order, replayer, waiting = True, None, []
-        if replayer is not None:
-            with contextlib.suppress(OutOfOrder):
-                self.result = replayer.result()
+    steps = end_ns = 0
+    changes, replayer = None, None
+    waiting: list[Piece] = []  # for the configuration
+    out_of_order = False
+    for piece in iter_pieces(reader, _REPLAYED):
+        if piece.topic == "trace" and len(piece.records):
+            steps += len(piece.records)
+            end_ns = max(end_ns, int(piece.records["t_ns"].max()))
+        if out_of_order:
+            continue
+        waiting.append(piece)
+        try:
+            if replayer is None and (steps or "controller" in reader.metadata):
+                changes = _changes_of(reader.metadata, reader.path, settings, None)
+                replayer = Replayer(changes, from_s)
+            if replayer is not None:
+                for one in waiting:
+                    _add(replayer, one)
+                waiting = []
+        except (OutOfOrder, Fault):  # a fault of the configuration may be no more one when all of it was read
+            out_of_order, replayer, waiting = True, None, []
+    with contextlib.suppress(OutOfOrder):
+        return steps, end_ns, changes, replayer.result() if replayer is not None else None
+    return steps, end_ns, changes, None
 
 
 def _add(replayer: Replayer, piece: Piece) -> None:
@@ -208,14 +200,11 @@ def _add(replayer: Replayer, piece: Piece) -> None:
 
 def likely_reason(headers: Headers, path: Path, settings: list[str]) -> str:
     """Why a replay would differ, in words."""
-    from cockpit.run.scenario import Scenario, header
+    from cockpit.run.scenario import versions
 
     if settings:
         return f"the configuration was changed: {', '.join(settings)}"
-    config = validate(ControllerConfig, configuration_of(headers, "controller", path), path.name)
-    scenario = Scenario.model_construct(controller=config)
-    was = table_of(headers, "controller", "versions", path)
-    now = json.loads(header(scenario, "controller", lockstep=False).versions)
+    was, now = table_of(headers, "controller", "versions", path), versions()
     changed = [f"{name} {was.get(name)} then, {now[name]} now" for name in now if was.get(name) != now[name]]
     if changed:
         made, made_by = was.get("stickslip"), now["stickslip"]

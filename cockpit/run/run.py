@@ -125,8 +125,8 @@ def run_scenario(
         wait_s: longest time until the log of a run of several processes begins; None: as long as they need.
         without: simulate the same run without the controller as well, once it is judged.
 
-    Raises Fault INTERRUPTED where one with an end was stopped before, and what ended a run in one process early, each with the
-    verdict on what was recorded on stderr first.
+    Raises Fault INTERRUPTED where a run with an end was stopped before, and the fault that ended a run in one process early; the
+    verdict on the recorded part is on stderr before.
 
     """
     scenario = load_scenario(name, settings)
@@ -174,16 +174,16 @@ def run_scenario(
 
 
 class _Came(NamedTuple):
-    """What a run in one process left besides its log."""
+    """Results of a run in one process, besides its log."""
 
     judge: "RunJudge | None"  # that took every message; None where the log is to be read
     chain: "Chain | None"
-    told: list[str]  # what the log does not hold
+    told: list[str]  # events that the log does not hold
     stopped: bool  # by Ctrl-C or a signal
 
 
 def _say_verdict(path: Path) -> None:
-    """The verdict on what was recorded, on stderr; nothing where a log of a moment holds nothing to judge."""
+    """Write the verdict on the recorded part to stderr; nothing where the log is too short to judge."""
     from cockpit.judge.judged import judge
     from cockpit.judge.verdict_words import in_words
 

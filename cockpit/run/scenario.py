@@ -173,6 +173,16 @@ def processor() -> str:
     return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
 
 
+def versions() -> dict[str, str]:
+    """What the bits of a run depend on."""
+    found = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
+    return found | {
+        "python": platform.python_version(),
+        "libc": "-".join(platform.libc_ver()),
+        "processor": processor(),
+    }
+
+
 def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
     """What a process of this scenario says of itself."""
     if role == "plant":
@@ -186,11 +196,9 @@ def header(scenario: Scenario, role: str, lockstep: bool) -> wire.Header:
             configuration["fault"] = [table.model_dump(mode="json") for table in scenario.fault]
     else:
         configuration = scenario.controller.model_dump(mode="json")
-    versions = {name: version(name) for name in ("stickslip", "numpy", "numba", "protobuf", "eclipse-zenoh", "mcap")}
-    versions |= {"python": platform.python_version(), "libc": "-".join(platform.libc_ver()), "processor": processor()}
     return wire.Header(
         role=role,
         schema_version=SCHEMA_VERSION,
         configuration=json.dumps(configuration, sort_keys=True),
-        versions=json.dumps(versions, sort_keys=True),
+        versions=json.dumps(versions(), sort_keys=True),
     )

@@ -1,31 +1,34 @@
-"""A loop that runs for hours, watched from outside: memory of each process, lost blocks, latency over time."""
+"""A loop that runs for hours: memory of each process and latency over time, and the verdict of the judge of every run.
+
+The log is judged file by file, each once it is closed, so that memory and disk hold a soak of any length.
+"""
 
 import contextlib
 import math
 import os
-import re
-import shutil
 import tempfile
 import threading
 import time
-from array import array
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from bridge.faults import Fault
+from bridge.log.check.log_check import feed
+from bridge.log.damage import Damage
+from bridge.log.log_reader import LogReader
 from bridge.log.storage.parts import parts_of
 from bridge.processes import pid_here
 from bridge.units import counted
-from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.event_codes import is_told
-from bridge.wire.messages import APPLIED as APPLIED_LAYOUT
-from bridge.wire.payloads import parsed
-from bridge.wire.topics import APPLIED, CONTROLLER_EVENT, PLANT_EVENT, RECORDER_EVENT
-from bridge.wire.zenoh_link import Bus, BusConfig, Inbox
+from bridge.wire.messages import Records
+from bridge.wire.zenoh_link import Bus, BusConfig
+from cockpit.judge.run_judge import RunJudge
+from cockpit.judge.verdict import RunVerdict
+from cockpit.judge.verdict_words import in_words
+from cockpit.judge.watches import LatencyWatch
 from cockpit.run.processes import run_processes
 
 ROLES = ("plant", "controller", "recorder")
@@ -33,10 +36,7 @@ _LOOK_S = 0.5
 _MOST_PERIODS = 60  # of a soak, unless they were shorter than 10 s
 _SHORTEST_PERIOD_S = 10.0
 _WARM_SHARE, _WARM_MOST_S = 0.2, 60.0  # of the soak, in which memory may grow
-_KEPT_PARTS = 2  # files of a log that nobody asked for
-_INBOX = 16_384  # messages of 16 s
-_LATE_NS = 1_000_000
-_GAP = re.compile(r"/sensors: (\d{1,12}) lost")  # as the recorder says it
+_NICE = 10  # of the thread that judges: the loop that it judges has the processors first
 
 
 class Period(NamedTuple):
@@ -44,7 +44,6 @@ class Period(NamedTuple):
 
     until_s: float
     blocks: int
-    unheard: int  # blocks of which this listener did not hear
     p50_us: float
     p99_us: float
     p999_us: float
@@ -67,28 +66,28 @@ class Soaked(NamedTuple):
 
     scenario: str
     wanted_s: float
-    seconds: float  # watched
     interrupted: bool
-    blocks: int
-    lost_blocks: int  # that the recorder says are not in the log
-    unheard: int  # blocks of which this listener did not hear: the rig drops what a listener is too slow for
-    events: dict[str, int]  # how many of each code that is more than news
+    verdict: RunVerdict
     memory: list[Memory]
     periods: list[Period]
 
     @property
     def good(self) -> bool:
-        """Whether it ran to its end without a lost block."""
-        return not self.interrupted and self.lost_blocks == 0 and self.blocks > 0
+        """Whether it ran to its end and its log is whole."""
+        v = self.verdict
+        return not self.interrupted and v.blocks > 0 and v.lost_messages == 0 and v.all_losses_known
+
+    def as_dict(self) -> dict[str, Any]:
+        """For `--json`: the verdict, with what a soak has besides."""
+        own = {"scenario": self.scenario, "wanted_s": self.wanted_s, "interrupted": self.interrupted, "good": self.good}
+        rows = {name: [row._asdict() for row in getattr(self, name)] for name in ("memory", "periods")}
+        return self.verdict.as_dict() | own | rows
 
     def in_words(self) -> list[str]:
-        """Lines for a person."""
+        """Lines for an operator."""
         short = " (interrupted)" if self.interrupted else ""
-        lines = [f"soak     {self.scenario}: {self.seconds:.0f} of {self.wanted_s:.0f} s{short}"]
-        lost = "none lost" if self.lost_blocks == 0 else f"{self.lost_blocks} LOST"
-        lines.append(f"blocks   {self.blocks}, {lost}")
-        if self.unheard:
-            lines.append(f"unheard  {counted(self.unheard, 'block')}: this listener was too slow for them")
+        lines = [f"soak     {self.scenario}: {self.verdict.seconds:.0f} of {self.wanted_s:.0f} s{short}"]
+        lines += in_words(self.verdict, verbose=False)
         lines += [
             f"memory   {one.role}: {one.begin_MB:.1f} to {one.end_MB:.1f} MB, {one.slope_MB_per_h:+.2f} "
             f"+- {one.slope_sigma_MB_per_h:.2f} MB/h"
@@ -101,20 +100,16 @@ class Soaked(NamedTuple):
                 f"latency  p50 {min(p50):.0f} to {max(p50):.0f} us, p99 {min(p99):.0f} to {max(p99):.0f} us, "
                 f"longest {max(one.max_us for one in self.periods):.0f} us; {counted(late, 'command')} over 1 ms"
             )
-        told = ", ".join(f"{count} {code}" for code, count in sorted(self.events.items())) or "none"
-        return [*lines, f"events   {told}"]
+        return lines
 
     def page(self) -> str:
         """The same and each period, in Markdown."""
         made = f"stickslip soak --scenario {self.scenario} --hours {self.wanted_s / 3600.0:g} --report FILE"
         lines = [f"# Soak of {self.scenario}", "", f"Made by `{made}`.", ""]
         lines += [*(f"    {line}" for line in self.in_words()), ""]
+        lines += ["| until, s | blocks | p50, us | p99, us | p99.9, us | longest, us | over 1 ms |", f"|{'---|' * 7}"]
         lines += [
-            "| until, s | blocks | unheard | p50, us | p99, us | p99.9, us | longest, us | over 1 ms |",
-            f"|{'---|' * 8}",
-        ]
-        lines += [
-            f"| {one.until_s:.0f} | {one.blocks} | {one.unheard} | {one.p50_us:.0f} | {one.p99_us:.0f} | {one.p999_us:.0f} "
+            f"| {one.until_s:.0f} | {one.blocks} | {one.p50_us:.0f} | {one.p99_us:.0f} | {one.p999_us:.0f} "
             f"| {one.max_us:.0f} | {one.late} |"
             for one in self.periods
         ]
@@ -129,118 +124,101 @@ def soak(
     log: Path | None,
     progress: Callable[[float], None],
 ) -> Soaked:
-    """Run plant, controller and recorder and watch them.
+    """Run plant, controller and recorder, watch their memory and judge their log.
 
     Args:
         scenario: its name.
         arguments: the command line that makes it in a child, its duration left out.
         bus: where they meet.
         seconds: how long.
-        log: kept there; None: in a folder that is gone at the end, its newest files alone.
+        log: kept there; None: in a folder that is gone at the end, each further file once it is judged.
         progress: called with the share done.
 
-    Raises Fault ENDPOINT_BUSY, or what ended a process.
+    Raises Fault ENDPOINT_BUSY, INTERRUPTED before anything was recorded, or what ended a process.
 
     """
-    watch = _Watch(bus, seconds, progress)
-    folder = None if log is not None else Path(tempfile.mkdtemp(prefix="stickslip-soak-"))
-    path = log if log is not None else (folder or Path()) / "soak.mcap"
-    watch.thin_out = path if folder is not None else None
-    interrupted = False
-    try:
-        run_processes([*arguments, "--set", f"duration_s={seconds}"], bus.endpoint, path, False, watch)
-    except KeyboardInterrupt:
-        interrupted = True
-    finally:
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-    return watch.result(scenario, interrupted)
+    with tempfile.TemporaryDirectory(prefix="stickslip-soak-", ignore_cleanup_errors=True) as folder:
+        watch = _Watch(bus, seconds, log or Path(folder) / "soak.mcap", log is None, progress)
+        interrupted = False
+        try:
+            run_processes([*arguments, "--set", f"duration_s={seconds}"], bus.endpoint, watch.path, False, watch)
+        except KeyboardInterrupt:
+            interrupted = True
+        return watch.result(scenario, interrupted)
 
 
 class _Watch:
-    """Listens to a run until it is over; called in a thread of its own."""
+    """Watches a run until it is over, in a thread of its own, and takes the messages of its log."""
 
-    def __init__(self, config: BusConfig, seconds: float, progress: Callable[[float], None]) -> None:
-        self.thin_out: Path | None = None
-        self._config, self._seconds, self._progress = config, seconds, progress
+    def __init__(
+        self, config: BusConfig, seconds: float, path: Path, thin_out: bool, progress: Callable[[float], None]
+    ) -> None:
+        self.path = path
+        self._config, self._seconds, self._thin_out, self._progress = config, seconds, thin_out, progress
         self._period_s = max(seconds / _MOST_PERIODS, _SHORTEST_PERIOD_S)
-        self._events: Counter[str] = Counter()
         self._memory: dict[str, list[tuple[float, float]]] = {role: [] for role in ROLES}
-        self._periods: list[Period] = []
-        self._round_trips_ns = array("q")
-        self._blocks = self._lost = self._unheard = 0
-        self._in_period = (0, 0)  # blocks and those that were not heard of, at the begin of the period
-        self._next: int | None = None
-        self._t_s = 0.0
+        self._periods: dict[int, LatencyWatch] = {}
+        self._judge = RunJudge(path, {})
+        self._readers: dict[Path, LogReader] = {}  # of the files that were judged
+        self._one_at_once = threading.Lock()
 
     def __call__(self, over: threading.Event) -> None:
+        os.nice(_NICE)  # on Linux of this thread alone
         with contextlib.suppress(Fault), Bus(self._config, "cockpit", lockstep=False, stop=over) as bus:
-            inbox = Inbox(_INBOX)
-            bus.listen(APPLIED, inbox.push)
-            for topic in (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT):
-                bus.listen(topic, inbox.keep)
             pids = {role: pid_here(role, said.process) for role, said in bus.headers(ROLES, 5.0, over).items()}
-            self._until(over, inbox, pids)
-
-    def _until(self, over: threading.Event, inbox: Inbox, pids: dict[str, int]) -> None:
-        due_s = time.monotonic()
-        while not over.is_set():
-            received = inbox.get(0.1)
-            while received is not None:
-                with contextlib.suppress(Fault):
-                    self._take(received.topic.name, received.payload)
-                received = inbox.get_nowait()
-            if time.monotonic() >= due_s:
-                due_s = time.monotonic() + _LOOK_S
+            began_s = time.monotonic()
+            while not over.wait(_LOOK_S):
+                t_s = time.monotonic() - began_s
                 for role, pid in pids.items():
-                    self._memory[role] += _resident(self._t_s, pid)
-                self._progress(min(self._t_s / self._seconds, 1.0))
-                self._delete_old_parts()
+                    self._memory[role] += _resident(t_s, pid)
+                self._progress(min(t_s / self._seconds, 1.0))
+                self._judge_files(still_open=1)
 
-    def _take(self, topic: str, payload: bytes) -> None:
-        if topic != APPLIED.name:
-            event = parsed(wire.Event, payload, topic)
-            self._events[event.code] += is_told(event.code)
-            gap = _GAP.match(event.text) if event.code == "GAP" else None
-            self._lost += int(gap[1]) if gap is not None else 0
-            return
-        applied: Any = APPLIED_LAYOUT.read(payload, topic)[0]
-        number = int(applied.sequence)
-        if self._next is not None and number > self._next:
-            self._unheard += number - self._next
-        self._next = number + 1
-        self._blocks += 1
-        self._t_s = int(applied.t_ns) * 1e-9
-        if applied.commands > 0 and applied.round_trip_ns > 0:
-            self._round_trips_ns.append(int(applied.round_trip_ns))
-        if self._t_s >= (len(self._periods) + 1) * self._period_s:
-            self._end_period()
+    def _judge_files(self, still_open: int) -> None:
+        """Judge the files of the log, but for those at its end that are still open."""
+        with self._one_at_once:
+            files = parts_of(self.path) if self.path.is_file() else []
+            for file in files[: len(files) - still_open]:
+                if file in self._readers:
+                    continue
+                reader = self._readers[file] = LogReader(file, alone=True)
+                self._judge.begin(reader.metadata)
+                self._chain = feed(reader, self)
+                if self._thin_out and file != self.path:
+                    file.unlink(missing_ok=True)
 
-    def _end_period(self) -> None:
-        took_us = np.asarray(self._round_trips_ns) * 1e-3
-        if len(took_us):
-            p50, p99, p999, most = (float(one) for one in np.percentile(took_us, [50.0, 99.0, 99.9, 100.0]))
-            blocks, unheard = self._in_period
-            late = int(np.count_nonzero(took_us > _LATE_NS * 1e-3))
-            self._periods.append(
-                Period(self._t_s, self._blocks - blocks, self._unheard - unheard, p50, p99, p999, most, late)
-            )
-        self._round_trips_ns = array("q")
-        self._in_period = (self._blocks, self._unheard)
+    def add(self, topic: str, records: Records, log_time_ns: npt.NDArray[np.int64]) -> None:
+        """Take messages of a streaming topic, [messages]."""
+        self._judge.add(topic, records, log_time_ns)
+        if topic == "applied":
+            period = (records["t_ns"] - 1) // round(self._period_s * 1e9)
+            for number in np.unique(period).tolist():
+                self._periods.setdefault(number, LatencyWatch()).applied(records[period == number])
 
-    def _delete_old_parts(self) -> None:
-        if self.thin_out is not None and self.thin_out.exists():
-            for part in parts_of(self.thin_out)[1:-_KEPT_PARTS]:
-                part.unlink(missing_ok=True)
+    def add_others(self, topic: str, payloads: Sequence[bytes]) -> None:
+        """Take messages of another topic."""
+        self._judge.add_others(topic, payloads)
 
     def result(self, scenario: str, interrupted: bool) -> Soaked:
-        """All of it."""
-        self._end_period()
+        """All of it, once the log is closed. Raises Fault INTERRUPTED where there is none."""
+        self._judge_files(still_open=0)
+        if not self._readers:
+            raise Fault("INTERRUPTED", "stopped before anything was recorded")
+        damage = next((one.damage for one in self._readers.values() if not one.damage.whole), Damage(0, 0, closed=True))
+        verdict = self._judge.result(damage, self._chain, {})
         memory = [_memory(role, points) for role, points in self._memory.items() if points]
-        return Soaked(
-            scenario, self._seconds, self._t_s, interrupted, self._blocks, self._lost, self._unheard,
-            dict(+self._events), memory, self._periods,
-        )  # fmt: skip
+        periods = [
+            Period(
+                min((number + 1) * self._period_s, verdict.seconds),
+                watch.blocks,
+                *took[:3],
+                watch.took_us.most,
+                watch.late,
+            )
+            for number, watch in sorted(self._periods.items())
+            if (took := watch.result()) is not None
+        ]
+        return Soaked(scenario, self._seconds, interrupted, verdict, memory, periods)
 
 
 def _resident(t_s: float, pid: int) -> list[tuple[float, float]]:

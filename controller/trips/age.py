@@ -24,7 +24,7 @@ class Age:
 
     def note(self, answered_ns: int, t_ns: int) -> None:
         """Take a block: when it is answered by the controller's clock, and its time by the rig's."""
-        if answered_ns <= 0:  # in one process there is no clock
+        if answered_ns <= 0:  # a run in one process has no clock
             return
         age_ns = float(answered_ns - t_ns)
         if self._last_ns is None:

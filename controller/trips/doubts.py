@@ -22,7 +22,7 @@ CHANNELS = 4
 def trip(s: Record, reason: int, doubts: int) -> None:
     """Doubt signals; the first trip is the one that is told until it ends, unless a later one ends the vibration.
 
-    After a stall of the computer a doubt waits: what is true of a signal is still there when that is over.
+    After a stall of the computer a doubt waits: a signal that is broken still is when the wait is over.
     """
     if not is_judged(s):
         return

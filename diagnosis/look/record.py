@@ -7,6 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
+from bridge.log.watches.arrays import noise_of
+
 Floats = npt.NDArray[np.float64]
 _GAP_STEPS = 10.0  # usual steps, beyond which the record is cut: nobody knows what happened
 FEWEST = 16  # samples of a part
@@ -76,14 +78,7 @@ def _even(t_s: Floats, force_N: Floats, position_m: Floats | None, sign: float) 
     if np.abs(t_s - even_s).max() > _UNEVEN * step_s:
         force_N = np.interp(even_s, t_s, force_N)
         position_m = None if position_m is None else np.interp(even_s, t_s, position_m)
-    return Part(even_s, force_N, position_m, sign, noise_of(force_N))
-
-
-def noise_of(force_N: Floats) -> float:
-    """Standard deviation of the noise from sample to sample: second differences remove climbs, their median the slips."""
-    if len(force_N) < FEWEST:
-        return 0.0
-    return 1.4826 * float(np.median(np.abs(np.diff(force_N, 2)))) / 6.0**0.5
+    return Part(even_s, force_N, position_m, sign, float(noise_of(force_N)))
 
 
 def smoothed(values: Floats, width: int) -> Floats:

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from bridge.log.watches.arrays import noise_of
 from diagnosis.look.numbers import Number, mean_of, slope_of
-from diagnosis.look.record import Part, noise_of, smoothed
+from diagnosis.look.record import Part, smoothed
 from diagnosis.look.sticks import Cycle
 
 Floats = npt.NDArray[np.float64]

@@ -94,7 +94,7 @@ def _blocks(block_s: float, samples: int) -> dict[str, Any]:
     return {"block_s": block_s, "samples_per_block": samples}
 
 
-# 25 s of CPU each for its own kernels; tests/unit/test_config.py has what sizes of blocks are taken
+# 25 s of CPU each for its own kernels; tests/unit/test_config.py tests which sizes of blocks are accepted
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("block_s", "samples"),

@@ -1,4 +1,4 @@
-"""A computer that stalls: nothing is lost, and no sensor, exciter or gain is blamed for what the stall did."""
+"""A computer that stalls: nothing is lost, and no sensor, exciter or gain is blamed for its effects."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ def run(path: Path, seconds: float, *tables: dict[str, Any]) -> RunData:
 
 
 def blamed(data: RunData) -> Iterator[tuple[float, str, str]]:
-    """Time [s], code and text of what the controller says of sensors and exciter."""
+    """Time [s], code and text of the controller's events about sensors and exciter."""
     for event in data.events:
         if event.code in (*TRIPS, *WEAK_REASONS):
             yield event.t_ns * 1e-9, event.code, event.text

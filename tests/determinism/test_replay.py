@@ -221,7 +221,7 @@ def test_an_operators_stop_is_repeated_in_the_closed_loop_and_no_stick_slip_of_t
     assert slips.stopped_s == pytest.approx(6.6, abs=0.1)
     assert slips.stopped_slips > 0
     then = f"{slips.stopped_slips} slips"
-    told = f"stopped  by an operator, or not armed, for 6.6 s, which is no part of what came after; {then} then"
+    told = f"stopped  by an operator, or not armed, for 6.6 s (counted neither before nor after); {then} then"
     assert told in in_words(slips, verbose=True)
     assert headline(slips) == f"no stick-slip with the controller in charge; {then} while it was stopped or not armed"
     assert int(read_run(stopped).trace["slips"][-1]) >= 3

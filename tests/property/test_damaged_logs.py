@@ -292,7 +292,7 @@ def test_a_late_block_is_no_loss_and_a_new_start_is_said(tmp_path: Path) -> None
 
 def test_a_stop_ends_the_record_of_a_rig_that_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Endless:
-        """An inbox that is never empty, but for a test that hangs."""
+        """An inbox that is never empty, except in a test that hangs."""
 
         def __init__(self) -> None:
             self.began_s = time.monotonic()

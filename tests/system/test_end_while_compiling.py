@@ -1,4 +1,4 @@
-"""A first start compiles for half a minute, and a signal ends it meanwhile: in one process, and in the children of a run."""
+"""A first start compiles for half a minute, and a signal ends it at once: in one process, and in the children of a run."""
 
 import os
 import signal

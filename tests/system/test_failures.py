@@ -73,7 +73,7 @@ def test_a_controller_that_stood_still_goes_on(tmp_path: Path, runs: list[Run]) 
     if verdict.pauses is None:
         assert verdict.not_watched
         return
-    # the computer went on meanwhile: what was late in these 1.5 s is the loop's own
+    # the computer did not stall: late commands in these 1.5 s are the loop's
     assert verdict.pauses.longest_ms < 500.0
     assert verdict.pauses.late_outside > 1000
 

@@ -1,4 +1,4 @@
-"""In lockstep nothing is late: what would end a run in real time costs nothing."""
+"""In lockstep nothing is late: stalls that would end a run in real time cost nothing."""
 
 import os
 import signal

@@ -12,7 +12,7 @@ from tests.stall_report import LEAST_NS, _Thread, words
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-# stands in for the timers: the computer stalls during each test that has the word in its name
+# stands in for the timers: the computer stalls during each test with the word in its name
 CONFTEST = """
 from bridge.wire.pauses import Pause
 from tests import stall_report

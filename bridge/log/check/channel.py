@@ -19,8 +19,12 @@ _KEYS = dict(zip(CHANNELS, (_FORCE, _ACCEL, _ACCEL, _POSITION, _POSITION), stric
 _NOISY = 0.25
 _DEAD_S = 1.0  # of equal samples. Larger: a shorter failure passes; smaller: a position at rest counts as dead
 # Samples at the largest value of a channel that dwells nowhere, from which it is clipped although no two follow each other: more
-# than chance gives a signal with noise, in a short log and, as a share, in a long one. Larger: a clipped channel passes.
+# than chance gives a signal with noise, in a short log and, as a share, in a long one. Larger: a clipped channel passes. Noise
+# alone, whose ends are 8 of its own apart, may have more there.
 FEW_AT_END, _SHARE_AT_END = 20, 1e-5
+_NOISE_ALONE = (
+    20.0  # end to end, in noise. Smaller: 41 samples of an accelerometer at rest count; larger: a clip passes
+)
 _BEYOND = 1e-3  # of the range, by which a value is beyond it. Smaller: rounding to float32, 1e-7, counts; larger: units of 1 %
 
 
@@ -58,23 +62,32 @@ def channels_of(plant: Any) -> dict[str, Channel]:
 
 def channel_findings(name: str, seen: SignalLook, sample_s: float, of: Channel) -> list[Finding]:
     """Findings on a channel of `/sensors`, whose samples are `sample_s` apart; `times` are the samples concerned."""
-    where, found = "/sensors " + name, list[Finding]()
-    if seen.not_finite:
-        at_s = seen.first_not_finite * sample_s
-        text = f"{counted(seen.not_finite, 'sample is', 'samples are')} no finite number, first after {at_s:.3f} s of samples"
-        found.append(Finding("not-finite", where, text, seen.not_finite))
+    where, found = "/sensors " + name, not_finite(name, seen, sample_s)
     if seen.constant:
         return [*found, Finding("dead", where, f"constant at {seen.lowest:g} over the whole log", seen.samples)]
-    if seen.longest_run * sample_s > _DEAD_S:
+    live = of.is_noisy or not math.isfinite(of.noise)  # equal samples are a fault
+    if live and seen.longest_run * sample_s > _DEAD_S:
         from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
         text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s of samples on"
         found.append(Finding("dead", where, text, seen.longest_run))
     return [*found, *_clipped(where, seen, of, dwells=name.endswith("_m"))]
 
 
+def not_finite(name: str, seen: SignalLook, sample_s: float) -> list[Finding]:
+    """A finding where samples of a channel are no finite number."""
+    if not seen.not_finite:
+        return []
+    at_s = seen.first_not_finite * sample_s
+    text = (
+        f"{counted(seen.not_finite, 'sample is', 'samples are')} no finite number, first after {at_s:.3f} s of samples"
+    )
+    return [Finding("not-finite", f"/sensors {name}", text, seen.not_finite)]
+
+
 def _clipped(where: str, seen: SignalLook, of: Channel, dwells: bool) -> list[Finding]:
     beyond = _BEYOND * (of.high - of.low)  # infinite where an end is not known
-    many = max(FEW_AT_END, _SHARE_AT_END * seen.samples) if of.is_noisy and not dwells else math.inf
+    shows_more = of.is_noisy and not dwells and seen.highest - seen.lowest > _NOISE_ALONE * of.noise
+    many = max(FEW_AT_END, _SHARE_AT_END * seen.samples) if shows_more else math.inf
     parts: list[str] = []
     times, reached = 1, math.nan
     for value, runs, at, end, over in (

@@ -1,7 +1,6 @@
 """Check of a run log in one pass; the memory does not grow with the log."""
 
 import re
-from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -17,7 +16,7 @@ from bridge.log.in_charge import ChargeWatch
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import STREAMING, block_period_ns, check_log_file, iter_pieces
 from bridge.log.metadata import configuration_of, number_of
-from bridge.log.storage.chain import Chain, chain_findings
+from bridge.log.storage.chain import Chain, chain_findings, chain_of
 from bridge.log.storage.parts import chain_of_log
 from bridge.log.topic_watch import TopicWatch
 from bridge.log.watches.arrays import Integers
@@ -32,7 +31,6 @@ LATE_NS = 1_000_000  # 1 ms, the usual block: a later answer comes after the nex
 # Share of late messages from which a rig does not keep up. Smaller: every desktop is late now and then; larger: a slow controller
 # passes.
 LATE_SHARE = 0.01
-_MOST_EVENTS = 10  # of one source and code that are listed one by one
 _OF_EVERY_BLOCK = {"plant": ("applied",), "controller": ("command", "trace")}  # topics by who sends them
 
 
@@ -126,18 +124,22 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
     `progress` is called with the share of the log that was read, 0 to 1.
     """
     check_log_file(path)
-    reader = LogReader(path)
-    seen = LogWatch()
+    reader, seen = LogReader(path), LogWatch()
+    return seen.result(reader, feed(reader, seen, progress))
+
+
+def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None = None) -> Chain:
+    """Give every message of a log to a watch with the methods of `LogWatch`; returns the chain, checked by a second thread."""
     with ThreadPoolExecutor(max_workers=1) as beside:
-        chain = beside.submit(chain_of_log, path)
+        chain = beside.submit(chain_of if reader.alone else chain_of_log, reader.path)
         for piece in iter_pieces(reader):
             if piece.topic in STREAMING:
-                seen.add(piece.topic, piece.records, piece.log_time_ns)
+                watch.add(piece.topic, piece.records, piece.log_time_ns)
             else:
-                seen.add_others(piece.topic, piece.payloads)
+                watch.add_others(piece.topic, piece.payloads)
             if progress is not None:
                 progress(reader.position_bytes / max(reader.size_bytes, 1))
-        return seen.result(reader, chain.result())
+        return chain.result()
 
 
 def _channels(reader: LogReader) -> dict[str, Channel]:
@@ -183,23 +185,20 @@ def _of_file(path: Path, reader: LogReader, seen: LogWatch) -> list[Finding]:
         found.append(Finding("empty", path.name, "holds no sensor block"))
     else:
         found += _of_absent_topics(reader, seen)
-    listed: Counter[tuple[str, str]] = Counter()
-    for event in seen.events.kept:
-        listed[event.source, event.code] += 1
-        if listed[event.source, event.code] > _MOST_EVENTS:
-            continue
+    events, listed = seen.events, set[tuple[str, str]]()
+    for event in events.kept:
+        key = event.source, event.code
+        times, first = events.counts[key], key not in listed
+        listed.add(key)
         dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
         # a gap is a finding of its topic already
         if event.code != "GAP" and is_weighty(event.code):
-            found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", event.text))
+            text = event.text + (f" (the first of {times})" if times > 1 else "")
+            own = Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", text, times)
+            found += [own] if first else []
         elif dropped and int(dropped[1]):
             text = f"the {event.source} dropped {counted(int(dropped[1]), 'message')} because it was too slow"
             found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))
-    for (source, code), times in seen.events.counts.items():
-        if times > _MOST_EVENTS and is_weighty(code):
-            text = f"{counted(times - _MOST_EVENTS, 'more event', 'more events')} of this kind"
-            found.append(Finding(code.lower().replace("_", "-"), f"/event/{source}", text, times - _MOST_EVENTS))
-    events = seen.events
     if reader.damage.closed and events.has("plant", "START") and not events.has("plant", "END"):
         found.append(Finding("no-end", "/event/plant", "the plant began its run and never ended it"))
     return found

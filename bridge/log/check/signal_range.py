@@ -2,7 +2,6 @@
 
 import math
 from copy import copy
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,18 +64,22 @@ class _Side:
         elif highest < self.extreme:
             self.end_run(self.extreme - float(values[0]), resolution)
             return
-        at = values == self.extreme
-        self.at_extreme += int(np.count_nonzero(at))
-        edges = np.flatnonzero(at[1:] != at[:-1]) + 1
-        limits = np.concatenate([[0], edges, [len(values)]])
-        for first, end in pairwise(limits.tolist()):
-            if not at[first]:
-                self.end_run(self.extreme - float(values[first]), resolution)
-            elif first == 0 and self._open is not None:
+        at = np.flatnonzero(values == self.extreme)
+        self.at_extreme += len(at)
+        if at[0] > 0:
+            self.end_run(self.extreme - float(values[0]), resolution)
+        apart = np.diff(at) > 1
+        firsts, ends = at[np.concatenate([[True], apart])], at[np.concatenate([apart, [True]])] + 1
+        # shorter runs do not count, and a channel that rests at its end has thousands; one may go on in another piece
+        kept = (ends - firsts >= _SHORTEST_RUN) | (firsts == 0) | (ends == len(values))
+        for first, end in zip(firsts[kept].tolist(), ends[kept].tolist(), strict=True):
+            if first == 0 and self._open is not None:
                 self._open = self._open[0] + end, self._open[1]
             else:
                 last = before if first == 0 else float(values[first - 1])
                 self._open = float(end - first), math.inf if last is None else self.extreme - last
+            if end < len(values):
+                self.end_run(self.extreme - float(values[end]), resolution)
 
     def end_run(self, step_out: float, resolution: float) -> None:
         """The run that goes on, if any, ends with this step."""

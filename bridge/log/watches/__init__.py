@@ -1,6 +1,5 @@
 """What a log is looked at for, message by message in a memory that does not grow: losses, events, distributions of values.
 
-loss_watch    how many messages of a topic are missing, in whatever order the others came
 event_watch   the first events of each source and code, and how many there were
 histogram     percentiles to 0.25 %
 arrays        differences and medians, without the parts of numpy that are slow to import

@@ -18,9 +18,21 @@ def steps(values: Integers, before: int) -> Integers:
 
 def median(values: npt.NDArray[Any]) -> float:
     """As `numpy.median` of at least one finite number; the first call of that imports the masked arrays, which takes 30 ms."""
-    low, high = (len(values) - 1) // 2, len(values) // 2
+    return float(_medians(values))
+
+
+def _medians(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Along the last axis."""
+    low, high = (values.shape[-1] - 1) // 2, values.shape[-1] // 2
     middle = np.partition(values, (low, high))
-    return (float(middle[low]) + float(middle[high])) / 2.0
+    return np.asarray((middle[..., low].astype(np.float64) + middle[..., high]) / 2.0)
+
+
+def noise_of(values: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.float64]:
+    """Standard deviation of white noise on what moves smoothly most of the time, along the last axis, by second differences."""
+    if values.shape[-1] < 3:
+        return np.zeros(values.shape[:-1])
+    return 1.4826 * _medians(np.abs(np.diff(values, 2))) / 6.0**0.5
 
 
 class Longest:

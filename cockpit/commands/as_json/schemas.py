@@ -303,10 +303,11 @@ def _faults() -> dict[str, Any]:
 
 
 def _soak() -> dict[str, Any]:
-    from cockpit.commands.as_json.types import schema_of, table
-    from cockpit.run.soak import Soaked
+    from cockpit.commands.as_json.types import schema_of
+    from cockpit.run.soak import Memory, Period
 
-    return schema_of(table(Soaked, {"good": bool}))
+    own = {"scenario": str, "wanted_s": float, "interrupted": bool, "memory": list[Memory], "periods": list[Period]}
+    return schema_of(_verdict(**own))
 
 
 def _bench_faults() -> dict[str, Any]:

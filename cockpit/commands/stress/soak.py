@@ -1,4 +1,4 @@
-"""`stickslip soak`: plant, controller and recorder for hours, watched from outside."""
+"""`stickslip soak`: plant, controller and recorder for hours, judged and watched from outside."""
 
 from pathlib import Path
 from typing import Annotated
@@ -36,7 +36,7 @@ def soak(
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a page, one .md file.")] = None,
     as_json: Json = None,
 ) -> None:
-    """Run a loop for hours: memory of each process, lost blocks, latency over time; exit status 1: not to its end, or not whole.
+    """Run a loop for hours: verdict, memory of each process, latency over time; exit status 1: not to its end, or not whole.
 
     Ctrl-C ends it with a result. Its log is gone afterwards, unless --log keeps it.
     """
@@ -64,7 +64,7 @@ def soak(
         if report is not None:
             with writing(report):
                 write_whole(report, soaked.page())
-        tell(as_json, soaked._asdict() | {"good": soaked.good}, soaked.in_words())
+        tell(as_json, soaked.as_dict(), soaked.in_words())
         return 0 if soaked.good else 1
 
     carry_out(work, as_json)

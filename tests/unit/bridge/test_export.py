@@ -119,6 +119,10 @@ def test_tables_chunk_by_chunk_are_the_whole_run(log: Path, monkeypatch: pytest.
         assert b"".join(pieces[name]) == getattr(run, name).tobytes()
 
 
+def test_topics_that_nobody_asks_for_are_not_looked_at(log: Path) -> None:
+    assert {piece.topic for piece in iter_pieces(LogReader(log), {"trace", "snapshot"})} <= {"trace", "snapshot"}
+
+
 def test_the_command(log: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(
         log_app, ["export", str(log), "--to", str(tmp_path / "x.csv"), "--topic", "trace", "--json"]

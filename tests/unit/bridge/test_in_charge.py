@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bridge.log.check.log_check import check_log
-from bridge.log.in_charge import NO_COMMAND, in_charge
+from bridge.log.in_charge import NO_COMMAND
 from bridge.log.logfile import read_run
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, LETTERS, harms, is_told
@@ -76,7 +76,7 @@ def test_the_way_out_of_a_rig_that_is_stopped_is_no_fallback(long_run: Path, tmp
         tables["applied"]["fallback"][-40:] = 1
         tables["applied"]["command_block"][-40:] = NO_COMMAND
 
-    assert in_charge(read_run(changed(long_run, tmp_path / "out.mcap", stopped))).fallbacks == 0
+    assert judge(changed(long_run, tmp_path / "out.mcap", stopped)).charge.fallbacks == 0
 
 
 def test_a_rig_that_nobody_ever_commanded(long_run: Path, tmp_path: Path) -> None:

@@ -3,8 +3,12 @@
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
+import numba
+
+ROOT = Path(__file__).parents[3]
 # the inner kernel is too long to become a part of the outer one: that finds it by its symbol
 STEPS = "\n    ".join(f"total = 0.5 * total + math.sin(total + {k}.0)" for k in range(60))
 KERNELS = f"""
@@ -76,3 +80,21 @@ def test_a_shared_kernel_is_compiled_once_and_loaded_before_its_callers(tmp_path
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         # one compilation for both values in the source
         assert done.stdout.split() == ["1.75", "1", hits]
+
+
+def test_no_numba_is_installed_whose_internals_may_differ() -> None:
+    """With another one these tests decide whether the bound may rise: numba promises nothing of the classes that link kernels."""
+    major, minor = map(int, numba.__version__.split(".")[:2])
+    needed = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    assert f"numba>={major}.{minor},<{major}.{minor + 1}" in needed
+
+
+def test_a_process_that_loads_kernels_does_not_import_linear_algebra() -> None:
+    """Numba asks for it as it loads the first one; where it compiles a product it still asks."""
+    code = (
+        "import sys, bridge.kernel, numba.np.arraymath as of_arrays, numba.np.linalg as of_matrices\n"
+        "assert 'scipy.linalg' not in sys.modules\n"
+        "of_matrices.ensure_blas()\n"
+        "assert 'scipy.linalg' in sys.modules and of_arrays._HAVE_BLAS"
+    )
+    subprocess.run([sys.executable, "-P", "-c", code], check=True)

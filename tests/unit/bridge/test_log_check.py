@@ -11,9 +11,12 @@ from mcap.writer import Writer
 from typer.testing import CliRunner
 
 from bridge.faults import Fault
+from bridge.log.check.channel import Channel, channel_findings
 from bridge.log.check.log_check import check_log
+from bridge.log.check.signal_range import look
 from bridge.log.logfile import read_run
 from bridge.log.recover import recover
+from bridge.log.topic_watch import TopicWatch
 from cockpit.commands.log import log_app
 from cockpit.judge.judged import judge
 from cockpit.judge.verdict_words import in_words
@@ -115,6 +118,18 @@ def test_what_was_done_is_found(tmp_path: Path, change: Callable[[Tables], None]
     assert kind in {finding["kind"] for finding in json.loads(result.stdout)["findings"]}
 
 
+def test_noise_alone_and_a_coarse_position_at_rest_are_no_finding() -> None:
+    """Both repeat values: noise of few steps its largest one, and a position that stands within a step."""
+    noise = np.clip(np.random.default_rng(1).standard_normal(100_000), -3.5, 3.5)
+    accel_mps2 = (0.001 * np.round(1.5 * noise)).astype(np.float32)
+    accel = Channel(noise=0.0015, step=0.001, low=-490.0, high=490.0)
+    assert look(accel_mps2, dwells=False).at_highest > 20
+    assert channel_findings("base_accel_mps2", look(accel_mps2, dwells=False), 5e-5, accel) == []
+    position_m = 1e-6 * np.arange(3.0).repeat(40_000)
+    position = Channel(noise=1e-8, step=1e-6, low=-1.0, high=1.0)
+    assert channel_findings("mass_position_m", look(position_m, dwells=True), 5e-5, position) == []
+
+
 def test_the_lower_end_of_a_range_is_known(tmp_path: Path) -> None:
     """A sensor that ends at -8 N, on a stroke back that pushes harder, and one that measures the whole of it."""
     back = ["duration_s=0.4", "rig.drive.profile=[[0.0, -0.01]]", "rig.sensors.position_lowest_m=-0.01"]
@@ -135,6 +150,25 @@ def test_a_late_message_closes_its_gap(tmp_path: Path) -> None:
     found = kinds(doctored(tmp_path, change))
     assert "/sensors: 1 message missing in 1 gap, first 5 to 5" in found["gap"]
     assert "order" in found
+
+
+def test_missing_messages_are_counted_in_whatever_order_the_others_came() -> None:
+    """Stretches that come late, the first ones among them, and doubled messages, in pieces of any length."""
+    drawn = np.random.default_rng(1)
+    for _ in range(300):
+        numbers = drawn.integers(0, 50) + np.flatnonzero(drawn.random(200) > 0.2 * drawn.random())
+        for _ in range(drawn.integers(0, 4)):
+            first, middle, end = np.sort(drawn.integers(0, len(numbers), 3))
+            parts = numbers[:first], numbers[middle:end], numbers[first:middle], numbers[end:]
+            numbers = np.concatenate([*parts, numbers[first : first + 1]])
+        watch = TopicWatch("sensors")
+        for piece in np.split(numbers, np.sort(drawn.integers(0, len(numbers), 3))):
+            records = np.zeros(len(piece), [("sequence", "u8"), ("t_ns", "i8")])
+            records["sequence"] = piece
+            watch.add(records, records["t_ns"], 0.0)
+        whole = range(int(numbers.min()), int(numbers.max()) + 1)
+        assert (watch.first_number, watch.end) == (whole.start, whole.stop)
+        assert watch.missing == len(whole) - len(set(numbers.tolist()))
 
 
 def test_a_cut_log(tmp_path: Path) -> None:

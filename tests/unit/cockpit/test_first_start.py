@@ -96,4 +96,4 @@ def test_what_a_child_says_of_its_kernels_is_heard_and_told(monkeypatch, capsys)
     child._reader.join(PATIENCE_S)
     assert child.still == processes.READY
     assert child.left == (0, 4)
-    assert capsys.readouterr().err == ""  # the parent shows what is left of all its children
+    assert capsys.readouterr().err == ""  # the parent shows the kernels left of all its children

@@ -97,7 +97,7 @@ def test_a_rig_that_falls_silent_is_not_told_by_what_it_said_before(
 def test_an_answer_to_another_word_is_none_to_this_one(say: Callable[[Rig, str], operator.Obeyed]) -> None:
     """Somebody else's word, and an earlier one of this process, end in the state that is asked for."""
     other = wire.Operator(who="somebody else")
-    with pytest.raises(Fault, match=r"did not say that it took RESET .* is DISARMED .*; say it again") as raised:
+    with pytest.raises(Fault, match=r"did not confirm RESET .* is DISARMED .*; send it again") as raised:
         say(Rig([], lambda _word: [taken(other, "RESET"), applied(DISARMED)] * 3), "RESET")
     assert raised.value.kind is FAULTS["NO_PEER"]
 

@@ -108,10 +108,13 @@ def test_a_loop_that_stood_still_by_itself_is_late_outside(run: RunData) -> None
     assert (short.late_inside, short.late_outside) == (0, 201)
 
 
-def test_commands_that_never_come_are_late(run: RunData) -> None:
-    lost: Late = dict.fromkeys((200, 201, 700, BLOCKS - 2), np.inf)
-    pauses = found(run, account(lost), (201.5, 1.0))
-    assert (pauses.late_inside, pauses.late_outside) == (2, 2)
+def test_every_figure_counts_the_same_late_commands(run: RunData) -> None:
+    """Commands that never came are blocks without a command; "207 late commands" stood beside "228 later than 1 ms"."""
+    never: Late = dict.fromkeys((200, 201, 700, BLOCKS - 2), np.inf)
+    verdict = verdict_of(watched(run, account(never | {500: 1.5, 800: 1.2}), (501.2, 1.1)))
+    assert verdict.pauses is not None
+    assert (verdict.pauses.late_inside, verdict.pauses.late_outside, verdict.late_commands) == (1, 1, 2)
+    assert "2 late commands" in verdict.losses()
 
 
 def test_rows_that_the_log_lacks_are_no_late_commands(run: RunData) -> None:

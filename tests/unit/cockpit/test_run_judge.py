@@ -121,6 +121,36 @@ def test_missing_blocks_change_the_status_only_where_they_decide(
     assert control == NOT_JUDGED or verdict.exit_status(strict=True) == 1
 
 
+def until(run: RunData, rows: int, text: str | None) -> RunData:
+    """The first rows of a run of 6 s, and the rig's END with a text, or no event."""
+    events = [] if text is None else [wire.Event(source="plant", code="END", text=text)]
+    return run._replace(**{name: table[:rows] for name, table in tables_of(run).items()}, events=events)
+
+
+def test_a_log_that_ends_early_and_does_not_say_why_is_not_judged(run: RunData) -> None:
+    """It read "data whole" and "control ok"."""
+    verdict = verdict_of(until(run, 5000, None))
+    assert data_in_words(verdict) == "5.00 of 6.00 s; the rest is not in the log"
+    assert headline(verdict) == "not judged: the log ends at 5.00 of 6.00 s and does not say why"
+    assert (verdict.exit_status(strict=False), verdict.exit_status(strict=True)) == (14, 1)
+    assert verdict.losses() == ["how many messages are lost is not known"]
+    short = headline(verdict_of(until(run, 2000, None)))
+    assert short == "the log ends at 2.00 of 6.00 s; ended before the controller was enabled (at 3.0 s)"
+
+
+def test_a_run_that_an_operator_ended_is_whole(run: RunData) -> None:
+    verdict = verdict_of(until(run, 5000, "blocks=5000"))
+    assert (verdict.control, data_in_words(verdict)) == (OK, "whole: 5000 blocks")
+    assert verdict_of(run._replace(events=[])).control == OK  # to its planned end
+
+
+@pytest.mark.parametrize("name", ["applied", "command", "trace"])
+def test_a_topic_without_a_message_is_a_loss(run: RunData, name: str) -> None:
+    verdict = verdict_of(run._replace(**{name: getattr(run, name)[:0]}))
+    assert verdict.losses() == [f"no message of /{name} in the log"]
+    assert (verdict.exit_status(strict=False), verdict.exit_status(strict=True)) == (14, 1)
+
+
 def slip(run: RunData, tables: Tables, block: int) -> None:
     """The slide jumps ahead of its drive, which goes back, and the force along it falls by 3 N."""
     stiffness_N_per_m = run.configuration("plant")["rig"]["drive"]["stiffness_N_per_m"]
@@ -156,6 +186,26 @@ def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path) -> Non
     assert verdict.after is not None
     assert (verdict.after.slips, verdict.stalled_slips, verdict.control) == (0, 1, NOT_JUDGED)
     assert "a slip came before" in verdict.reason  # the stall and its second leave 0.6 s
+
+
+def test_the_highest_set_point_is_named_beside_the_ratio(run: RunData) -> None:
+    """A ratio of "1.11 to 3.18 ... (ok)" did not say that the controller had raised its set point."""
+    trace = tables_of(run)["trace"]
+    trace["velocity_ratio"][(trace["mode"] == wire.EXCITE) & (trace["t_ns"] > 4.5e9)] = 2.25
+    lines = in_words(verdict_of(run._replace(trace=trace)), verbose=True)
+    (ratio,) = [line for line in lines if line.startswith("v_a/v_d")]
+    assert ratio.endswith("; set point at most 2.25")
+
+
+@pytest.mark.parametrize(("at_s", "blamed"), [(4.4, True), (5.6, False)])
+def test_a_trip_after_lost_commands_names_the_link(run: RunData, at_s: float, blamed: bool) -> None:
+    """ "Is the base accelerometer loose?" stood in the headline of a run whose commands were cut for 0.1 s."""
+    applied = tables_of(run)["applied"]
+    applied["fallback"][4200:4300] = 1
+    trip = wire.Event(source="controller", code="OPEN_LOOP", text="far less v_a than commanded", t_ns=round(at_s * 1e9))
+    verdict = verdict_of(run._replace(applied=applied, events=[*run.events, trip]))
+    assert verdict.control == NOT_OK
+    assert ("no fresh command reached the rig from 4.20 s on: look at the link" in headline(verdict)) == blamed
 
 
 def test_equal_warnings_are_one_line_with_a_count(run: RunData) -> None:

@@ -1,53 +1,78 @@
-"""What a soak makes of what it hears."""
+"""What a soak makes of its log and of the memory of its processes."""
 
 import math
 import os
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from bridge.wire import stickslip_pb2 as wire
-from bridge.wire.messages import APPLIED as LAYOUT
-from bridge.wire.topics import APPLIED, RECORDER_EVENT
+from bridge.log.logfile import read_run
+from bridge.log.runlog import Rotation
+from bridge.log.storage.parts import parts_of
+from bridge.wire.zenoh_link import BusConfig
+from cockpit.judge.judged import judge
 from cockpit.run import soak
+from cockpit.run.in_process import run_onboard
+from cockpit.run.scenario import load_scenario
 from cockpit.run.soak import Soaked
+from tests.logs import tables_of, write
 from tests.system.ports import free_endpoint
 
 
-def heard(numbers: list[int], gap: bool = False, interrupted: bool = False) -> Soaked:
-    watch = soak._Watch(soak.BusConfig(endpoint=free_endpoint()), 20.0, lambda _share: None)
-    for number in numbers:
-        applied = LAYOUT.blank()
-        applied["sequence"], applied["t_ns"] = number, (number + 1) * 10_000_000
-        applied["commands"], applied["round_trip_ns"] = 1, 300_000 if number % 100 else 2_000_000
-        watch._take(APPLIED.name, applied.tobytes())
-    if gap:
-        event = wire.Event(source="recorder", code="GAP", text="/sensors: 3 lost before 705")
-        watch._take(RECORDER_EVENT.name, event.SerializeToString())
-    watch._take(RECORDER_EVENT.name, wire.Event(source="recorder", code="WATCH").SerializeToString())
+def soaked(folder: Path, lost: int = 0, thin_out: bool = False) -> Soaked:
+    """Of a log of 1.2 s in several files, the last of which is judged at the end; its commands take 0.3 ms, each 100th 2 ms."""
+    log = folder / "soak.mcap"
+    whole = folder / "whole.mcap"
+    settings = ["duration_s=1.2", "controller.policy.enabled_from_s=0.1"]
+    run_onboard(load_scenario("paper-c45-c45", settings), whole, {})
+    run = read_run(whole)
+    tables = tables_of(run)
+    tables["applied"]["commands"] = 1
+    tables["applied"]["round_trip_ns"] = 300_000
+    tables["applied"]["round_trip_ns"][::100] = 2_000_000
+    tables["applied"]["commands_late"][::100] = 1
+    tables["sensors"] = np.delete(tables["sensors"], slice(700, 700 + lost))
+    write(log, tables, run, 200, Rotation(bytes=200_000))
+    assert len(parts_of(log)) > 2
+    watch = soak._Watch(BusConfig(endpoint=free_endpoint()), 20.0, log, thin_out, lambda _share: None)
+    watch._period_s = 0.5
+    watch._judge_files(still_open=1)
     watch._memory["recorder"] = [(t_s, 100.0 + 2.0 * t_s / 3600.0) for t_s in range(20)]
-    return watch.result("belt", interrupted)
+    return watch.result("belt", interrupted=False)
 
 
-def test_lost_blocks_latency_and_memory_are_told() -> None:
-    soaked = heard([*range(700), *range(705, 2000)], gap=True)
-    assert soaked.unheard == 5
-    assert (soaked.blocks, soaked.lost_blocks, soaked.good) == (1995, 3, False)
-    assert [(one.unheard, one.late) for one in soaked.periods] == [(5, 9), (0, 10)]
-    assert soaked.periods[0].p50_us == 300.0
-    assert soaked.periods[0].max_us == 2000.0
-    assert soaked.events == {"GAP": 1}
-    (memory,) = soaked.memory
+def test_lost_blocks_latency_and_memory_are_told(tmp_path: Path) -> None:
+    came = soaked(tmp_path, lost=3)
+    assert (came.verdict.blocks, came.verdict.lost_blocks, came.good) == (1197, 3, False)
+    assert [(one.until_s, one.blocks, one.late) for one in came.periods] == [
+        (0.5, 500, 5),
+        (1.0, 500, 5),
+        (1.2, 200, 2),
+    ]
+    assert came.periods[0].p50_us == pytest.approx(300.0, rel=3e-3)
+    assert came.periods[0].max_us == 2000.0
+    (memory,) = came.memory
     assert memory.role == "recorder"
     assert memory.slope_MB_per_h == pytest.approx(2.0)
-    assert "3 LOST" in "\n".join(soaked.in_words())
-    assert soaked.page().count("\n| ") == 3
+    assert "data     3 of 1200 blocks missing in the log" in "\n".join(came.in_words())
+    assert came.page().count("\n| ") == 4
+    assert came.as_dict()["memory"][0]["role"] == "recorder"
 
 
-def test_what_ran_to_its_end_without_a_loss_is_good() -> None:
-    assert heard(list(range(2000))).good
-    assert not heard(list(range(2000)), interrupted=True).good
+def test_what_ran_to_its_end_without_a_loss_is_good(tmp_path: Path) -> None:
+    came = soaked(tmp_path, thin_out=True)
+    assert came.good
+    assert not came._replace(interrupted=True).good
+    assert [path.name for path in sorted(tmp_path.glob("soak*"))] == ["soak.mcap"]  # the others were judged and deleted
+
+
+def test_a_soak_is_judged_as_its_log_is(tmp_path: Path) -> None:
+    came = soaked(tmp_path)
+    whole = judge(tmp_path / "soak.mcap")
+    assert came.verdict._replace(chain=whole.chain) == whole
 
 
 def test_two_points_are_no_slope() -> None:

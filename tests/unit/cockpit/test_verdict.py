@@ -44,7 +44,7 @@ def test_a_force_that_is_no_number_is_counted_and_left_out(tmp_path: Path, value
     assert before.swing_N == pytest.approx(was.swing_N, rel=0.02)
     assert before.mean_force_N == pytest.approx(was.mean_force_N, rel=0.02)
     assert verdict_of(spoilt).faults == [
-        "NOT_FINITE: /sensors drive_force_N: 2 blocks hold a sample that is no number, first 100; left out"
+        "NOT_FINITE: /sensors drive_force_N: 2 samples are no finite number, first after 0.100 s of samples; left out"
     ]
     assert outcome(spoilt).drive_work_J == pytest.approx(outcome(sound).drive_work_J, rel=0.02)
 
@@ -62,7 +62,7 @@ def test_what_was_not_measured_is_no_velocity_ratio(tmp_path: Path) -> None:
     from_the_start = json.dumps({"block_s": 0.001, "policy": {"enabled_from_s": 0.0}})
     verdict = verdict_of(run._replace(headers=run.headers | {"controller": {"configuration": from_the_start}}))
     assert verdict.faults == [
-        "NOT_FINITE: /sensors base_accel_mps2: 50 blocks hold a sample that is no number, first 250; left out"
+        "NOT_FINITE: /sensors base_accel_mps2: 50 samples are no finite number, first after 0.250 s of samples; left out"
     ]
     assert (verdict.velocity_ratio_min, verdict.velocity_ratio_max) == (pytest.approx(1.2), pytest.approx(1.2))
 
@@ -107,7 +107,7 @@ def test_slips_of_a_drive_that_seems_to_stand_are_said(tmp_path: Path) -> None:
     ("settings", "expected"),
     [
         (["rig.drive.profile=[[0.0, 0.0]]"], "the drive never moved: nothing was tested"),
-        (["controller.policy.enabled_from_s=100.0"], "the controller was not in charge in this run"),
+        (["controller.policy.enabled_from_s=100.0"], "ended before the controller was enabled (at 100.0 s)"),
         (
             ["controller.policy.enabled_from_s=0.1"],
             "the controller was in charge for 0.4 s, too short to judge: it has 1 s to settle",

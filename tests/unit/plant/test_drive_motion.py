@@ -141,15 +141,15 @@ def test_a_repeated_profile_begins_anew() -> None:
 @pytest.mark.parametrize(
     ("given", "parts"),
     [
-        (["rig.drive.profile=[[0.0, -0.0005]]"], ["travel to -8 mm", "below the transducers' 0 mm", "to -0.008"]),
+        (["rig.drive.profile=[[0.0, -0.0005]]"], ["goes to -8 mm", "ends at 0 mm", "set it to -0.01"]),
         (
             ["rig.drive.profile=[[0.0, 0.0005], [8.0, -0.0004]]", "duration_s=8.5"],
             ["rig.sensors.force_lowest_N = 0", "goes back within the run", "set it to -50"],
         ),
-        ([*TWO_SIDED, "rig.drive.profile=[[0.0, -0.01]]"], ["to -160 mm", "below the transducers' -50 mm"]),
+        ([*TWO_SIDED, "rig.drive.profile=[[0.0, -0.01]]"], ["goes to -160 mm", "ends at -50 mm", "set it to -0.2"]),
         (
             [*TWO_SIDED, "rig.drive.profile=[[0.0, 0.01], [1.0, 0.01]]", "rig.drive.repeat_every_s=1.0"],
-            ["travel to 160.0 mm, beyond the transducers' 50 mm"],
+            ["goes to 160 mm", "ends at 50 mm", "set it to 0.2"],
         ),
         (
             [*TWO_SIDED, "rig.drive.profile=[[0.0, 1e-6]]", "rig.drive.repeat_every_s=1.0", "duration_s=0.0"],
@@ -194,7 +194,7 @@ def test_a_drive_that_drifts_within_its_range_is_taken() -> None:
         *TWO_SIDED,
     ]
     assert load_scenario("from-the-start", [*cycle, "duration_s=300.0"])
-    with pytest.raises(Fault, match="beyond the transducers' 50 mm"):
+    with pytest.raises(Fault, match="ends at 50 mm"):
         load_scenario("from-the-start", [*cycle, "duration_s=3000.0"])
 
 

@@ -1,14 +1,15 @@
 """Refits: an effect that changes a number of the rig table takes over what that number was moved by."""
 
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from diagnosis.fits.batch import together
 from diagnosis.fits.fit import step_within
-from diagnosis.fits.gauss_newton import Fitter
-from diagnosis.gap.floor import floor_of, replicates
+from diagnosis.fits.gauss_newton import FAR_KNEE, Fitter
+from diagnosis.gap.floor import KNEE, floor_of, replicates
 from diagnosis.gap.problem import OutOfTimeError, Problem
 from diagnosis.hypotheses.hypothesis import NOTHING
 from diagnosis.hypotheses.nuisances import Nuisances
@@ -68,6 +69,28 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
         sliding.hypothesis, (described, rough), fitter.predicted(described, sliding.hypothesis.tables(rough))
     )
     assert fitter.far_chi2(yielding.hypothesis, (described, weightless), impossible) > even > 1e3
+
+
+@pytest.mark.parametrize(("left", "knees"), [(0.5, [FAR_KNEE, KNEE]), (0.99, [FAR_KNEE]), (2.0, [FAR_KNEE, KNEE])])
+def test_a_trial_ends_after_its_first_steps_where_it_gains_nothing(monkeypatch, left, knees):
+    """Not where it gains, nor where it is astray: there more steps may help. Here by stand-ins for the two stages."""
+    fitter, seen = Fitter.__new__(Fitter), []
+    far = SimpleNamespace(chi2=left * 100.0, deviations=np.zeros(1), w=np.zeros(1))
+
+    def fitting(*arguments):
+        seen.append(arguments[-1].knee)
+        yield from ()
+        return far
+
+    def judging(fit):
+        yield from ()
+        return fit
+
+    monkeypatch.setattr(fitter, "fitting", fitting)
+    monkeypatch.setattr(fitter, "_judging", judging)
+    (fit,) = together(lambda *_: [], [fitter.trying(NOTHING, np.zeros(1), np.zeros(1), 100.0)])
+    assert fit is far
+    assert seen == knees
 
 
 @pytest.mark.slow

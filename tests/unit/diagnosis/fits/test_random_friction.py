@@ -1,11 +1,13 @@
 """A random load is told by what it scatters, whatever path it takes."""
 
 import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from diagnosis.evidence.folder import load_evidence
+from diagnosis.fits import random_friction
 from diagnosis.fits.random_friction import RANDOM_EFFECTS, RandomFriction, in_bursts
 from diagnosis.fits.retuning import retuned_rig
 from diagnosis.gap.floor import replicates
@@ -82,6 +84,22 @@ def rigs_in_bursts(folder, effect, formula, count):
 def test_a_load_that_goes_on_comes_in_no_bursts(rig):
     (fitter, _, _, _), _ = rig
     assert not in_bursts(fitter.problem)
+
+
+def test_bursts_are_one_sided_or_rare_and_a_load_that_goes_on_is_neither(monkeypatch):
+    """Breakaways of three kinds, of 200 slips: with a few strong ones, with many weak ones of a heavy tail, and even."""
+    drawn = np.random.default_rng(4)
+    even = np.sin(np.linspace(0.0, 60.0, 200))
+    debris = np.where(drawn.random(200) < 0.1, 1.0, 0.0) + 0.05 * even
+    rare = np.where(drawn.random(200) < 0.1, drawn.normal(size=200), 0.1 * drawn.normal(size=200))
+
+    def of(values):
+        series = [SimpleNamespace(value=values - values.mean(), of_slips=True)]
+        monkeypatch.setattr(random_friction, "friction_series", lambda *_: series)
+        return in_bursts(SimpleNamespace(runs=[], scales=None))
+
+    assert [of(debris), of(rare), of(even)] == [True, True, False]
+    assert of(even[:6])  # too few to tell
 
 
 @pytest.mark.nightly  # 15 s of CPU
