@@ -51,13 +51,14 @@ class Came(NamedTuple):
     missed: int  # blocks that the controller did not receive, by its own trace
     p50_us: float  # block sent to command received
     trips: list[str]
+    reason: str  # why control is not ok; empty where it is
 
     @property
     def row(self) -> str:
         """One line of the table."""
         return (
             f"{self.program[-22:]:<22} {self.status:>4} {len(self.stops):>5} {max(self.stops, default=0.0) * 1e3:>5.0f} ms "
-            f"{self.blocks:>6} {self.messages:>8} {self.missed:>6} {self.p50_us:>6.0f}  {' '.join(self.trips)}"
+            f"{self.blocks:>6} {self.messages:>8} {self.missed:>6} {self.p50_us:>6.0f}  {' '.join(self.trips)} {self.reason}"
         )
 
 
@@ -116,10 +117,12 @@ class Run:
             verdict = json.loads(out)
         p50_us = float((verdict.get("latency") or {}).get("p50_us", "nan"))
         if not self.log.exists():
-            return Came(self.program, self.process.returncode, self.stops, -1, -1, -1, p50_us, ["no log"])
+            return Came(self.program, self.process.returncode, self.stops, -1, -1, -1, p50_us, [], "no log")
         data = read_run(self.log)
         trips = sorted({event.code for event in data.events} & {*TRIPS, *WEAK_REASONS})
-        return Came(self.program, self.process.returncode, self.stops, *losses(data), p50_us, trips)
+        return Came(
+            self.program, self.process.returncode, self.stops, *losses(data), p50_us, trips, verdict.get("reason", "")
+        )
 
 
 def stop_at_random(runs: list[Run], stops: Stops, chance: random.Random) -> None:

@@ -84,6 +84,7 @@ class RunJudge:
         self._first_ns: int | None = None
         self._last_ns = self._applied_ns = 0
         self._has_force = self._answered = False  # a block has a force; a block has a fresh command
+        self._disarmed_s = np.inf  # when the rig first disarmed itself, as it had no fresh command
         self._gain_seen = False  # a loop check confirmed the exciter's gain
         self._phases: dict[str, PhaseSum] = {}
         self._alone: dict[float, PhaseSum] = {}  # by begin
@@ -110,6 +111,9 @@ class RunJudge:
             self._answered |= bool((records["fallback"] == 0).any())
             self._applied_ns = max(self._applied_ns, int(records["t_ns"].max()))
             self._gain_seen |= bool(np.isin(records["cause"], (wire.CHECK_PASSED, wire.GAIN_ACCEPTED)).any())
+            left = (records["guard_state"] == wire.DISARMED) & (records["cause"] == wire.COMMAND_LOST)
+            if left.any():
+                self._disarmed_s = min(self._disarmed_s, 1e-9 * float(records["t_ns"][left.argmax()]))
 
     def add_others(self, topic: str, payloads: Sequence[bytes]) -> None:
         """Take messages of another topic."""
@@ -190,7 +194,7 @@ class RunJudge:
 
     def _without(self, setup: Setup, is_last: bool) -> Stretches:
         """What is no part of the controller's time: it has a second to settle after it was stopped, or was not there."""
-        return [*self._steps.stops(setup.block_s, is_last), *_settling(self._fallbacks())]
+        return [*self._steps.stops(setup.block_s, is_last), *_settling([*self._fallbacks(), *self._steps.stale])]
 
     def result(self, damage: Damage, chain: Chain, foreign: dict[str, int]) -> RunVerdict:
         """The verdict, at the end of the log. Raises Fault BAD_LOG."""
@@ -210,6 +214,7 @@ class RunJudge:
         gone, settled_s = self._gone(), setup.settled_from_s
         spans = ((max(from_s, settled_s), until_s, until_s - from_s) for from_s, until_s in self.log.charge.stretches)
         short = [(from_s, until_s) for from_s, until_s, length_s in spans if length_s <= GONE_S]
+        short += [(from_s, until_s) for from_s, until_s in self._steps.stale if from_s > settled_s]
         enabled_s = min(setup.enabled_from_s, seconds) if setup.imported else setup.enabled_from_s
         in_charge_s = seconds - enabled_s - stopped_s - sum(until_s - from_s for from_s, until_s in gone)
         planned_s = self._planned_s(setup)
@@ -222,6 +227,7 @@ class RunJudge:
         watch = self._sensor_watch
         slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
         counted_s = apart((settled_s, seconds), self._without(setup, is_last=True))
+        why, disarmed = untested(setup, self._steps, seconds, self._answered, after, in_charge_s), self._disarmed()
         return RunVerdict(
             log=str(self._path),
             seconds=seconds,
@@ -263,7 +269,7 @@ class RunJudge:
                 for event in events.kept
                 if event.code == "START" and event.text.startswith(realtime.NORMAL)
             ],
-            untested=untested(setup, self._steps, seconds, self._answered, after, in_charge_s),
+            untested=f"{why}; {disarmed}" if why and disarmed else why,
             doubts=[]
             if setup.imported
             else self._doubts(charge, after, setup.block_s, chain, damage, all_known or planned_s > 0),
@@ -336,6 +342,13 @@ class RunJudge:
                 return f"{why}: look at the link to the controller, then `stickslip reset`"
         return event.text
 
+    def _disarmed(self) -> str:
+        """That the rig disarmed itself, in words; empty where it did not."""
+        if self._disarmed_s == np.inf:
+            return ""
+        why = f"the rig disarmed itself at {self._disarmed_s:.2f} s, as no fresh command reached it"
+        return f"{why}: look at the controller and the link to it, then `stickslip arm`"
+
     def _clock(self) -> str:
         """What is wrong with the time of the blocks, in words; empty where it follows their numbers."""
         watch = self.log.topics["sensors"]
@@ -350,7 +363,7 @@ class RunJudge:
         self, charge: InCharge, after: Phase | None, block_s: float, chain: Chain, damage: Damage, all_known: bool
     ) -> list[str]:
         """Why a run cannot be judged although something was tested."""
-        doubts = [line for line in (self._clock(), too_little(after, self._phases, block_s)) if line]
+        doubts = [line for line in (self._clock(), self._disarmed(), too_little(after, self._phases, block_s)) if line]
         if charge.controller_until_s is not None:
             doubts.append(f"no step of the controller is in the log after {charge.controller_until_s:.2f} s")
         if after is not None:

@@ -11,6 +11,7 @@ from bridge.units import counted
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.messages import CHANNELS, Records
 from cockpit.judge.setup import SETTLING_S
+from controller.codes import STALE
 
 STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
 # A drive that turns stands for a moment, and a slip may come then: 17 in an hour of the belt axis, which has 718 turns. Smaller:
@@ -86,6 +87,7 @@ class StepWatch:
         self._unseen = 0  # slips while the drive seemed to stand
         self._unseen_s = 0.0
         self._moved_s = -np.inf  # when the drive was last seen to move
+        self.stale: list[tuple[float, float]] = []  # first and last step of the stretches without a block in time
         self._idle: list[tuple[float, float]] = []  # first and last step of each stretch that ended
         self._idle_from_s: float | None = None
         self._last_s = 0.0
@@ -114,6 +116,9 @@ class StepWatch:
             self._unseen_s = self._unseen_s if self._unseen else float(t_s[unseen][0])
             self._unseen += int(np.count_nonzero(unseen))
         self._slips = int(slips[-1])
+        for at_s in t_s[(records["events"] & STALE) != 0].tolist():
+            goes_on = self.stale and at_s - self.stale[-1][1] <= SETTLING_S
+            self.stale[len(self.stale) - bool(goes_on) :] = [(self.stale[-1][0] if goes_on else at_s, at_s)]
         idle = (records["mode"] == wire.STOPPED) | not_armed
         for at in np.flatnonzero(steps(idle.view(np.int8), int(self._idle_from_s is not None))):
             if idle[at]:

@@ -20,6 +20,7 @@ from cockpit.run.closed_loop import ClosedLoop
 from cockpit.run.in_process import run_onboard
 from cockpit.run.run import run_scenario
 from cockpit.run.scenario import load_scenario
+from controller.codes import STALE
 from tests.logs import Tables, tables_of, verdict_of, write
 
 
@@ -177,15 +178,32 @@ def test_a_slip_with_missing_blocks_in_it_may_be_none(run: RunData, tmp_path: Pa
     assert "blocks are missing within 1 slip" in headline(unsure)
 
 
-def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("table", "field", "value"), [("applied", "fallback", 1), ("trace", "events", STALE)], ids=["rig", "controller"]
+)
+def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path, table: str, field: str, value: int) -> None:
+    """Of the rig, which ramped to zero without a fresh command, and of the controller, which did without a fresh block."""
+
     def stalled(tables: Tables) -> None:
         slip(run, tables, 4500)
-        tables["applied"]["fallback"][4300:4700] = 1
+        tables[table][field][4300:4700] |= value
 
     verdict = judge(changed(run, tmp_path / "stalled.mcap", stalled))
     assert verdict.after is not None
     assert (verdict.after.slips, verdict.stalled_slips, verdict.control) == (0, 1, NOT_JUDGED)
     assert "a slip came before" in verdict.reason  # the stall and its second leave 0.6 s
+
+
+def test_a_rig_that_disarmed_itself_is_not_judged_and_named(run: RunData) -> None:
+    """The line read "stopped by an operator, or not armed", and control was ok."""
+    tables = tables_of(run)
+    assert verdict_of(run).control == OK
+    tables["applied"]["guard_state"][5500:] = wire.DISARMED
+    tables["applied"]["cause"][5500:] = wire.COMMAND_LOST
+    tables["trace"]["reason"][5500:] = wire.NOT_ARMED
+    verdict = verdict_of(run._replace(applied=tables["applied"], trace=tables["trace"]))
+    assert (verdict.control, verdict.exit_status(strict=False)) == (NOT_JUDGED, 14)
+    assert "the rig disarmed itself at 5.50 s, as no fresh command reached it" in headline(verdict)
 
 
 def test_the_highest_set_point_is_named_beside_the_ratio(run: RunData) -> None:
