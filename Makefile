@@ -100,7 +100,7 @@ define install
 else $(BIN)/python -m ensurepip > /dev/null && $(BIN)/python -m pip install --disable-pip-version-check --no-compile --no-deps $(1); fi
 endef
 
-# 46 packages: what runs, records, replays and judges
+# some 45 packages: what runs, records, replays and judges
 $(SMALL): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if v >= (3, 11) else f"$(PYTHON) is {v[0]}.{v[1]}: stickslip needs Python 3.11 or later; try make PYTHON=python3.11")'
 	@echo "making $(VENV), once: 190 MB to download, 600 MB on disk"
@@ -109,7 +109,7 @@ $(SMALL): requirements.lock pyproject.toml
 	$(call install,--no-build-isolation --editable .)
 	@touch $@
 
-# 96 more: the developers' tools
+# some 95 more: the developers' tools
 $(READY): $(SMALL) requirements-dev.lock
 	@echo "adding the developers' tools to $(VENV), once: 600 MB on disk"
 	$(call install,--require-hashes --requirement requirements-dev.lock)

@@ -25,7 +25,7 @@ FAULTS = {
             "ENDPOINT_BUSY",
             3,
             "The plant could not listen on the bus endpoint: another process (often an earlier run) holds the port, or the "
-            "address is not one of this machine. Or a second controller came to a rig that has one. End that process, or "
+            "address is not one of this computer. Or a second controller came to a rig that has one. End that process, or "
             "choose another port with --endpoint tcp/127.0.0.1:PORT.",
         ),
         FaultKind(
@@ -47,9 +47,9 @@ FAULTS = {
         FaultKind(
             "NOT_SECURE",
             2,
-            "Whoever reaches the bus of a rig can stop and command its exciter. So a rig listens beyond this machine only with "
+            "Whoever reaches the bus of a rig can stop and command its exciter. So a rig listens beyond this computer only with "
             "TLS and certificates (`stickslip certs FOLDER`, then --endpoint tls/HOST:PORT --certs FOLDER), a key must be closed "
-            "to others (mode 0600), and a Dask cluster beyond this machine needs tls://. --insecure allows a plain endpoint on "
+            "to others (mode 0600), and a Dask cluster beyond this computer needs tls://. --insecure allows a plain endpoint on "
             "a network that nobody else can reach. Nothing was started.",
         ),
         FaultKind(
@@ -128,7 +128,7 @@ FAULTS = {
         FaultKind(
             "NO_MEMORY",
             13,
-            "A command needed more memory than the machine, or a limit set for the command, allows. The line names the files it "
+            "A command needed more memory than the computer, or a limit set for the command, allows. The line names the files it "
             "was given. A log that claims far more than a run of its length is damaged, or made to do this: do not trust it. "
             "Else end other programs, raise the limit, or take a part of the file.",
         ),

@@ -1,4 +1,4 @@
-"""Which process of which machine somebody is, told so that a later process with the same number is not taken for it."""
+"""Which process of which computer somebody is, told so that a later process with the same number is not taken for it."""
 
 import json
 import os
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bridge.faults import Fault
 
-_STARTED = 19  # field of /proc/PID/stat behind the name: ticks since the machine's start
+_STARTED = 19  # field of /proc/PID/stat behind the name: ticks since the computer's start
 
 
 def this_process() -> str:
@@ -18,7 +18,7 @@ def this_process() -> str:
 def pid_here(role: str, told: str) -> int:
     """The pid of a process that said of itself `told`.
 
-    Raises Fault NO_PEER for one that does not tell, of another machine, of another user, or that is gone.
+    Raises Fault NO_PEER for one that does not tell, of another computer, of another user, or that is gone.
     """
     try:
         said = json.loads(told)
@@ -27,7 +27,7 @@ def pid_here(role: str, told: str) -> int:
         line = f"{role}: does not tell its process: must be one of this version; end it by hand"
         raise Fault("NO_PEER", line) from None
     if host != socket.gethostname():
-        line = f"{role}: is process {pid} of {host[:64]}: must be on this machine; give the command there"
+        line = f"{role}: is process {pid} of {host[:64]}: must be on this computer; give the command there"
         raise Fault("NO_PEER", line)
     if started is None or _started(pid) != started:
         raise Fault("NO_PEER", f"{role}: process {pid} is gone: must be there; start it again")

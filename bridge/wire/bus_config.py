@@ -1,4 +1,4 @@
-"""Where the processes of one rig meet: endpoint and prefix of the bus, and whether the endpoint is this machine's alone."""
+"""Where the processes of one rig meet: endpoint and prefix of the bus, and whether the endpoint is this computer's alone."""
 
 import ipaddress
 import socket
@@ -74,6 +74,6 @@ def address(endpoint: str) -> str:
 
 
 def is_loopback(endpoint: str) -> bool:
-    """Whether an endpoint can be reached from this machine alone; a name that is not known counts as one that can not."""
+    """Whether an endpoint can be reached from this computer alone; a name that is not known counts as one that can not."""
     found = address(endpoint).partition("%")[0]
     return bool(found) and ipaddress.ip_address(found).is_loopback

@@ -43,7 +43,7 @@ EVENTS = {
             "STALE",
             "controller",
             OUTSIDE,
-            "no new block came in time: the vibration is ramped to zero. A machine that stood still, a rig that hangs or a link "
+            "no new block came in time: the vibration is ramped to zero. A computer that stalled, a rig that hangs or a link "
             "that is cut; FRESH says that blocks arrive again",
         ),
         EventCode(
@@ -213,7 +213,7 @@ EVENTS = {
             "LATE",
             "controller",
             OUTSIDE,
-            "for 0.2 s and more blocks have come more than 15 ms later than they did before: a busy machine, a slow link, or a "
+            "for 0.2 s and more blocks have come more than 15 ms later than they did before: a busy computer, a slow link, or a "
             "clock that runs away",
         ),
         EventCode("CLEARED", "controller", NEWS, "a doubt about a sensor or the exciter is over; the text has which"),
@@ -252,12 +252,14 @@ EVENTS = {
         ),
         EventCode("INJECTION_ENDED", "plant", CHECK, "a fault that was asked for is over"),
         EventCode("OPERATOR", "plant, controller", CHECK, "a person's word was taken: `ACTION by WHO`"),
-        EventCode("WATCH", "recorder", NEWS, "whether pauses of the machine are watched, on which cores, or why not"),
+        EventCode("WATCH", "recorder", NEWS, "whether pauses of the computer are watched, on which cores, or why not"),
         EventCode(
             "PAUSE", "recorder", NEWS, "every core that the recorder may use stood still; the time is when it began"
         ),
         EventCode("CORE_PAUSE", "recorder", NEWS, "one core alone stood still"),
-        EventCode("GAP", "recorder", FAILURE, "messages were lost before they came to the log: a busy machine or link"),
+        EventCode(
+            "GAP", "recorder", FAILURE, "messages were lost before they came to the log: a busy computer or link"
+        ),
         EventCode(
             "RESTART",
             "recorder",

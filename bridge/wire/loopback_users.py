@@ -1,4 +1,4 @@
-"""Who may take part on a plain endpoint of this machine: a password for each role, made by the rig and found by our commands.
+"""Who may take part on a plain endpoint of this computer: a password for each role, made by the rig and found by our commands.
 
 The file is the dictionary that Zenoh reads, `ROLE:PASSWORD` a line, in a folder that only this user can enter. Who cannot read
 it cannot open a session.

@@ -1,4 +1,4 @@
-"""When the whole machine stood still: what the timers on all cores tell alike."""
+"""When the whole computer stalled: what the timers on all cores tell alike."""
 
 import contextlib
 import os
@@ -11,7 +11,7 @@ from typing import NamedTuple
 from bridge.wire import core_timer, realtime
 
 _PRIORITY = realtime.LOOP_PRIORITY + 1  # a loop that takes long must not look like a core that stands still
-_MOST_CORES = 8  # that are watched. More: a process of 10 MB each, and what eight share is the machine's already
+_MOST_CORES = 8  # that are watched. More: a process of 10 MB each, and what eight share is the computer's already
 # From when on no timer has more to say of a pause. Shorter: a line of a timer that starts to run later would be missed.
 _SETTLED_NS = 50_000_000
 NO_PRIORITY = "no real-time priority"
@@ -22,7 +22,7 @@ class Pause(NamedTuple):
 
     from_ns: int
     until_ns: int
-    core: int | None = None  # that stood still alone; None: every core did, which is a pause of the machine
+    core: int | None = None  # that stood still alone; None: every core did, which is a stall of the computer
 
 
 def shared(still: Sequence[Sequence[Pause]]) -> list[Pause]:
@@ -85,7 +85,7 @@ class PauseWatch:
         os.close(other)
 
     def poll(self, all_of_them: bool = False) -> list[Pause]:
-        """Pauses since the last call, of the machine and of one core alone; with `all_of_them` also such of the last 50 ms."""
+        """Pauses since the last call, of the computer and of one core alone; with `all_of_them` also such of the last 50 ms."""
         if self.refused:
             return []
         with contextlib.suppress(BlockingIOError):
@@ -115,7 +115,7 @@ class PauseWatch:
 
 
 def settled(still: Mapping[int, list[Pause]], until_ns: int) -> tuple[list[Pause], dict[int, list[Pause]]]:
-    """The pauses that ended before `until_ns`, of the machine and of one core alone, and what belongs to later ones."""
+    """The pauses that ended before `until_ns`, of the computer and of one core alone, and what belongs to later ones."""
     together = shared(list(still.values()))
     found = [pause for pause in together if pause.until_ns <= until_ns]
     told_ns = max((pause.until_ns for pause in found), default=0)

@@ -94,7 +94,7 @@ def rig_security(config: BusConfig) -> dict[str, Any]:
         print(f"stickslip: warning: {line}", file=sys.stderr, flush=True)
         return {}
     if not is_loopback(config.endpoint):
-        line = f"{config.endpoint}: others can reach it: must be an address of this machine alone, or tls/"
+        line = f"{config.endpoint}: others can reach it: must be an address of this computer alone, or tls/"
         remedy = "make certificates with `stickslip certs FOLDER` and use --endpoint tls/HOST:PORT --certs FOLDER"
         raise Fault("NOT_SECURE", f"{line}; {remedy}; --insecure allows it on a network that nobody else can reach")
     return loopback_rig_security(config, loopback_users.make(config.endpoint))
@@ -107,7 +107,7 @@ def tls_rig_security(config: BusConfig, own: certificates.RoleFiles) -> dict[str
 
 
 def loopback_rig_security(config: BusConfig, users: Path) -> dict[str, Any]:
-    """Of a rig at an endpoint of this machine alone: roles are the names in the file of passwords."""
+    """Of a rig at an endpoint of this computer alone: roles are the names in the file of passwords."""
     return {
         "transport/auth/usrpwd": {"dictionary_file": str(users)},
         "access_control": access_control(config.prefix, "usernames"),

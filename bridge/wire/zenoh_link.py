@@ -31,7 +31,7 @@ __all__ = ["Bus", "BusConfig", "Inbox", "Received"]
 
 # One attempt to dial without a password: a rig that begins makes one, and only the next attempt has it.
 _WITHOUT_PASSWORD_S = 0.2
-_READS_S = 0.5  # in which a rig that runs has read the first bytes of a connection, on a busy machine too
+_READS_S = 0.5  # in which a rig that runs has read the first bytes of a connection, on a busy computer too
 _NO_PROTOCOL = b"\x08\x00" + b"\xff" * 8  # a length and as many bytes, as Zenoh frames them; in TLS no handshake
 _AT_ONCE = struct.pack("ii", 0, 0)  # SO_LINGER off
 _OWN_SOURCE = re.compile(r" at /\S+\.rs:\d+\.?")  # of Zenoh: a place in it, behind each of its errors
@@ -68,7 +68,9 @@ def _listening(config: BusConfig, lockstep: bool) -> zenoh.Session:
     try:
         session = zenoh.open(session_config(config, hub=True, lockstep=lockstep, security=security))
     except zenoh.ZError as error:
-        line = f"{config.endpoint}: cannot listen there: must be free, and an address of this machine ({_brief(error)})"
+        line = (
+            f"{config.endpoint}: cannot listen there: must be free, and an address of this computer ({_brief(error)})"
+        )
         raise Fault("ENDPOINT_BUSY", f"{line}; end what holds it or choose another --endpoint") from None
     return session
 
@@ -114,7 +116,7 @@ def _remedy(config: BusConfig, known: bool) -> str:
     if config.encrypted:
         return f"{start}, and compare the certificates of both sides: one authority, and the host's name in that of the rig"
     return (
-        start if known else f"{start}; one of another user of this machine lets nobody in who cannot read its password"
+        start if known else f"{start}; one of another user of this computer lets nobody in who cannot read its password"
     )
 
 

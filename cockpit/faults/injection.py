@@ -106,7 +106,7 @@ def _tell_rig(bus: Bus, where: str, tables: Sequence[FaultTable], clear: bool) -
 
 
 def _disturb(table: FaultTable, pid: int) -> str:
-    """Freeze, kill or restart a process of this machine and this user."""
+    """Freeze, kill or restart a process of this computer and this user."""
     time.sleep(table.from_s)
     role = table.target
     if table.kind == "frozen":

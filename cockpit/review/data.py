@@ -170,7 +170,7 @@ def _packed(values: Floats) -> str:
 
 
 def _events(run: RunData) -> list[dict[str, Any]]:
-    # pauses of the machine may be many, and must not crowd out what matters
+    # pauses of the computer may be many, and must not crowd out what matters
     first = sorted(run.events, key=lambda one: (one.code.endswith("PAUSE"), one.t_ns))[:_MOST_EVENTS]
     events = sorted(first, key=lambda one: one.t_ns)
     return [

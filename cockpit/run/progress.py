@@ -28,7 +28,7 @@ _EVENTS = (PLANT_EVENT, CONTROLLER_EVENT, RECORDER_EVENT)
 def progress_line(
     state: wire.State, duration_s: float, pauses: int = 0, paused_ms: float = 0.0, warnings: Iterable[str] = ()
 ) -> str:
-    """What is going on, in one line; of the machine's pauses how many there were and how long all of them."""
+    """What is going on, in one line; of the computer's pauses how many there were and how long all of them."""
     t_s = state.t_ns * 1e-9
     bar = f"[{'#' * round(20 * min(t_s / duration_s, 1.0)):<20}] " if duration_s else ""  # none where no end is known
     ratio = f"v_a/v_d {state.velocity_ratio:4.2f}" if state.velocity_ratio > 0.01 else "no vibration"

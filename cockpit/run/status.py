@@ -18,7 +18,7 @@ from bridge.wire.topics import APPLIED, COMMAND, CONTROLLER_EVENT, PLANT_EVENT, 
 from bridge.wire.words import words
 from bridge.wire.zenoh_link import Bus, BusConfig, Received, stands_still
 
-_DIAL_S = 0.4  # a rig on this machine answers in milliseconds, one in the same network in tens of them
+_DIAL_S = 0.4  # a rig on this computer answers in milliseconds, one in the same network in tens of them
 _ROLES_S = 0.2  # who is there is known as soon as the link is; only who is not there is waited for
 _HEADER_S = 0.2
 _LISTEN_S = 0.3  # three blocks of a rig that is late for 0.1 s; events within this time are told

@@ -11,7 +11,7 @@ from tests.blind.__main__ import app as making_app
 from tests.blind.independent_cases import Independent
 from tests.blind.small_set import ALL, CASES, FEW, RUNS, SEED, known
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]  # of all cases, on a busy machine
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]  # of all cases, on a busy computer
 
 
 def succeeds(command, *arguments):

@@ -251,7 +251,7 @@ def test_closed_loop_of_a_log_without_a_block_is_refused(tmp_path: Path) -> None
 def to_a_live_controller(log: Path, again: Path) -> list[int]:
     """Play a log to a controller and a recorder; how the three ended."""
     endpoint = free_endpoint()
-    # on a busy machine the player may pause for 20 ms, which the controller would rightly call stale
+    # on a busy computer the player may pause for 20 ms, which the controller would rightly call stale
     patient = ["--set", "controller.limits.stale_after_s=5.0"]
     arguments = ["--endpoint", endpoint, "--set", "controller.policy.enabled_from_s=0.5", *patient]
     started = [

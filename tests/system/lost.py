@@ -1,4 +1,4 @@
-"""What a log tells was lost on its way: a machine that stands still for longer than a link waits costs messages."""
+"""What a log tells was lost on its way: a computer that stalls for longer than a link waits costs messages."""
 
 import re
 from collections import Counter

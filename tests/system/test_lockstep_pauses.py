@@ -16,7 +16,7 @@ pytestmark = pytest.mark.realtime  # it is frozen between its first chunk and it
 
 @pytest.mark.parametrize("victim", ["plant", "controller", pytest.param("recorder", marks=pytest.mark.nightly)])
 def test_in_lockstep_a_pause_costs_nothing(tmp_path: Path, runs: list[Run], victim: str) -> None:
-    """A busy machine pauses processes for longer than the lease of real time, which would break the link and lose messages."""
+    """A busy computer pauses processes for longer than the lease of real time, which would break the link and lose messages."""
     # in charge from the start: a run of which nothing was tested has another status
     run = Run(tmp_path / "run.mcap", "--lockstep", "--set", "controller.policy.enabled_from_s=0.0", seconds=5.0)
     runs.append(run)

@@ -96,7 +96,7 @@ def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None
     assert json.loads(out)["blocks"] > 2000
     data = read_run(log)
     assert data.damage.closed
-    # the rig's own numbers and no others; on a busy machine some are lost, and told
+    # the rig's own numbers and no others; on a busy computer some are lost, and told
     numbers = data.sensors["sequence"].astype(np.int64)
     gaps = np.diff(numbers, prepend=-1) - 1
     assert gaps.min() >= 0
@@ -106,7 +106,7 @@ def test_a_stranger_ends_nobody_and_changes_no_vibration(tmp_path: Path) -> None
     assert after["amplitude_m"].max() <= data.trace["wanted_amplitude_m"].max()
     if not {"FALLBACK", "STALE"} & {event.code for event in data.events}:
         assert after["amplitude_m"].max() < 1.2 * before["amplitude_m"].max()
-    assert after["fallback"].mean() < 0.1  # a busy machine may be late
+    assert after["fallback"].mean() < 0.1  # a busy computer may be late
     told = Counter(event.code for event in data.events)
     assert {"BAD_MESSAGE", "FOREIGN"} <= set(told)
     lasted_s = len(after) * 1e-3

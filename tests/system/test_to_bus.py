@@ -41,7 +41,7 @@ def test_pause_and_go_on() -> None:
             first = inbox.get(30.0)
             assert first is not None
             player.send_signal(signal.SIGUSR1)
-            before = [first, *until_quiet(inbox)]  # the signal takes its time on a busy machine
+            before = [first, *until_quiet(inbox)]  # the signal takes its time on a busy computer
             assert "END" not in codes(before)  # held
             player.send_signal(signal.SIGUSR1)
             resumed = inbox.get(30.0)

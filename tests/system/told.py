@@ -1,4 +1,4 @@
-"""What a command said on stderr, but for its life, and what depends on this machine: its priority, how long judging takes."""
+"""What a command said on stderr, but for its life, and what depends on this computer: its priority, how long judging takes."""
 
 _LEFT_OUT = (
     *("stickslip: warning: normal scheduling", "judging the log; "),

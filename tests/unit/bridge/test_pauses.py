@@ -1,4 +1,4 @@
-"""Pauses of the machine: what several cores tell alike, in whose time, and the timers' own beginning and end."""
+"""Pauses of the computer: what several cores tell alike, in whose time, and the timers' own beginning and end."""
 
 import os
 import signal
@@ -147,7 +147,7 @@ def _hold(timers: list["subprocess.Popen[bytes]"], seconds: float) -> None:
 
 def _wait_until_they_watch(timers: Iterable[int]) -> None:
     """Until each has its priority, as it has its handlers of signals by then and begins to look."""
-    until_s = time.monotonic() + PATIENCE_S  # of normal priority until then: seconds on a busy machine
+    until_s = time.monotonic() + PATIENCE_S  # of normal priority until then: seconds on a busy computer
     waiting = list(timers)
     while waiting and time.monotonic() < until_s:
         time.sleep(0.01)

@@ -16,7 +16,7 @@ def test_a_process_is_known_by_what_it_said() -> None:
 @pytest.mark.parametrize(
     ("changed", "line"),
     [
-        ({"host": "elsewhere"}, "must be on this machine"),
+        ({"host": "elsewhere"}, "must be on this computer"),
         ({"started": 1}, "is gone"),
         ({"started": None}, "is gone"),
         ({"pid": 2**22 + 1}, "is gone"),

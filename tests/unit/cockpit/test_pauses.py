@@ -1,4 +1,4 @@
-"""Late commands inside and outside of the machine's pauses, on made accounts of the plant."""
+"""Late commands inside and outside of the computer's pauses, on made accounts of the plant."""
 
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,7 @@ def event(code: str, text: str, t_ms: float = 0.0) -> wire.Event:
 def watched(run: RunData, applied: Any, *pauses_ms: tuple[float, float]) -> RunData:
     told = [event(PAUSE, in_words(round(length * MS), None), t_ms) for t_ms, length in pauses_ms]
     return run._replace(
-        applied=applied, events=[event(WATCH, "pauses of the machine are watched on 2 cores: 0, 1"), *told]
+        applied=applied, events=[event(WATCH, "pauses of the computer are watched on 2 cores: 0, 1"), *told]
     )
 
 

@@ -12,7 +12,7 @@ from tests.unit.controller.test_process import CONFIG, block
 
 @pytest.mark.parametrize("lockstep", [False, True])
 def test_a_pause_makes_a_block_late_only_where_the_rig_does_not_wait(lockstep: bool) -> None:
-    """A late block changes what trips see: in lockstep the same run would have other bytes on a busy machine."""
+    """A late block changes what trips see: in lockstep the same run would have other bytes on a busy computer."""
     node = ControllerNode(CONFIG, lockstep)
     events: list[int] = []
     for number, arrival_ms in enumerate([1.0, 2.0, 103.0, 103.1]):
