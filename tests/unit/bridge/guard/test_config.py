@@ -36,4 +36,4 @@ def test_limits_that_protect_less_than_the_defaults_are_named() -> None:
     loose = validate(
         GuardConfig, {"loud_ratio": {"alarm": 3.0, "abort": 1e6, "hold_s": 0.1}, "command_lost_s": 9.0}, "rig.toml"
     )
-    assert wider(loose) == "loud_ratio.abort = 1e+06 (default 4), command_lost_s = 9 (default 1)"
+    assert wider(loose) == "loud_ratio.abort = 1e+06 (default 4), command_lost_s = 9 (default 0.75)"

@@ -247,7 +247,7 @@ def test_a_rig_that_a_person_armed_without_a_controller_is_disarmed_again() -> N
     for _ in range(500 + 5 * 200 + 10):
         rig.block(NO_COMMAND)
     assert rig.s.state == ARMED
-    for _ in range(1000):
+    for _ in range(750):
         rig.block(NO_COMMAND)
     assert rig.s.state == ARMED
     rig.block(NO_COMMAND)
