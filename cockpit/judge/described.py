@@ -24,7 +24,7 @@ class Described(NamedTuple):
     slip_m: float  # way of a slip, 2 (F_s - F_c) / k_d
     mass_kg: float  # of the slide
     contact_per_s2: float  # stiffness of the contact over the mass
-    uses_force: bool
+    uses_force: bool  # the verdict rests on it: the controller uses it, or the rig is described and has it
     uses_slide: bool
     enabled_from_s: float
     v_ratio: float  # set point of v_a / v_d
@@ -57,8 +57,8 @@ def described(plant: Mapping[str, Any] | None, controller: Mapping[str, Any] | N
         slip_m=2.0 * (static_N - sliding_N) * gain / k_d if k_d > 0.0 else math.nan,
         mass_kg=mass_kg,
         contact_per_s2=number("rig.contact.stiffness_N_per_m") / mass_kg,
-        uses_force=_at(tables, "controller.estimator.use_force") is not False,
-        uses_slide=_at(tables, "controller.estimator.use_slide_position") is not False,
+        uses_force=k_d > 0.0 or _at(tables, "controller.estimator.use_force") is not False,
+        uses_slide=k_d > 0.0 or _at(tables, "controller.estimator.use_slide_position") is not False,
         enabled_from_s=number("controller.policy.enabled_from_s", 0.0),
         v_ratio=number("controller.limits.v_ratio"),
         most_ratio=number("controller.policy.most_ratio"),

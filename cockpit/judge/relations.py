@@ -84,9 +84,11 @@ class Relations:
         force, spring, apart = (np.square(part).mean(axis=(1, 2)) for part in (force_N, spring_N, force_N - spring_N))
         larger = np.maximum(force, spring)
         text = "drive_force_N varies by {:.3g} N, the described stiffness times drive_position_m - mass_position_m by {:.3g} N, "
-        text += "and not alike: one of them has another sign or scale, is another signal, or not connected"
+        text += (
+            "their difference by {:.3g} N: one of them has another sign or scale, is another signal, or not connected"
+        )
         broken = (larger > _EXCITED * noise_N2) & (apart > self._of.apart**2 * larger)
-        self._take("SENSOR_SCALE", t_s, broken, text, np.sqrt(force), np.sqrt(spring))
+        self._take("SENSOR_SCALE", t_s, broken, text, *map(np.sqrt, (force, spring, apart)))
 
     def _vibration(self, t_s: Floats, window: Window, at: Rows, force_N: Floats) -> None:
         """Base, slide and controller while the rig vibrates, [seconds, blocks]."""
@@ -94,7 +96,8 @@ class Relations:
         def most(code: str, compared: Bools, holds: Bools, text: str, *shown: Floats) -> None:
             wrong, blocks = compared & ~holds, compared.sum(axis=1)
             broken = (blocks >= _COMPARED * self._count) & (wrong.sum(axis=1) > 0.5 * blocks)
-            self._take(code, t_s, broken, text, *(values[np.arange(len(at)), wrong.argmax(axis=1)] for values in shown))
+            middle = (wrong.cumsum(axis=1) > 0.5 * wrong.sum(axis=1, keepdims=True)).argmax(axis=1)
+            self._take(code, t_s, broken, text, *(values[np.arange(len(at)), middle] for values in shown))
 
         base_noise_mps2, noise_mps2 = (self._of.channels[name].noise for name in ("base_accel_mps2", "mass_accel_mps2"))
         base_mps2, slide_mps2 = window.blocks.base_mps2[at], window.blocks.slide_mps2[at]
@@ -128,7 +131,7 @@ class Relations:
 
     def doubts(self) -> list[Doubt]:
         """Relations that do not hold."""
-        return [Doubt(code, f"{text} ({seconds} s)", True) for code, (text, seconds) in self._found.items()]
+        return [Doubt(code, f"{text} ({seconds} s in all)", True) for code, (text, seconds) in self._found.items()]
 
 
 def _rows_at(rows: Rows, name: str, number: Rows) -> Rows:

@@ -36,8 +36,8 @@ def refuse_out_of_travel(rig: RigConfig, duration_s: float) -> None:
     sensors, motion = rig.sensors, rig.drive.motion()
     if motion.drift_m != 0.0 and not duration_s:
         raise ValueError(
-            f"rig.drive.repeat_every_s = {rig.drive.repeat_every_s:g}: each cycle ends {motion.drift_m * 1e3:.3g} mm from where "
-            "it began: must end there in a run without an end; change the way back, or give duration_s"
+            f"rig.drive.repeat_every_s = {rig.drive.repeat_every_s:g}: each cycle ends {motion.drift_m * 1e3:.3g} mm from its "
+            "start: must be 0 mm in a run without an end; change the way back, or give duration_s"
         )
     low_m, high_m, until_s = sensors.position_lowest_m, sensors.position_range_m, _until_s(rig, motion, duration_s)
 
@@ -77,7 +77,7 @@ class _Needs(NamedTuple):
     """What the description implies for the sensors, along the drive."""
 
     most_N: float  # of the drive force, forwards, as the sensor shows it
-    least_N: float  # backwards; 0 where the drive does not go back
+    least_N: float  # backwards; 0 where the drive does not go back and the slide does not overshoot
     fall_N: float  # of the force in a slip, 2 (F_s - F_c), as the sensor shows it; 0 where no slip is to be expected
     slip_m: float  # way of a slip, 2 (F_s - F_c) / k_d; 0 as well
     slip_mps2: float  # acceleration of a slip; 0 as well
@@ -87,11 +87,9 @@ class _Needs(NamedTuple):
 def refuse_blind_sensors(rig: RigConfig, controller: ControllerConfig, duration_s: float) -> None:
     """Raise ValueError for a sensor that cannot show the motion that the description implies, with the number to use."""
     needs = _needs(rig, duration_s)
-    if controller.estimator.use_force:
-        _force(rig, needs)
+    _force(rig, needs)  # a controller may do without it; the verdict counts slips in it
     if speeds_mps := rig.drive.speeds_mps():
-        slip_m = needs.slip_m if controller.estimator.use_slide_position else 0.0
-        _positions(rig.sensors, slip_m, _WAY_S * speeds_mps[0], needs.natural_Hz)
+        _positions(rig.sensors, needs.slip_m, _WAY_S * speeds_mps[0], needs.natural_Hz)
         _base(rig, controller, needs.slip_mps2, speeds_mps[0], speeds_mps[-1])
 
 
@@ -117,6 +115,8 @@ def _needs(rig: RigConfig, duration_s: float) -> _Needs:
     # a slide that does not become half of v_d faster than its drive does not slip
     drop_N = float(p.F_s) - float(p.F_c)
     drop_N = drop_N if drop_N / rooted > 0.5 * speeds_mps[0] > 0.0 else 0.0
+    # without damping a slip ends as far below F_c as it began above it: the drive pushes where F_s is more than 2 F_c
+    back_N = max(back_N, float(p.F_s) - 2.0 * float(p.F_c) if drop_N > 0.0 else 0.0)
     return _Needs(
         most_N=gain * min(friction_N, stiffest_N_per_m * highest_m) + max(bias_N, 0.0),
         least_N=gain * back_N - min(bias_N, 0.0) if back_N > 0.0 else 0.0,
@@ -137,7 +137,7 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
         why = f"the drive pulls with {needs.most_N:.4g} N, this sensor ends at {highest_N:g} N"
         _refuse("sensors.force_range_N", highest_N, why, f"{_above(_ROOM * needs.most_N):g}")
     if needs.least_N > -lowest_N:
-        why = f"the drive goes back within the run, and pushes with {needs.least_N:.4g} N, this sensor ends at {lowest_N:g} N"
+        why = f"the drive pushes with {needs.least_N:.4g} N as it goes back or after a slip, this sensor ends at {lowest_N:g} N"
         _refuse("sensors.force_lowest_N", lowest_N, why, f"{-max(_above(_ROOM * needs.least_N), highest_N):g}")
     if needs.fall_N == 0.0:
         return
@@ -153,13 +153,23 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
 
 def _noise(sensors: SensorsConfig, name: str, most: float, signal: str) -> None:
     if (value := getattr(sensors, name)) > most:
-        _refuse(f"sensors.{name}", value, f"{signal}, noise above {most:.3g} hides it", f"{_below(0.5 * most):g}")
+        _refuse(
+            f"sensors.{name}",
+            value,
+            f"{signal}; noise above {most:.3g} {_unit(name)} hides it",
+            f"{_below(0.5 * most):g}",
+        )
 
 
 def _steps(sensors: SensorsConfig, name: str, noise: str, size: float, signal: str) -> None:
     most = max(size / _STEPS, _HIDDEN * getattr(sensors, noise))
     if (value := getattr(sensors, name)) > most:
-        _refuse(f"sensors.{name}", value, f"{signal}, steps above {most:.3g} distort it", f"{_below(0.25 * most):g}")
+        _refuse(
+            f"sensors.{name}",
+            value,
+            f"{signal}; steps above {most:.3g} {_unit(name)} distort it",
+            f"{_below(0.25 * most):g}",
+        )
 
 
 def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
@@ -169,7 +179,8 @@ def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
 
 
 def _positions(sensors: SensorsConfig, slip_m: float, way_m: float, natural_Hz: float) -> None:
-    ways = f"a slip of the slide is {slip_m * 1e6:.3g} um long, the drive goes {way_m * 1e6:.3g} um in {_WAY_S:g} s"
+    slip = f"a slip is {slip_m:.3g} m long, " if slip_m else ""
+    ways = f"{slip}the drive goes {way_m:.3g} m in {_WAY_S:g} s"
     _noise(sensors, "position_noise_m", max(slip_m, way_m) / _NOISES_A_SLIP, ways)
     _steps(sensors, "position_resolution_m", "position_noise_m", slip_m or way_m, ways)
     if slip_m > 0.0:
@@ -207,6 +218,10 @@ def _base(
     least = f"the base vibrates with {least_mps2:.3g} m/s2 at {slowest_mps * 1e3:.3g} mm/s"
     _noise(sensors, "accel_noise_mps2", least_mps2 / _NOISES_AN_AMPLITUDE, least)
     _steps(sensors, "accel_resolution_mps2", "accel_noise_mps2", least_mps2, least)
+
+
+def _unit(name: str) -> str:
+    return name.rpartition("_")[2].replace("mps2", "m/s2")
 
 
 def _above(value: float) -> float:

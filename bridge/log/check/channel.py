@@ -68,7 +68,7 @@ def channel_findings(name: str, seen: SignalLook, sample_s: float, of: Channel) 
     live = of.is_noisy or not math.isfinite(of.noise)  # equal samples are a fault
     if live and seen.longest_run * sample_s > _DEAD_S:
         from_s = (seen.longest_run_end - seen.longest_run + 1) * sample_s
-        text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s of samples on"
+        text = f"constant for {seen.longest_run * sample_s:.2f} s from {from_s:.3f} s on"
         found.append(Finding("dead", where, text, seen.longest_run))
     return [*found, *_clipped(where, seen, of, dwells=name.endswith("_m"))]
 

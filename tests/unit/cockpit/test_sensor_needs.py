@@ -42,13 +42,14 @@ BLIND = {
     "accelerometer noise": ["rig.sensors.accel_noise_mps2=20.0"],
     "accelerometer resolution": ["rig.sensors.accel_resolution_mps2=10.0"],
     "accelerometer bandwidth": ["rig.sensors.accel_bandwidth_Hz=1000.0"],
+    "no force sensor for the verdict": ["controller.estimator.use_force=false", "rig.sensors.force_range_N=1.0"],
+    "a slip that overshoots": ["rig.contact.coulomb_force_N=4.0", "rig.sensors.force_lowest_N=-1.0"],
     "accelerometer lowest": ["rig.sensors.accel_lowest_Hz=4000.0"],
 }
 SOUND = {
     "range just above": [*HEAVY, "rig.sensors.force_range_N=250.0"],
     "backwards": [*TO_AND_FRO, "rig.sensors.force_lowest_N=-20.0"],
     "a short run with a small range": ["duration_s=1.0", "rig.sensors.force_range_N=8.0"],
-    "no force sensor": ["controller.estimator.use_force=false", "rig.sensors.force_range_N=1.0"],
     "noise of 1 N": ["rig.sensors.force_noise_N=1.0"],
     "steps of 5 um": ["rig.sensors.position_resolution_m=5e-6"],
     "an end before the range": ["duration_s=99.0"],

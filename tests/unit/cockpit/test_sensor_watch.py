@@ -153,15 +153,16 @@ def test_a_force_that_shows_no_slip_disagrees_with_the_other_witnesses() -> None
 
 
 def test_channels_that_do_not_decide_are_named_and_leave_the_verdict() -> None:
-    """A rig whose controller uses no force, and one that describes no sensor and has no accelerometer on its slide."""
-    run = with_channels(golden("slip-then-control"), of_edits(FORCE, "zero"))
-    controller = run.configuration("controller")
-    controller["estimator"] |= {"use_force": False}
-    run = run._replace(headers={**run.headers, "controller": {"configuration": json.dumps(controller)}})
-    assert [(one.code, one.decides) for one in watched(run).findings] == [("SENSOR_DEAD", False)]
-    run = with_channels(golden("slip-then-control"), of_edits(SLIDE_MPS2, "zero"))
-    run = run._replace(headers={name: table for name, table in run.headers.items() if name != "plant"})
-    assert [(one.code, one.decides) for one in watched(run).findings] == [("SENSOR_DEAD", False)]
+    """On a rig without a description: a force that its controller does not use, and the accelerometer on its slide."""
+    for name in (FORCE, SLIDE_MPS2):
+        run = with_channels(golden("slip-then-control"), of_edits(name, "zero"))
+        controller = run.configuration("controller")
+        controller["estimator"] |= {"use_force": name != FORCE}
+        described = {**run.headers, "controller": {"configuration": json.dumps(controller)}}
+        alone = {role: table for role, table in described.items() if role != "plant"}
+        found = [watched(run._replace(headers=headers)).findings for headers in (described, alone)]
+        assert ("SENSOR_DEAD", True) in [(one.code, one.decides) for one in found[0]]
+        assert [(one.code, one.decides) for one in found[1]] == [("SENSOR_DEAD", False)]
 
 
 def test_a_force_whose_noise_hides_a_slip_is_not_judged() -> None:

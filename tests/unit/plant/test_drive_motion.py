@@ -144,7 +144,7 @@ def test_a_repeated_profile_begins_anew() -> None:
         (["rig.drive.profile=[[0.0, -0.0005]]"], ["goes to -8 mm", "ends at 0 mm", "set it to -0.01"]),
         (
             ["rig.drive.profile=[[0.0, 0.0005], [8.0, -0.0004]]", "duration_s=8.5"],
-            ["rig.sensors.force_lowest_N = 0", "goes back within the run", "set it to -50"],
+            ["rig.sensors.force_lowest_N = 0", "as it goes back or after a slip", "set it to -50"],
         ),
         ([*TWO_SIDED, "rig.drive.profile=[[0.0, -0.01]]"], ["goes to -160 mm", "ends at -50 mm", "set it to -0.2"]),
         (
@@ -153,7 +153,7 @@ def test_a_repeated_profile_begins_anew() -> None:
         ),
         (
             [*TWO_SIDED, "rig.drive.profile=[[0.0, 1e-6]]", "rig.drive.repeat_every_s=1.0", "duration_s=0.0"],
-            ["rig.drive.repeat_every_s = 1: each cycle ends 0.001 mm from where it began", "change the way back"],
+            ["rig.drive.repeat_every_s = 1: each cycle ends 0.001 mm from its start", "change the way back"],
         ),
         (
             [f"rig.drive.moves=[{THERE}, {BACK}]", "rig.drive.repeat_every_s=3.0", *TWO_SIDED],
