@@ -14,11 +14,9 @@ BLIND := $(or $(OUT),runs/blind-$(GENERATOR)-$(SEED)-$(CASES))
 demo: $(SMALL)
 	@$(BIN)/stickslip run --scenario paper-c45-c45 --log runs/demo.mcap
 
-# one more than cores, as some tests wait for processes that they started: two on two cores leave 13 % of the time unused
-WORKERS = $(shell $(PYTHON) -c 'import os; print(min(os.cpu_count() + 1, 4))')
 # linear algebra with one thread a process: there are as many processes as cores. An import of the whole project without kept
 # bytecode takes 5.3 s of CPU, with it 2.8 s, and some tests start ten processes.
-PARALLEL = OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(NICE) $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+PARALLEL = OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(NICE) $(BIN)/pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 EACH_CPU_S := 5 # of a test that is not marked slow
 # CPU of all tests of `make quick` and of `make test`: may only fall, but for the 40 s that an issue may add to the second
 QUICK_CPU_S := 110
