@@ -198,7 +198,8 @@ def test_a_stop_is_taken_however_full_the_inbox_is() -> None:
     controller.loop(stop, "")
     timer.cancel()
     assert controller._inbox.dropped == 44
-    assert bus.codes() == ["START", "FLOOD", "OPERATOR", "END"]
+    codes = [code for code in bus.codes() if code != "LATE"]  # how long 4096 steps take is the computer's
+    assert codes == ["START", "FLOOD", "OPERATOR", "END"]
 
 
 def test_a_rig_that_repeats_its_last_block_is_stale() -> None:
