@@ -136,6 +136,7 @@ class ControllerProcess:
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
         self._rig_lost = ""  # why, from when it was told until blocks come again
+        self._stale_told = False  # STALE was published since the last stall
         self._paused_s = 0.0  # for which this process stalled, and has not reported
         self._stale = False  # told, and not yet FRESH
         self._in_time = 0  # blocks in a row without a stale step, of those that FRESH waits for
@@ -209,14 +210,17 @@ class ControllerProcess:
                 heard_s = time.monotonic()
                 if not self._lockstep:
                     self._stale, self._in_time, self._paused_s = True, 0, heard_s - waited_until_s
+                    self._stale_told = False
             # a rig that has left wakes nobody: it is known at the latest when its next block does not come
             if time.monotonic() < due_s or self._ended:
                 continue
             self._mind_the_plant(heard_s)
             if started and not self._lockstep:
                 silent_blocks = 1 if silent else round(self._stale_after_s / self._block_s)
-                if not self._stale:
+                # a stall of this process is no silence of the rig, unless no block follows it
+                if not self._stale or (silent and not self._stale_told):
                     self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
+                    self._stale_told = True
                 silent = self._stale = True
                 self._in_time = 0
                 self._ramp(silent_blocks)

@@ -10,6 +10,7 @@ import pytest
 
 from bridge.config import validate
 from bridge.faults import Fault
+from bridge.wire import realtime
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.inbox import WAITING
 from bridge.wire.messages import COMMAND as COMMAND_LAYOUT
@@ -146,6 +147,20 @@ def test_a_repeated_block_is_not_fresh() -> None:
     bus.leave()
     thread.join(JOIN_S)
     assert [code for code in bus.codes() if code != "REPEATED"] == ["START", "STALE", "END"]
+
+
+def test_silence_after_a_stall_of_the_controller_itself_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stall counted as the silence, so that a rig that was silent from then on was reported by nobody."""
+    controller, bus = process()
+    stalls = iter([True])
+    monkeypatch.setattr(realtime, "was_paused", lambda *_: next(stalls, False))
+    thread = threading.Thread(target=controller.loop, args=(threading.Event(), ""), daemon=True)
+    bus.say(SENSORS, block(0))
+    thread.start()
+    wait_for(lambda: "STALE" in bus.codes())
+    bus.leave()
+    thread.join(JOIN_S)
+    assert bus.codes() == ["START", "STALE", "END"]
 
 
 def test_a_slip_of_a_drive_that_seems_to_stand_is_an_event() -> None:
