@@ -1,4 +1,4 @@
-"""While kernels are compiled: the number of kernels left, on stderr, and the guard of a command, which a signal ends at once."""
+"""Compilation of kernels: the number of kernels left, on stderr, and the guard by which a signal ends a command at once."""
 
 import sys
 from collections.abc import Callable, Generator
@@ -6,22 +6,22 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from bridge.plain import say
 
-PROGRESS = "compiling kernels, once for this version: "  # and then `12 of 163 left`
-_LINES = 8  # where stderr is no terminal, for all kernels
+PROGRESS = "compiling kernels, once for this version: "  # followed by `12 of 163 left`
+_LINES = 8  # for all kernels, where stderr is no terminal
 _BAR = 20  # characters
-# of a command: a signal ends it at once in here; elsewhere signals act as ever
+# Set by a command: within this context a signal ends the process at once. Without it signals wait for the end of a compilation.
 guard: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
 class Progress:
-    """One line on a terminal that is written again and again, and some lines elsewhere."""
+    """One line that is rewritten, on a terminal; a few lines elsewhere."""
 
     def __init__(self) -> None:
         self._on_terminal = sys.stderr is not None and sys.stderr.isatty()  # pyright: ignore[reportUnnecessaryComparison]
-        self._step = -1  # the last one that was shown
+        self._step = -1  # shown last; -1 before the first line and after the last
 
     def show(self, left: int, total: int) -> None:
-        """Show how many kernels are left; with none left the line is over."""
+        """Show how many kernels are left; 0 ends the line."""
         step = (total if self._on_terminal else _LINES) * (total - left) // max(total, 1)
         if step == self._step or (not left and self._step < 0):
             return
@@ -35,7 +35,7 @@ class Progress:
 
 
 def left_in(line: str) -> tuple[int, int] | None:
-    """How many kernels are left, of how many, in a line of a child's stderr; None in a line about something else."""
+    """Kernels left and kernels in all, from a line of a child's stderr; None for any other line."""
     words = line.removeprefix("stickslip: ")
     if not words.startswith(PROGRESS):
         return None
@@ -44,7 +44,7 @@ def left_in(line: str) -> tuple[int, int] | None:
 
 
 class _Work:
-    """The kernels that this process has to compile now."""
+    """The kernels that this process compiles at present."""
 
     def __init__(self) -> None:
         self.depth = 0
@@ -63,12 +63,12 @@ _work = _Work()
 
 
 def expect(kernels: set[object]) -> None:
-    """Count these kernels as not yet compiled."""
+    """Add these kernels to those that are to be compiled."""
     _work.total |= kernels
 
 
 def note_done(kernels: set[object]) -> None:
-    """These kernels are compiled, or were loaded."""
+    """Count these kernels as compiled or loaded."""
     _work.done |= kernels
     if kernels & _work.total:
         _work.show(max(len(_work.total - _work.done), 1))  # the last one still waits for its machine code
@@ -76,10 +76,10 @@ def note_done(kernels: set[object]) -> None:
 
 @contextmanager
 def compiling(module: str = "") -> Generator[str]:
-    """Kernels are compiled or loaded in here, which the command guards; the progress is over at the end.
+    """A context in which kernels are compiled or loaded: guarded, and with progress; gives the module of the outermost context.
 
     Args:
-        module: of these kernels, where it is known; a nested call gets it.
+        module: of these kernels, where it is known.
 
     """
     _work.depth += 1

@@ -50,7 +50,7 @@ FAULTS = {
             "Whoever reaches the bus of a rig can stop and command its exciter. So a rig listens beyond this computer only with "
             "TLS and certificates (`stickslip certs FOLDER`, then --endpoint tls/HOST:PORT --certs FOLDER), a key must be closed "
             "to others (mode 0600), and a Dask cluster beyond this computer needs tls://. --insecure allows a plain endpoint on "
-            "a network that nobody else can reach. Nothing was started.",
+            "a network of trusted computers alone. Nothing was started.",
         ),
         FaultKind(
             "LOG_LOST",

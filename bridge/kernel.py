@@ -24,7 +24,7 @@ Record = Any
 
 _settings: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
 _settings.CACHE_DIR = os.environ[FOLDER] = str(usable_folder())  # for this process and its children
-# the colours of thousands of messages that numba alone reads are 3 % of a compilation
+# colouring thousands of messages that numba alone reads takes 3 % of a compilation
 _settings.DISABLE_ERROR_MESSAGE_HIGHLIGHTING = True
 _settings.CACHE_LOCATOR_CLASSES = "bridge.kernel_cache.SourcesLocator"
 
@@ -52,8 +52,8 @@ def _written_once(layout: Any, write: Callable[[Any], str] = _layouts.__repr__) 
 
 _layouts.__repr__ = _written_once
 
-# When it loads its first kernel, numba imports SciPy's linear algebra, to know whether it could compile a product of matrices:
-# 0.3 s of CPU in every process that controls, simulates or replays. Where it compiles one it asks again.
+# As it loads its first kernel, numba imports SciPy's linear algebra to see whether it could compile a product of matrices: 0.3 s
+# of CPU in every process that controls, simulates or replays. Where numba compiles such a product it imports it all the same.
 _linear_algebra: Any = importlib.import_module("numba.np.linalg")
 _ask: Any = _linear_algebra.ensure_blas
 _linear_algebra.ensure_blas = lambda: None
@@ -74,7 +74,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 def shared_kernel(function: Callable[P, R]) -> Callable[P, R]:
     """As `kernel`, and compiled once for all kernels that call it: for a step that runs in several loops.
 
-    A call costs some 50 ns more than that of a `kernel`. It must be a function of a module, under its own name.
+    A call costs some 50 ns more than the call of a `kernel`. The function must be found in its module under its own name.
     """
     compiled: Any = function if _settings.DISABLE_JIT else SharedKernel(function)
     return compiled

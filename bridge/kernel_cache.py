@@ -89,7 +89,7 @@ def compile_once(what: str, load: Callable[[], object]) -> None:
     """Call `load`, which calls kernels for the first time. Of several processes one compiles them, and the others wait.
 
     Args:
-        what: of whose kernels, in words that make a file name.
+        what: whose kernels they are, in words that make a file name.
         load: compiles the kernels, or loads them where they are kept.
 
     """

@@ -1,4 +1,4 @@
-"""How kernels that call each other become machine code: each once.
+"""How kernels that call each other become machine code, each of them once.
 
 Numba optimises each function with all that it calls, gives it machine code and wrappers for Python and C, and keeps these on
 disk. Each caller does all of that again, so that a kernel six calls deep is optimised six times. Here a kernel that kernels call
@@ -59,7 +59,7 @@ class _Part(_Library):
 
 
 class _ByAddress:
-    """Stands for the code of a shared kernel: nothing is linked in, but it is loaded before its callers are."""
+    """In the place of the code of a shared kernel: nothing is linked in, and the kernel is loaded before its callers."""
 
     def __init__(self, load: Callable[[], object]) -> None:
         self.load = load
@@ -113,7 +113,7 @@ class Kernel(_CPUDispatcher):
 
 
 class SharedKernel(_CPUDispatcher):
-    """A kernel that is machine code for Python and for other kernels alike."""
+    """A kernel that is machine code both for Python and for other kernels."""
 
     def __init__(self, py_func: Any) -> None:
         super().__init__(py_func, targetoptions=dict(_OPTIONS), pipeline_class=_WholeCompiler)
@@ -140,10 +140,10 @@ def _called_by(function: Any) -> set[object]:
     """The functions of a kernel and of all kernels below it in the call tree; found by their names."""
     found, ahead = set[object](), [function]
     while ahead:
-        one = ahead.pop()
-        found.add(one)
-        names = one.__code__.co_names
-        values = [one.__globals__.get(name) for name in names]
+        caller = ahead.pop()
+        found.add(caller)
+        names = caller.__code__.co_names
+        values = [caller.__globals__.get(name) for name in names]
         modules = [value for value in values if inspect.ismodule(value)]
         values += [getattr(module, name, None) for module in modules for name in names]
         ahead += [value.py_func for value in values if isinstance(value, _KINDS) and value.py_func not in found]
@@ -151,8 +151,8 @@ def _called_by(function: Any) -> set[object]:
 
 
 def _of_any_value(args: Any, kws: Any) -> tuple[Any, Any]:
-    """Types of arguments without the values that some have in the caller's source, for each of which numba compiles a kernel."""
-    return tuple(types.unliteral(one) for one in args), {name: types.unliteral(one) for name, one in kws.items()}
+    """Types of arguments, without the values that the caller's source has for some: numba compiles a kernel for each value."""
+    return tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
 
 
 _KINDS = (Kernel, SharedKernel)
@@ -165,5 +165,5 @@ def _kernels_in(module: str) -> set[object]:
 
 
 def _load(module: str, name: str, args: tuple[Any, ...]) -> None:
-    """Load a shared kernel, or compile it where it is not kept, before kernels that call it are loaded."""
+    """Load a shared kernel, or compile it where the cache lacks it, before the kernels that call it are loaded."""
     getattr(importlib.import_module(module), name).compile(args)

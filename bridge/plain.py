@@ -8,9 +8,9 @@ from collections.abc import Callable
 # forge what a person reads, and an escape code can do more (rename the window, answer in the person's name)
 _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
 
-# lines on stderr that the parent of a process reads: it waits
+# Lines on stderr that the parent of a process reads. It waits for a compilation:
 ANOTHER_COMPILES = "another process compiles the kernels of "
-# it has loaded all that it needs, and waits for the others
+# it has loaded all that it needs, and waits for the other processes:
 LOADED = "loaded"
 
 

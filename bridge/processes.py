@@ -1,4 +1,4 @@
-"""Which process of which computer somebody is, told so that a later process with the same number is not taken for it."""
+"""The identity of a process: computer, number and start, so that a later process with the same number is not taken for it."""
 
 import json
 import os
@@ -16,9 +16,9 @@ def this_process() -> str:
 
 
 def pid_here(role: str, told: str) -> int:
-    """The pid of a process that said of itself `told`.
+    """The pid of a process that sent the identity `told`.
 
-    Raises Fault NO_PEER for one that does not tell, of another computer, of another user, or that is gone.
+    Raises Fault NO_PEER for a process without an identity, of another computer, of another user, or that is gone.
     """
     try:
         said = json.loads(told)

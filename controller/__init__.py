@@ -5,11 +5,9 @@ records        the derived numbers (`PARAMS`) and all memory (`STATE`)
 announced      what the rig has announced of v_d
 estimate/      windows, motion, contact, learning: what drive and slide do
 vibration      the measured v_a
-need           at which speeds vibration is needed, and how much
 frequency      the cheapest allowed frequency
 modes          going from one mode to another
-probe          fading out, to see whether vibration is needed at all
-failures       slips in spite of all that can be done, and that it is said
+needs/         at which speeds vibration is needed, how much, whether at all, and when none helps
 policy         the wanted v_a
 amplitude      the wanted amplitude, by the learnt gain and delay of the exciter
 trips/         what is taken for a fault of a sensor or the exciter, and what is done then
@@ -17,8 +15,9 @@ limits         the allowed vibration
 core           one step of all of these
 telemetry      the state for plots and the memory for replay
 node, app      the controller as a participant of the bus; the process
-doubts         what is wrong with what it receives; rig_header: whether the rig is one that it can control
-replay         the controller on the frames of a log, piece by piece; replay_steps: its steps beside the log's
+freshness      whether blocks come in time; stalls of the controller itself
+doubts         faults of the messages that it receives; rig_header: whether it can control the rig
+replay         the controller on the frames of a log, piece by piece; replay_steps: its steps compared with those of the log
 codes          modes, states, reasons and limits as numbers
 loop_design    margins of the amplitude loop where its delay is off
 

@@ -72,8 +72,8 @@ def _least(p: Record, slots: Record) -> float:
 def listen(p: Record, s: Record, late: bool) -> None:
     """Learn loop delay and gain from the v_a of this block, and correct the gain where v_a is too large.
 
-    A block that comes `late` shows a v_a that was commanded longer ago than is known: it teaches nothing. One soon after a stall
-    teaches no gain, as the rig may not have its vibration back; too much v_a is cut all the same.
+    A block that comes `late` shows a v_a that was commanded longer ago than is known: nothing is learnt from it. Soon after a
+    stall no gain is learnt, as the rig may not vibrate again yet; too much v_a is cut all the same.
     """
     if (
         s.guard_state == CHECKING

@@ -27,16 +27,17 @@ from bridge.wire.topics import (
 from bridge.wire.zenoh_link import Bus, BusConfig, Inbox, Received
 from controller.config import ControllerConfig
 from controller.doubts import Doubts
+from controller.freshness import Events, Freshness
 from controller.node import ControllerNode
 from controller.rig_header import RigAgain, refuse_another_rig
 
 _PLANT_LOST_S = 1.0  # silence after which a plant that has left the bus counts as lost
 _GIVEN_UP_S = 30.0  # without a rig this process ends then, as long as one waits for a rig at the start
-_HEADER_S = 1.0  # longest wait for what the rig says of itself; one that says nothing costs all of it
-_TOLD_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token costs all of it
+_HEADER_S = 1.0  # longest wait for the header of the rig; a rig without one delays the start by all of it
+_TOLD_S = 1.0  # longest wait for a plant at the start; a rig without a liveliness token delays it by all of that
 _AT_ONCE_S = 0.05  # time for a second controller of the same moment to appear, and the period of looking again
-_SAID_AGAIN_S = 0.4  # between two answers to one word of an operator, who says it every 0.5 s until it is answered
-_MOST_SAID = 16  # answers to operators a second; a flood of words is obeyed, and answered so often
+_SAID_AGAIN_S = 0.4  # between two answers to one command of an operator, which comes every 0.5 s until it is answered
+_MOST_SAID = 16  # answers to operators a second; commands beyond are applied without an answer
 _LONGEST_WHO = 200  # letters of a name
 _UNSEEN = "is its transducer at the end of its range, or loose? without v_d nothing is vibrated"
 # Wait for another controller to leave. Shorter: a frozen controller refuses this one, though its lease is about to end. Longer: a
@@ -54,7 +55,7 @@ def run(
 ) -> int:
     """Answer every block on the bus until the plant ends its run or `stop` is set; how many steps.
 
-    `tell`: of the life of this process, for a person.
+    `tell`: reports the life of this process to the operator.
 
     Raises Fault NO_PEER, PEER_DIED, BAD_MESSAGE, CONFIG, ENDPOINT_BUSY.
     """
@@ -106,8 +107,8 @@ class ControllerProcess:
         config, node: the controller.
         bus: its session.
         lockstep: whether each block waits for its command.
-        inbox: where its messages wait, if it is not one of its own.
-        tell: of the life of this process, and of what is more than news, for a person.
+        inbox: where its messages wait; by default a new one.
+        tell: reports the life of this process, and the events that are more than news, to the operator.
 
     """
 
@@ -130,17 +131,14 @@ class ControllerProcess:
         self._send: dict[str, Callable[[bytes], None]] = {}
         self._events = 0
         self._doubts = Doubts(node, self._inbox, self.event)
-        self._said_s: dict[str, float] = {}  # what operators were answered within the last second, and when
+        self._said_s: dict[str, float] = {}  # answers to operators within the last second, and when
         self._end_said_s: float | None = None
         self._restarts = 0
         self._rig_again = RigAgain(self._rig_header, config)
         self._rig_came = 0
-        self._rig_lost = ""  # why, from when it was told until blocks come again
-        self._stale_told = False  # STALE was published since the last stall
-        self._paused_s = 0.0  # for which this process stalled, and has not reported
-        self._stale = False  # told, and not yet FRESH
-        self._in_time = 0  # blocks in a row without a stale step, of those that FRESH waits for
-        self._unreadable = False  # told, and not yet FRESH
+        self._rig_lost = ""  # the reason, from RIG_LOST until blocks come again
+        self._blocks = Freshness(config.block_s, config.limits.stale_after_s)
+        self._unreadable = False  # NOT_FINITE was published, and no FRESH since
         self._unreadable_told_s = -1.0
         self._numbers_again = 0  # blocks in a row whose samples are numbers, since the last one that had another
 
@@ -173,31 +171,28 @@ class ControllerProcess:
             self._answer(stop, granted)
         finally:
             self._fade_out()
+            self._publish(self._blocks.paused())
             self._doubts.complaints.tell_when_due(all_of_it=True)
         node = self._node
         self.event("END", f"steps={node.steps} duplicates={node.duplicates} dropped={self._inbox.dropped}")
 
     @property
     def _ended(self) -> bool:
-        """Whether the rig said END and left; one that said so and stays is a stranger's word."""
+        """Whether the rig sent END and left the bus. END alone may be forged, so it is ignored while the rig stays."""
         return self._end_said_s is not None and not self._bus.alive("plant")
 
     def _answer(self, stop: threading.Event, granted: str) -> None:
         self._rig_came = self._bus.came("plant")
-        heard_s = time.monotonic()
-        due_s = heard_s + self._stale_after_s  # the command ramps down then, unless a new block comes
+        blocks = self._blocks
+        blocks.heard(time.monotonic())
         started = False
-        silent = False
         while not stop.is_set() and not self._ended:
             asked_s = time.monotonic()
-            received = self._inbox.get(max(due_s - asked_s, 0.0))
-            waited_until_s = max(asked_s, due_s)
+            received = self._inbox.get(max(blocks.due_s - asked_s, 0.0))
+            waited_until_s = max(asked_s, blocks.due_s)
             if received is not None:
                 if self._consume(received):  # only a new block is fresh: a rig that hangs may repeat its last block
-                    heard_s = time.monotonic()
-                    due_s = heard_s + self._stale_after_s
-                    silent = False
-                    self._tell_fresh()
+                    self._publish(blocks.heard(time.monotonic(), self._node.block_was_late))
                 if received.topic is SENSORS and not started:
                     started = True
                     self._tell("running", granted or "in lockstep")
@@ -207,38 +202,23 @@ class ControllerProcess:
                 self._doubts.look()
                 self._rig_again.refuse()
             if realtime.was_paused(waited_until_s, waited_until_s):
-                heard_s = time.monotonic()
+                blocks.heard_s = time.monotonic()
                 if not self._lockstep:
-                    self._stale, self._in_time, self._paused_s = True, 0, heard_s - waited_until_s
-                    self._stale_told = False
-            # a rig that has left wakes nobody: it is known at the latest when its next block does not come
-            if time.monotonic() < due_s or self._ended:
+                    blocks.stalled(blocks.heard_s - waited_until_s)
+            # a rig that has left sends nothing: it is noticed at the latest when its next block does not come
+            if time.monotonic() < blocks.due_s or self._ended:
                 continue
-            self._mind_the_plant(heard_s)
+            self._check_rig(blocks.heard_s)
             if started and not self._lockstep:
-                silent_blocks = 1 if silent else round(self._stale_after_s / self._block_s)
-                # a stall of this process is no silence of the rig, unless no block follows it
-                if not self._stale or (silent and not self._stale_told):
-                    self.event("STALE", f"no block for {self._stale_after_s * 1e3:g} ms: ramping to zero")
-                    self._stale_told = True
-                silent = self._stale = True
-                self._in_time = 0
+                silent_blocks, events = blocks.missing(time.monotonic())
+                self._publish(events)
                 self._ramp(silent_blocks)
-            # The slew limit counts a step: once stale, one step a block period ramps as fast as with blocks.
-            due_s = time.monotonic() + (self._block_s if silent else self._stale_after_s)
+            else:
+                blocks.due_s = time.monotonic() + self._stale_after_s
 
-    def _tell_fresh(self) -> None:
-        """Blocks are back once as many came in time as make a silence stale; those that waited during it are late."""
-        if not self._stale:
-            return
-        self._in_time = 0 if self._node.is_late else self._in_time + 1
-        if self._in_time * self._block_s >= self._stale_after_s:
-            if self._paused_s:  # now, as the link may have been down before
-                text = f"this controller stalled for {self._paused_s:.2f} s; the rig had no command during that time"
-                self.event("PAUSED", text)
-                self._paused_s = 0.0
-            self.event("FRESH", f"blocks arrive again, {self._in_time} in time")
-            self._stale = False
+    def _publish(self, events: Events) -> None:
+        for code, text in events:
+            self.event(code, text)
 
     def _ramp(self, silent_blocks: int) -> None:
         self._send[COMMAND.name](self._node.stale(silent_blocks).payload)
@@ -251,7 +231,7 @@ class ControllerProcess:
             time.sleep(self._block_s)
 
     def _consume(self, received: Received) -> bool:
-        """Take one message; return whether it was a block that got an answer. What cannot be read is dropped and told."""
+        """Take one message; return whether it was a block that got an answer. Unreadable messages are dropped and reported."""
         try:
             return self._take(received)
         except Fault as fault:
@@ -270,22 +250,21 @@ class ControllerProcess:
                 if not self._lockstep:
                     realtime.let_the_bus_send()
                 self._send_rest(0 if self._lockstep else received.arrival_ns)
-                self._tell_of_block(before)
+                self._report_block(before)
             return command is not None
         if received.topic is ANNOUNCE:
             node.announcement(received.payload)
         elif received.topic is OPERATOR:
-            self._obey(received.payload)
+            self._apply(received.payload)
         else:
-            self._mind(parsed(wire.Event, received.payload, PLANT_EVENT.name))
+            self._take_rig_event(parsed(wire.Event, received.payload, PLANT_EVENT.name))
         return False
 
-    def _tell_of_block(self, before: int) -> None:
-        """Tell what the block that was just answered shows; `before` is the number of the one before it."""
+    def _report_block(self, before: int) -> None:
+        """Publish the events of the block that was just answered; `before` is the number of the block before it."""
         node = self._node
-        self._tell_unreadable()
-        for code, text in node.news():
-            self.event(code, text)
+        self._report_unreadable()
+        self._publish(node.news())
         if node.slide_accel_unread:
             text = "a sample is no number; the controller goes on without this channel"
             self._doubts.complaints.note("NOT_FINITE", f"{SENSORS.name} mass_accel_mps2", text)
@@ -305,7 +284,7 @@ class ControllerProcess:
             self._end_said_s = None
             self._doubts.complaints.note(FOREIGN, PLANT_EVENT.name, "END, but the rig is there and goes on: ignored")
 
-    def _mind(self, event: wire.Event) -> None:
+    def _take_rig_event(self, event: wire.Event) -> None:
         if event.code == "END":
             self._end_said_s = time.monotonic()
         elif event.code == "START" and self._lockstep and event.text != "lockstep":
@@ -314,8 +293,8 @@ class ControllerProcess:
                 "CONFIG", f"{line} for ever where blocks stop coming; leave --lockstep away, or give it to the rig too"
             )
 
-    def _tell_unreadable(self) -> None:
-        """Tell of samples that are no numbers, and that they are numbers again once that lasts."""
+    def _report_unreadable(self) -> None:
+        """Report samples that are no numbers, and their end once blocks of numbers last."""
         if self._node.unreadable:
             self._numbers_again = 0
             if not self._unreadable and time.monotonic() > self._unreadable_told_s + 1.0:
@@ -328,13 +307,13 @@ class ControllerProcess:
                 self._unreadable = False
                 self.event("FRESH", "every sample is a number again")
 
-    def _obey(self, payload: bytes) -> None:
-        """Take an operator's message; say so where the rig does not, a repeated one once in a while. Raises Fault BAD_MESSAGE."""
+    def _apply(self, payload: bytes) -> None:
+        """Apply an operator's command; report it where the rig does not, repetitions sparsely. Raises Fault BAD_MESSAGE."""
         word = parsed(wire.Operator, payload, OPERATOR.name)
         if word.action not in wire.Operator.Action.values():
             raise Fault("BAD_MESSAGE", f"{OPERATOR.name}: action = {word.action}: not known")
         self._node.operator(word.action)
-        if self._node.rig_tells and not self._stale:  # a rig with a guard says what it takes; once is enough
+        if self._node.rig_tells and self._blocks.is_fresh:  # a rig with a guard reports it
             return
         said = f"{wire.Operator.Action.Name(word.action)} by {word.who[:_LONGEST_WHO] or 'somebody'}"
         now_s = time.monotonic()
@@ -350,8 +329,8 @@ class ControllerProcess:
         for message in self._node.rest(lateness_ns):
             self._send[message.topic.name](message.payload)
 
-    def _mind_the_plant(self, heard_s: float) -> None:
-        """Tell of a rig that went away, and give it up after half a minute; called while no block comes."""
+    def _check_rig(self, heard_s: float) -> None:
+        """Report a rig that left, and end after half a minute without it; called while no block comes."""
         if self._bus.came("plant") != self._rig_came:
             self._rig_came = self._bus.came("plant")
             self._node.rig_was_away()

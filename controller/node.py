@@ -77,8 +77,8 @@ class ControllerNode:
         return int(self._state[0]["guard_state"]) != wire.NO_GUARD
 
     @property
-    def is_late(self) -> bool:
-        """Whether the last block was older than the loop is made for."""
+    def block_was_late(self) -> bool:
+        """Whether the last block was older than the margin of the loop."""
         return self.age.late_ns > MARGIN_NS
 
     @property
@@ -143,7 +143,7 @@ class ControllerNode:
         Args:
             payload: the block.
             arrival_ns: when it came (time.perf_counter_ns); 0 in lockstep.
-            answered_ns: the present time, from which its age is judged: a block that waited in this process is late as well.
+            answered_ns: the present time; the age of a block counts until now, as one that waited in this process is late too.
 
         """
         payload = self._layout.canonical(payload, SENSORS.name)
@@ -171,7 +171,7 @@ class ControllerNode:
             self.age.note(answered_ns, t_ns)
         self.block_t_ns = self.t_ns = t_ns
         sensors = self._layout.record(payload)
-        events = BLOCK | (GAP if gap_blocks else 0) | (LATE if self.is_late else 0) | self._operator_events
+        events = BLOCK | (GAP if gap_blocks else 0) | (LATE if self.block_was_late else 0) | self._operator_events
         return self._step(sensors, events, gap_blocks)
 
     def _refuse_changed(self, payload: bytes) -> None:

@@ -32,9 +32,8 @@ from controller.replay_steps import (
     StepComparer,
 )
 
-# Steps that a message may come late in the log, 10 s of blocks of 1 ms. What is not there by then counts as lost. Larger: a log
-# that lacks messages needs more memory. Smaller: a log in which a step stands further from its block is read a second time, in
-# whole. The value was not swept.
+# Steps by which a message may be late in the log, 10 s of blocks of 1 ms; a later one counts as lost. Larger: a log that lacks
+# messages needs more memory. Smaller: a log with a step further from its block is read a second time, in whole. Not swept.
 WINDOW: Final = 10_000
 _DEFAULT_SAMPLES = 20
 
@@ -60,7 +59,7 @@ class Replay(NamedTuple):
 
 
 class OutOfOrder(Exception):
-    """A message stands in the log after steps that would have needed it: only the log in whole can be replayed."""
+    """A message comes in the log after steps that needed it: only the log in whole can be replayed."""
 
 
 class _Waiting:
@@ -68,8 +67,8 @@ class _Waiting:
 
     def __init__(self, empty: Records) -> None:
         self._parts = [empty]
-        self.passed = -1  # largest sequence that no step will use any more
-        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences without which steps went on
+        self.passed = -1  # largest sequence that no later step uses
+        self.lacked: list[npt.NDArray[np.uint64]] = []  # sequences that were missing for steps that were taken
 
     def add(self, records: Records) -> None:
         """Messages in the order of the log."""
@@ -77,7 +76,7 @@ class _Waiting:
             self._parts.append(records)
 
     def records(self) -> Records:
-        """All that wait; of several with one sequence the first of the log comes first."""
+        """All that wait; those with equal sequences are in the order of the log."""
         if len(self._parts) > 1:
             parts = [part for part in self._parts if len(part)]
             dtype = parts[0].dtype
@@ -97,7 +96,7 @@ class _Waiting:
             self._parts = [whole[count:]]
 
     def forget_until(self, sequence: int) -> None:
-        """Forget those up to a sequence, whether they came or not."""
+        """Forget those up to a sequence, and any of them that come later."""
         self.forget(int(np.searchsorted(self.records()["sequence"], np.uint64(sequence), "right")))
         self.passed = max(self.passed, sequence)
 
@@ -134,7 +133,7 @@ class Replayer:
         self._newest = 0  # steps of the newest piece, the other topics of which may follow
 
     def add(self, topic: str, records: Records) -> None:
-        """Messages of a streaming topic; those that no step needs are passed over."""
+        """Take messages of a streaming topic; those of other topics are skipped."""
         waiting = self._tables.get(topic)
         if waiting is None or not len(records):
             return
@@ -146,7 +145,7 @@ class Replayer:
             self._advance(end=False)
 
     def add_snapshot(self, snapshot: wire.Snapshot) -> None:
-        """A memory of the controller; one of another version is passed over."""
+        """Take a memory of the controller; one of another version is skipped."""
         if snapshot.layout != LAYOUT_ID:
             return
         early = snapshot.t_ns < self._from_ns
@@ -163,14 +162,14 @@ class Replayer:
                 self._pass_over(int(np.searchsorted(self._trace.records()["sequence"], np.uint64(snapshot.step + 1))))
 
     def result(self) -> Replay:
-        """What came of it, at the end of the log. Raises Fault BAD_LOG where two controllers answered: no step is whose."""
+        """The result, at the end of the log. Raises Fault BAD_LOG where two controllers answered, as their steps are mixed."""
         self._advance(end=True)
         return Replay(self._compared, self._skipped, self._comparer.difference)
 
     def _in_time(self, topic: str, waiting: _Waiting, records: Records) -> Records:
-        """Those that can still be used; one that comes twice is passed over, as the first counts."""
+        """Those that can still be used; a message that comes a second time is skipped, as the first counts."""
         sequence = records["sequence"]
-        if topic == "announce":  # they are counted
+        if topic == "announce":  # steps refer to them by their number
             steps = np.diff(sequence, prepend=waiting.records()["sequence"][-1:]).astype(np.int64)
             if waiting.lacked or (steps <= 0).any():
                 raise OutOfOrder
@@ -183,7 +182,7 @@ class Replayer:
         return records.view(f"V{records.dtype.itemsize}")[~late].view(records.dtype)
 
     def _advance(self, end: bool) -> None:
-        """Take every step that is complete; with `end` all of them, as nothing more comes."""
+        """Take every step that is complete; with `end` all of them, as no message follows."""
         while len(trace := self._trace.records()):
             sequence = trace["sequence"]
             twice = np.flatnonzero(sequence[1:] == sequence[:-1])
@@ -203,7 +202,7 @@ class Replayer:
         why = "the controller was started again, or two answered"
         raise Fault("BAD_LOG", f"{line}: {why}; record every controller in a log of its own")
 
-    # each phase has the number of steps for which nothing can come any more, and says whether another phase follows
+    # each phase takes the number of steps for which no message can follow, and returns whether another phase follows
 
     def _start(self, sure: int) -> bool:
         """Find where the replay begins."""
@@ -225,7 +224,7 @@ class Replayer:
         """Take the steps that follow the memory, up to one that cannot be rebuilt, and forget them."""
         trace, sensors, command, announce = (waiting.records() for waiting in self._tables.values())
         if not len(sensors) and self._sensors.passed < 0 and not sure:
-            return False  # of how many samples a block is, is not known
+            return False  # the number of samples of a block is not known
         known_from = [0, 0] if self._whole else [self._sensors.passed + 1, self._command.passed + 1]
         taken = self._comparer.take((trace, sensors, command, announce), sure, *known_from)
         if taken.why == AGAIN:

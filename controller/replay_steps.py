@@ -1,4 +1,4 @@
-"""Steps of today's controller beside those of a log: each answer is compared as soon as it is there, and kept nowhere."""
+"""Steps of today's controller on the frames of a log: each answer is compared at once and then forgotten."""
 
 from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
@@ -14,9 +14,9 @@ from controller.core import step
 
 _OF_A_CLOCK = "lateness_ns"  # the field that is not compared
 
-# why steps end: more may come, a step or its block is lost, something came again, a bit differs
+# why steps end: more may come, a step is lost, its block is lost, a forgotten message is needed, a bit differs
 WAITS, GAP, NO_BLOCK, AGAIN, DIFFERS = range(5)
-NO_COMMAND: Final = 1  # bits of what steps went on without
+NO_COMMAND: Final = 1  # bits of the messages that were missing for steps that were taken
 NO_ANNOUNCEMENT: Final = 2
 
 
@@ -39,12 +39,12 @@ class Taken(NamedTuple):
     why: int  # they end there
     compared: int
     blocks: int  # places of sensor blocks up to the last that was used
-    lacks: int  # bits of what they went on without
+    lacks: int  # bits of the messages that were missing
 
 
 @kernel
 def _place(records: npt.NDArray[Any], likely: int, sequence: int) -> int:
-    """The place of the first message with this sequence, -1 where there is none."""
+    """The place of the first message with this sequence; -1 without one."""
     if likely < records.shape[0] and records[likely].sequence == sequence:
         return likely
     low, high = 0, records.shape[0]
@@ -104,8 +104,8 @@ def _steps(
         lacks |= lacking
         block_at = found if events & BLOCK != 0 else block_at
         while s.announced_count < announced:
-            said: Record = announce[s.announced_count]
-            take_announcement(s, said.holds_from_ns, said.drive_velocity_mps)
+            announced_now: Record = announce[s.announced_count]
+            take_announcement(s, announced_now.holds_from_ns, announced_now.drive_velocity_mps)
         change = params.shape[0] - 1
         while change > 0 and t.t_ns < params_from_ns[change]:
             change -= 1
@@ -128,7 +128,7 @@ def _steps(
 
 
 class StepComparer:
-    """Today's controller, fed with the frames of a log; what follows the first difference is not compared.
+    """Today's controller, fed with the frames of a log; steps after the first difference are not compared.
 
     Args:
         params: of the controller, [changes].
@@ -156,8 +156,8 @@ class StepComparer:
 
         Args:
             tables: trace, sensors, command and announcements of the log, each in order of sequence.
-            sure: steps for which nothing can come any more.
-            first_block, first_command: sequences from which on nothing was forgotten.
+            sure: steps for which no message can follow.
+            first_block, first_command: sequences from which on no message was forgotten.
 
         """
         trace, sensors, command, announce = map(writable, tables)
@@ -187,7 +187,7 @@ class StepComparer:
 
 
 def _mask(layout: Layout) -> npt.NDArray[np.uint8]:
-    """Which bytes of a message are compared, [size]: those of its fields, but for the field of a clock."""
+    """Which bytes of a message are compared, [size]: those of its fields, except for the field of a clock."""
     mask = np.zeros(layout.size, np.uint8)
     for name, (kind, first, *_) in (layout.dtype.fields or {}).items():
         mask[first : first + kind.itemsize] = 0 if name == _OF_A_CLOCK else 0xFF
@@ -199,5 +199,5 @@ def _rows_of_bytes(records: Records) -> npt.NDArray[np.uint8]:
 
 
 def writable(records: Records) -> Records:
-    """The same messages, which a kernel may be compiled for once: one that only reads has another type."""
+    """The same messages in memory that may be written: numba would compile kernels again for arrays that may only be read."""
     return records if records.flags.writeable else np.frombuffer(bytearray(records.tobytes()), records.dtype)

@@ -30,7 +30,7 @@ loop_delay              commands on their way to the exciter
 step                    one whole block with its messages
 simulate                a run without bus and sensors
 stability               the slider linearised around steady sliding
-inputs                  the drive's velocity, what is announced of it, noise and delays, block by block
-received                the commands that mean something
+inputs                  velocity of the drive, its announcements, noise and delays, block by block, drawn ahead by a thread
+faults                  faults of sensors, exciter, clock and bus that a scenario or an operator asks for
 node, app               the rig as a participant of the bus; the process
 """

@@ -140,7 +140,7 @@ class PlantProcess:
         self._answers = Inbox(64)
         self._on_the_way: collections.deque[Received] = collections.deque(maxlen=WAITING)
         self._events = 0
-        self._paused_ns = 0  # for which this process stalled, and has not reported
+        self._paused_ns = 0  # of a stall of this process that is not published
         self._send_sensors = bus.publisher(SENSORS)
         self._send_applied = bus.publisher(APPLIED)
         self._send_announce = bus.publisher(ANNOUNCE)
@@ -166,6 +166,7 @@ class PlantProcess:
     def end(self) -> None:
         """Say that the run is over, and leave the bus as a rig: only both together end the other processes."""
         self._complaints.tell_when_due(all_of_it=True)
+        self._report_stall()
         self.event("END", f"blocks={self._node.block}")
         self._bus.withdraw()
 
@@ -290,10 +291,14 @@ class PlantProcess:
             self._complaints.tell_when_due()
             if late_ns > _PAUSE_NS:
                 self._paused_ns = max(self._paused_ns, late_ns)
-            elif self._paused_ns and late_ns < node.block_ns and commands:  # whose sender has its link again
-                text = f"this rig stalled for {self._paused_ns * 1e-9:.2f} s; the blocks that were due followed at once"
-                self.event("PAUSED", text)
-                self._paused_ns = 0
+            elif late_ns < node.block_ns and commands:  # whose sender has its link again
+                self._report_stall()
+
+    def _report_stall(self) -> None:
+        if self._paused_ns:
+            text = f"this rig stalled for {self._paused_ns * 1e-9:.2f} s; the blocks that were due followed at once"
+            self.event("PAUSED", text)
+            self._paused_ns = 0
 
     def lockstep(self, blocks: int, stop: threading.Event) -> None:
         """Advance block by block; each block waits for the command that answers the block before."""

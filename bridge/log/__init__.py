@@ -11,9 +11,9 @@ log_reader, logfile      reading without seeking, whole or cut; its topics as ar
 chunk_messages           where the messages are in the bytes of chunks
 reading                  chunks of any compression, and the definitions of channels
 damage, recover          what could not be read; a cut log made whole
-check, topic_watch       faults of a log: all of them; those in the numbers and times of one topic
-watches                  messages that are missing, events, percentiles, in a memory that does not grow
+check                    faults of a log: of its schemas, of each channel (for evidence too), and all of them together
+topic_watch              missing messages, duplicates and clock jumps of one topic
+watches                  events and percentiles of a log, in a memory that does not grow
 in_charge, pause_events  when the rig had no controller; stalls of the computer
-signal_range             range, clipping and dead stretches of one signal, for logs and evidence
 finding                  one fault of a log or of evidence, and its place
 """

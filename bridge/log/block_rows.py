@@ -10,7 +10,6 @@ from mcap.opcode import Opcode
 from bridge.wire.messages import Records
 
 FIELDS_BYTES = 22  # of a message record, between its length and its payload
-HEAD_BYTES = 9 + FIELDS_BYTES  # with the opcode and the length itself
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from bridge.log.finding import Finding
 from bridge.log.watches.arrays import median, steps
@@ -13,12 +12,11 @@ from bridge.wire.event_codes import WEAK_REASONS
 from bridge.wire.messages import Records
 from bridge.wire.words import words
 
-Integers = npt.NDArray[np.int64]
 NO_COMMAND = (1 << 64) - 1  # in `Applied.command_block`: the rig has none, before the first or on its way out
-# A longer fallback is no stall but a controller that is not there. Smaller: a process that is held up for 0.5 s, and catches up
-# counts as gone. Larger: slips without a controller count as slips in a stall. The bus gives a frozen process up after some 1 s.
+# A longer fallback is no stall: the controller is absent. Smaller: a controller that stalls for 0.5 s counts as absent. Larger:
+# slips without a controller count as slips in a stall. The bus drops a frozen process after its lease, 1.5 s.
 GONE_S = 1.0
-UNANSWERED_SHARE = 0.01  # of the blocks: more without an answer is a fault; less has every busy desktop now and then
+UNANSWERED_SHARE = 0.01  # of the blocks: more without an answer is a fault; every busy desktop has fewer now and then
 WEAK_S = 1.0  # of one reason that says the vibration does not do its work: more is a fault
 _MOST_STRETCHES = 1000  # that a result lists; of more, only their time
 
@@ -41,13 +39,13 @@ class InCharge(NamedTuple):
         return self.longest_fallback_s > GONE_S or self.controller_until_s is not None
 
     def sentences(self) -> list[tuple[str, str, bool]]:
-        """Code, words, and whether it is a fault, of each thing that a person should know."""
+        """Code, words, and whether it is a fault, of each event that an operator should know."""
         told: list[tuple[str, str, bool]] = []
         if self.fallbacks:
             where = f", first from {self.stretches[0][0]:.2f} s on" if self.stretches else ""
             text = (
                 f"the rig was without a fresh command for {self.fallback_s:.2f} s, {counted(self.fallbacks, 'time')}{where}, "
-                f"the longest {self.longest_fallback_s:.2f} s: nobody was in charge then"
+                f"the longest {self.longest_fallback_s:.2f} s: no controller was in charge then"
             )
             told.append(("FALLBACK", text, self.longest_fallback_s > GONE_S))
         if self.controller_until_s is not None:
@@ -123,7 +121,7 @@ class ChargeWatch:
 
     @property
     def open_from_s(self) -> float | None:
-        """Begin of the fallback that goes on [s]; None where there is none, or the rig is on its way out."""
+        """Begin of the fallback that goes on [s]; None without a fallback, or while the rig ends its run."""
         return self._since_ns * 1e-9 if self._since_ns is not None and not self._leaving else None
 
     def command(self, records: Records) -> None:

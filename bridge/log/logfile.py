@@ -47,8 +47,7 @@ def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterat
     """Every message of a log, chunk by chunk, in memory that does not grow with the log; none of what is there for viewers.
 
     Bytes that are not a message of their topic are left out and counted in the reader's damage, messages of other programs in
-    its `foreign`. Topics that are not among `only` are not looked at. Raises Fault BAD_LOG when the file is not a run log of
-    this project.
+    its `foreign`. With `only` other topics are skipped. Raises Fault BAD_LOG when the file is not a run log of this project.
     """
     layouts: dict[str, Layout] = dict(_LAYOUTS)
     for messages in reader.messages():
@@ -57,9 +56,8 @@ def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterat
             topic = reader.topic(channel_id)
             if topic is None:
                 reader.pass_over(channel_id, len(mine.start))
-            elif topic not in DERIVED and (
-                only is None or topic in only
-            ):  # of one topic several may alternate: two publishers, or a log that was merged
+            # channels of one topic may alternate: two publishers, or a log that was merged
+            elif topic not in DERIVED and (only is None or topic in only):
                 channels.setdefault(topic, []).append(channel_id)
         for topic, same in channels.items():
             mine = messages.by_channel[same[0]] if len(same) == 1 else messages.of(same)

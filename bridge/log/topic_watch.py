@@ -11,7 +11,7 @@ from bridge.wire.messages import Records
 _CLOCK_TOLERANCE_NS = 1000
 _REMEMBERED_NUMBERS = 1 << 20  # missing numbers that are kept, to tell a late message from a duplicate; costs memory
 
-# Numbers by which a message may come late; one that goes back to 0 from further on begins another run, as the recorder has it.
+# Numbers by which a message may come late. A number 0 after a higher one begins another run; the recorder has the same rule.
 _LATEST = 256
 
 
@@ -74,9 +74,8 @@ class TopicWatch:
             if step[at] != 1:
                 self._odd_number(int(number[at]), int(number[at]) - int(step[at]))
                 at += 1
-            while (
-                at < len(number) and step[at] == 1 and number[at] <= self._highest
-            ):  # late ones that follow one another
+            # late messages that follow one another
+            while at < len(number) and step[at] == 1 and number[at] <= self._highest:
                 self._odd_number(int(number[at]), int(number[at]) - 1)
                 at += 1
         # the running maximum; `_odd_number` sets it back at a restart

@@ -2,8 +2,8 @@
 
 from enum import Enum
 
-# Messages that a late one may be behind, and that may be lost at once without a doubt. Smaller: a loss is doubted for 8 blocks.
-# Larger: another sender whose count is as near is believed at once.
+# Messages by which a late one may be behind, or that may be lost at once. Smaller: a longer loss counts as another sender for 8
+# blocks. Larger: another sender whose count is as near is believed at once.
 WINDOW = 256
 # Another count is believed after so many messages in a row, each one further, while the present count has been silent for so
 # long. Smaller: a burst of a stranger takes over. Larger: a rig that was restarted waits for longer.

@@ -74,6 +74,6 @@ def address(endpoint: str) -> str:
 
 
 def is_loopback(endpoint: str) -> bool:
-    """Whether an endpoint can be reached from this computer alone; a name that is not known counts as one that can not."""
+    """Whether an endpoint can be reached from this computer alone; False for a name that cannot be resolved."""
     found = address(endpoint).partition("%")[0]
     return bool(found) and ipaddress.ip_address(found).is_loopback

@@ -252,11 +252,9 @@ EVENTS = {
         ),
         EventCode("INJECTION_ENDED", "plant", CHECK, "a fault that was asked for is over"),
         EventCode("OPERATOR", "plant, controller", CHECK, "a person's word was taken: `ACTION by WHO`"),
-        EventCode("WATCH", "recorder", NEWS, "whether pauses of the computer are watched, on which cores, or why not"),
-        EventCode(
-            "PAUSE", "recorder", NEWS, "every core that the recorder may use stood still; the time is when it began"
-        ),
-        EventCode("CORE_PAUSE", "recorder", NEWS, "one core alone stood still"),
+        EventCode("WATCH", "recorder", NEWS, "whether stalls of the computer are watched, on which cores, or why not"),
+        EventCode("PAUSE", "recorder", NEWS, "every core that the recorder may use stalled; the time is when it began"),
+        EventCode("CORE_PAUSE", "recorder", NEWS, "one core alone stalled"),
         EventCode(
             "GAP", "recorder", FAILURE, "messages were lost before they came to the log: a busy computer or link"
         ),

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from bridge.wire.topics import Topic
 
-# Blocks, or commands, that may wait for a loop that stalls: at least those of a lease, as a longer stall ends the link; that
-# are 1500 of 1 ms. With 512, four stops of 0.7 to 0.9 s lose 755 blocks of the controller, with 4096 24 such stops lose none.
+# Blocks, or commands, that may wait for a loop that stalls: at least those of a lease, 1500 of 1 ms, as a longer stall ends the
+# link. With 512 the controller loses 755 blocks in four stops of 0.7 to 0.9 s, with 4096 none in 24 such stops.
 # Larger: a controller that floods its rig delays a block by more than 16 ms, at 4 us a command.
 WAITING = 4096
 # Rare messages of one topic that may wait. Too small: a burst of announcements is lost. Larger: who floods a topic is read for

@@ -1,4 +1,4 @@
-"""When the whole computer stalled: what the timers on all cores tell alike."""
+"""Stalls of the computer: stretches in which the timers on all cores were late together."""
 
 import contextlib
 import os
@@ -11,7 +11,8 @@ from typing import NamedTuple
 from bridge.wire import core_timer, realtime
 
 _PRIORITY = realtime.LOOP_PRIORITY + 1  # a loop that takes long must not look like a core that stands still
-_MOST_CORES = 8  # that are watched. More: a process of 10 MB each, and what eight share is the computer's already
+# Cores that are watched. More: a process of 10 MB each; a stall of eight cores is one of the computer already.
+_MOST_CORES = 8
 # From when on no timer has more to say of a pause. Shorter: a line of a timer that starts to run later would be missed.
 _SETTLED_NS = 50_000_000
 NO_PRIORITY = "no real-time priority"
@@ -22,7 +23,7 @@ class Pause(NamedTuple):
 
     from_ns: int
     until_ns: int
-    core: int | None = None  # that stood still alone; None: every core did, which is a stall of the computer
+    core: int | None = None  # that stalled alone; None: every core did, which is a stall of the computer
 
 
 def shared(still: Sequence[Sequence[Pause]]) -> list[Pause]:
@@ -115,7 +116,7 @@ class PauseWatch:
 
 
 def settled(still: Mapping[int, list[Pause]], until_ns: int) -> tuple[list[Pause], dict[int, list[Pause]]]:
-    """The pauses that ended before `until_ns`, of the computer and of one core alone, and what belongs to later ones."""
+    """The pauses that ended before `until_ns`, of the computer and of one core alone; and the parts of later ones."""
     together = shared(list(still.values()))
     found = [pause for pause in together if pause.until_ns <= until_ns]
     told_ns = max((pause.until_ns for pause in found), default=0)

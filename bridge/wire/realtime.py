@@ -102,8 +102,7 @@ def _beside_the_loop() -> frozenset[int]:
 def hasten() -> None:
     """Let this process go before all without SCHED_FIFO, where it may: for one who only looks on, and keeps no time.
 
-    Where all cores are busy it is otherwise held up for some 100 ms, and an operator's STOP waits. Threads that begin later
-    inherit it.
+    Where all cores are busy it otherwise waits for some 100 ms, and so does an operator's STOP. Later threads inherit it.
     """
     beside = _beside_the_loop()
     for thread in _threads():

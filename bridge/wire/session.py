@@ -55,7 +55,7 @@ def session_settings(config: BusConfig, hub: bool, lockstep: bool, dial_s: float
         "scouting/gossip/enabled": False,
         "transport/link/tx/lease": round(1e3 * (_LOCKSTEP_LEASE_S if lockstep else LEASE_S)),
         "transport/link/tx/keep_alive": 4,
-        # Packets that may wait for a receiver, 2 by default, 16 at most: of 64 kB, each of some hundred messages. Smaller: a
+        # Packets of 64 kB, some hundred messages each, that may wait for a receiver: 2 by default, 16 at most. Smaller: a
         # receiver that stalls loses blocks.
         "transport/link/tx/queue/size/data": 16,
         "transport/link/rx/max_message_size": _LARGEST_BYTES,
@@ -96,7 +96,7 @@ def rig_security(config: BusConfig) -> dict[str, Any]:
     if not is_loopback(config.endpoint):
         line = f"{config.endpoint}: others can reach it: must be an address of this computer alone, or tls/"
         remedy = "make certificates with `stickslip certs FOLDER` and use --endpoint tls/HOST:PORT --certs FOLDER"
-        raise Fault("NOT_SECURE", f"{line}; {remedy}; --insecure allows it on a network that nobody else can reach")
+        raise Fault("NOT_SECURE", f"{line}; {remedy}; --insecure allows it on a network of trusted computers alone")
     return loopback_rig_security(config, loopback_users.make(config.endpoint))
 
 

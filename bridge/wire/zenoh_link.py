@@ -116,7 +116,7 @@ def _remedy(config: BusConfig, known: bool) -> str:
     if config.encrypted:
         return f"{start}, and compare the certificates of both sides: one authority, and the host's name in that of the rig"
     return (
-        start if known else f"{start}; one of another user of this computer lets nobody in who cannot read its password"
+        start if known else f"{start}; a rig of another user of this computer refuses all who cannot read its password"
     )
 
 
@@ -202,7 +202,7 @@ class Bus:
         """A function that sends bytes on `topic`.
 
         Zenoh sends a message at once where its queue is empty, and packs messages together where it is not: 16 packets then hold
-        some 1600 blocks. Sent `express`, each message fills a packet, and a receiver that pauses for 17 ms loses the rest. In
+        some 1600 blocks. Sent `express`, each message fills a packet, and a receiver that stalls for 17 ms loses the rest. In
         real time a message that cannot be sent is dropped; in lockstep the call waits.
         """
         block = zenoh.CongestionControl.BLOCK

@@ -6,6 +6,8 @@ delivered  v_a as measured against what the command gives: OPEN_LOOP, CLIPPED, S
 frozen     channels that repeat their bits: FROZEN; an accelerometer that drops out: LOOSE
 spring     force and positions against the law of the drive's spring: FORCE_DOUBTED, DRIVE_DOUBTED, SLIDE_DOUBTED
 confirmed  v_d as far as slide and force confirm it: POSITIONS_APART
+stall      after a stall of the computer or the link no doubt begins until v_a belongs to the command again
+age        how old the blocks are when they are answered
 jumps      a place of the drive that jumps: JUMPED
 anew       what a doubted force or place has taught is forgotten on a reset
 noise      noise that becomes many times larger, slips of which there are too many: NOISE

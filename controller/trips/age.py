@@ -4,7 +4,7 @@ The clocks of rig and controller are two: what they drift apart is forgotten, an
 """
 
 MARGIN_NS = 15_000_000  # by which the loop may be late: v_a then stays within 4 %
-HOLD_NS = 200_000_000  # for which blocks are older until it is told: a pause of the computer is made up for in less
+HOLD_NS = 200_000_000  # for which blocks are older until LATE is published; those of one stall are older for less
 _DRIFT = 2e-4  # of two clocks
 
 

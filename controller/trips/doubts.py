@@ -20,9 +20,9 @@ CHANNELS = 4
 
 @kernel
 def trip(s: Record, reason: int, doubts: int) -> None:
-    """Doubt signals; the first trip is the one that is told until it ends, unless a later one ends the vibration.
+    """Doubt signals; the first trip is reported until it ends, unless a later one ends the vibration.
 
-    After a stall of the computer a doubt waits: a signal that is broken still is when the wait is over.
+    After a stall of the computer a doubt waits: a signal that is broken is still broken when the wait is over.
     """
     if not is_judged(s):
         return

@@ -39,11 +39,11 @@ class TripTeller:
         self._told_ns: dict[str, int] = {}
 
     def news(self, trace: Any, stalled: bool = False) -> list[tuple[str, str]]:
-        """Codes and texts of what is new in a record of `Trace` since the last one.
+        """Codes and texts of the trips and limits that a record of `Trace` begins or ends.
 
         Args:
             trace: the record.
-            stalled: whether computer or link stalled within the last second, which may be the cause of all that is new.
+            stalled: whether computer or link stalled within the last second, which may be their cause.
 
         """
         reason, limit = int(trace.reason), int(trace.limit)

@@ -136,7 +136,7 @@ def _predict(
         p.samples_per_block = samples
         p.steps_per_sample = 1
         p.dt_s = BLOCK_S / samples
-        # contiguous, as everyone calls it: for other arrays it would be compiled again
+        # contiguous, as in all other calls: for other arrays it would be compiled again
         block_analogue = analogue.ravel()[: channels * samples].reshape((channels, samples))
         block_truth = truth.ravel()[: truths * samples].reshape((truths, samples))
         advance_disturbed(

@@ -1,4 +1,4 @@
-"""What a log tells was lost on its way: a computer that stalls for longer than a link waits costs messages."""
+"""The messages that a log reports as lost: a computer that stalls for longer than the lease of a link loses some."""
 
 import re
 from collections import Counter
@@ -10,6 +10,6 @@ _GAP = re.compile(r"(/\S+): (\d+) lost before \d+")
 
 
 def lost_of(events: Iterable[wire.Event]) -> Counter[str]:
-    """Messages that were lost, by topic; none on a machine that runs on."""
+    """Messages that were lost, by topic; none on a computer that does not stall."""
     found = (_GAP.fullmatch(event.text) for event in events if event.code == "GAP")
     return sum((Counter({gap[1]: int(gap[2])}) for gap in found if gap), Counter())

@@ -52,7 +52,7 @@ def test_a_killed_process_ends_the_run_and_costs_at_most_a_quarter_second(
 
 
 def told_lost(data: RunData, topic: str) -> int:
-    """Messages of a topic that the recorder says did not come: in real time a busy computer may drop one, never silently."""
+    """Messages of a topic that the recorder reports as missing: in real time a busy computer may lose one, never silently."""
     texts = [event.text for event in data.events if event.code == "GAP"]
     return sum(int(text.split()[1]) for text in texts if text.startswith(f"/{topic}: "))
 

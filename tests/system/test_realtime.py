@@ -77,7 +77,7 @@ def test_a_recorder_that_comes_last_misses_nothing(tmp_path: Path) -> None:
                 process.wait()
     data = read_run(log)
     assert [event.source for event in data.events if event.code == "START"] == ["plant", "controller"]
-    # the first of each is there; later ones a computer that stalls may cost, which is told
+    # the first of each is there; a computer that stalls may lose later ones, and reports it
     assert data.sensors["sequence"][0] == data.command["block"][0] == data.trace["block"][0] == 0
     assert not [event.text for event in data.events if event.code == "GAP" and event.t_ns < 100_000_000]
     assert len(data.sensors) + lost_of(data.events)["/sensors"] >= 2000
@@ -145,7 +145,7 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
     assert data.trace["vibration_velocity_mps"][stopped][300:].max() < 1e-5
     assert data.trace["mode"][-1] != wire.STOPPED
     said = [event.text.split()[0] for event in data.events if event.code == "OPERATOR"]
-    assert list(dict.fromkeys(said)) == ["STOP", "RESET", "ARM"]  # on a busy computer one may be said twice
+    assert list(dict.fromkeys(said)) == ["STOP", "RESET", "ARM"]  # on a busy computer one may be published twice
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_rubbish_on_the_bus_stops_nobody(tmp_path: Path) -> None:
         run.kill()
         run.communicate()
     data = read_run(log)
-    # on a busy computer a step without a block, for a late one, may stand between
+    # on a busy computer a step without a block may come between, where one is late
     assert int((data.trace["events"] & BLOCK).sum()) == 5000
     texts = [f"{event.code} {event.text}" for event in data.events]
     assert "BAD_MESSAGE operator: action = 7: not known: dropped" in texts

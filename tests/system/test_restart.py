@@ -107,7 +107,7 @@ def test_who_stalls_says_so_and_the_run_goes_on(tmp_path: Path, role: str, for_s
         started["plant"].send_signal(signal.SIGTERM)
         assert started["controller"].wait(20) == started["recorder"].wait(20) == 0
     data = read_run(log)
-    if for_s < LEASE_S:  # the link stands, and nothing is lost
+    if for_s < LEASE_S:  # the link is kept, and nothing is lost
         paused = [event for event in data.events if event.code == "PAUSED" and event.source == role]
         assert float(paused[0].text.split(" for ")[1].split()[0]) > 0.8 * for_s
         assert not {event.code for event in data.events} & {"GAP", "RIG_LOST"}

@@ -1,4 +1,4 @@
-"""What a command said on stderr, but for its life, and what depends on this computer: its priority, how long judging takes."""
+"""The lines of a command on stderr, without those of its life cycle, its priority and the time of judging."""
 
 _LEFT_OUT = (
     *("stickslip: warning: normal scheduling", "judging the log; "),

@@ -1,4 +1,4 @@
-"""What is wrong with a channel by itself: not there, dead or clipped. One rule for `log check` and for the verdict."""
+"""Faults of one channel by itself: no finite numbers, dead or clipped. One rule for `log check` and for the verdict."""
 
 import math
 from collections.abc import Mapping
@@ -14,18 +14,18 @@ _ACCEL = "accel_noise_mps2", "accel_resolution_mps2", "", "accel_range_mps2"
 _POSITION = "position_noise_m", "position_resolution_m", "position_lowest_m", "position_range_m"
 _FORCE = "force_noise_N", "force_resolution_N", "force_lowest_N", "force_range_N"
 _KEYS = dict(zip(CHANNELS, (_FORCE, _ACCEL, _ACCEL, _POSITION, _POSITION), strict=True))
-# Noise over resolution from which a live channel never repeats a value for long: 2 sigma are within half a step then. Larger: a
-# dead channel of coarse steps passes; smaller: one at rest, whose samples are all the same step, counts as dead.
+# Noise over resolution from which a live channel never repeats a value for long; 2 sigma are half a step then. Larger: a dead
+# channel of coarse steps passes; smaller: a channel at rest, whose samples are all the same step, counts as dead.
 _NOISY = 0.25
 _DEAD_S = 1.0  # of equal samples. Larger: a shorter failure passes; smaller: a position at rest counts as dead
-# Samples at the largest value of a channel that dwells nowhere, from which it is clipped although no two follow each other: more
-# than chance gives a signal with noise, in a short log and, as a share, in a long one. Larger: a clipped channel passes. Noise
-# alone, whose ends are 8 of its own apart, may have more there.
+# Samples at the largest value of a channel with noise from which it is clipped, although no two of them follow each other: more
+# than chance gives, in a short log, and as a share in a long one. Larger: a clipped channel passes.
 FEW_AT_END, _SHARE_AT_END = 20, 1e-5
-_NOISE_ALONE = (
-    20.0  # end to end, in noise. Smaller: 41 samples of an accelerometer at rest count; larger: a clip passes
-)
+# Range of the values over the noise, up to which a channel shows noise alone and may have more samples at its end: noise alone
+# spans 8 sigma. Smaller: 41 samples of an accelerometer at rest count as clipped; larger: a clipped channel passes.
+_NOISE_ALONE = 20.0
 _BEYOND = 1e-3  # of the range, by which a value is beyond it. Smaller: rounding to float32, 1e-7, counts; larger: units of 1 %
+_ROUNDING = 1e-6  # of an end of the range, to which a value reaches it. Smaller than 6e-8: float32 misses it; larger: spare range
 
 
 class Channel(NamedTuple):
@@ -52,11 +52,10 @@ def channels_of(plant: Any) -> dict[str, Channel]:
         return float(sensors[key]) if is_number(sensors.get(key)) else otherwise
 
     found: dict[str, Channel] = {}
-    for name, (noise, step, low, high) in _KEYS.items():
-        most = number(high, math.inf)
-        found[name] = Channel(
-            number(noise, math.nan), number(step, math.nan), number(low, -math.inf) if low else -most, most
-        )
+    for name, (noise, step, lowest, highest) in _KEYS.items():
+        high = number(highest, math.inf)
+        low = number(lowest, -math.inf) if lowest else -high
+        found[name] = Channel(number(noise, math.nan), number(step, math.nan), low, high)
     return found
 
 
@@ -102,9 +101,7 @@ def _clipped(where: str, seen: SignalLook, of: Channel, dwells: bool) -> list[Fi
         if runs or (at > many and value != 0.0):
             parts.append(f"{counted(max(runs, at if at > many else 0), 'sample')} at {value:g}")
             times = max(times, runs, at)
-        if math.isfinite(end) and over >= -1e-6 * abs(
-            end
-        ):  # a limit that float32 cannot hold exactly is missed by rounding
+        if math.isfinite(end) and over >= -_ROUNDING * abs(end):
             reached, times = end, max(times, at)
     if not parts and math.isnan(reached):
         return []

@@ -130,8 +130,8 @@ def check_log(path: Path, progress: Callable[[float], None] | None = None) -> Lo
 
 def feed(reader: LogReader, watch: Any, progress: Callable[[float], None] | None = None) -> Chain:
     """Give every message of a log to a watch with the methods of `LogWatch`; returns the chain, checked by a second thread."""
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        chain = beside.submit(chain_of if reader.alone else chain_of_log, reader.path)
+    with ThreadPoolExecutor(max_workers=1) as worker:
+        chain = worker.submit(chain_of if reader.alone else chain_of_log, reader.path)
         for piece in iter_pieces(reader):
             if piece.topic in STREAMING:
                 watch.add(piece.topic, piece.records, piece.log_time_ns)
@@ -188,14 +188,14 @@ def _of_file(path: Path, reader: LogReader, seen: LogWatch) -> list[Finding]:
     events, listed = seen.events, set[tuple[str, str]]()
     for event in events.kept:
         key = event.source, event.code
-        times, first = events.counts[key], key not in listed
-        listed.add(key)
         dropped = re.search(r"dropped=(\d{1,18})\b", event.text)
         # a gap is a finding of its topic already
         if event.code != "GAP" and is_weighty(event.code):
-            text = event.text + (f" (the first of {times})" if times > 1 else "")
-            own = Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", text, times)
-            found += [own] if first else []
+            if key not in listed:
+                listed.add(key)
+                times = events.counts[key]
+                text = event.text + (f" (the first of {times})" if times > 1 else "")
+                found.append(Finding(event.code.lower().replace("_", "-"), f"/event/{event.source}", text, times))
         elif dropped and int(dropped[1]):
             text = f"the {event.source} dropped {counted(int(dropped[1]), 'message')} because it was too slow"
             found.append(Finding("dropped", f"/event/{event.source}", text, int(dropped[1])))

@@ -30,8 +30,7 @@ class SignalLook(NamedTuple):
     clipped_low: int
     longest_run: int  # of equal samples
     longest_run_end: int  # index of its last sample
-    longest_run_value: float
-    at_highest: int  # samples that equal the largest one; many, of a live signal with noise, are clipped
+    at_highest: int  # samples that equal the largest; a live signal with noise and many of them is clipped
     at_lowest: int
 
     @property
@@ -48,10 +47,10 @@ class _Side:
         self.at_extreme = 0  # samples
         self._longest = longest
         self.runs = self.overshoot = 0.0  # samples in runs that count; the largest overshoot
-        self.begin: tuple[float, float] | None = (
-            None  # length of the run that the signal begins with, and the step out of it
-        )
-        self._open: tuple[float, float] | None = None  # length of the run that goes on, and the step into it
+        # length of the run that the signal begins with, and the step out of it
+        self.begin: tuple[float, float] | None = None
+        # length of the run that goes on, and the step into it
+        self._open: tuple[float, float] | None = None
 
     def add(self, values: Floats, before: float | None, resolution: float) -> None:
         """The next finite samples, at least one; `before` is the sample before them, `resolution` their smallest step so far."""
@@ -70,7 +69,7 @@ class _Side:
             self.end_run(self.extreme - float(values[0]), resolution)
         apart = np.diff(at) > 1
         firsts, ends = at[np.concatenate([[True], apart])], at[np.concatenate([apart, [True]])] + 1
-        # shorter runs do not count, and a channel that rests at its end has thousands; one may go on in another piece
+        # shorter runs do not count, and a channel that rests at its end has thousands; runs at the ends may go on in other pieces
         kept = (ends - firsts >= _SHORTEST_RUN) | (firsts == 0) | (ends == len(values))
         for first, end in zip(firsts[kept].tolist(), ends[kept].tolist(), strict=True):
             if first == 0 and self._open is not None:
@@ -122,7 +121,6 @@ class Signal:
         self._last: float | None = None
         self._resolution = math.inf
         self._run = self._longest_run = self._longest_run_end = 0
-        self._longest_run_value = math.nan
 
     def add(self, values: npt.NDArray[Any]) -> None:
         """Check the next samples, [samples]."""
@@ -158,7 +156,6 @@ class Signal:
         if runs[longest] > self._longest_run:
             self._longest_run = int(runs[longest])
             end = int(ends[longest])
-            self._longest_run_value = float(values[end]) if end >= 0 or self._last is None else self._last
             self._longest_run_end = at + (end if places is None else int(places[end]))
         self._run = int(runs[-1])
 
@@ -183,7 +180,6 @@ class Signal:
             clipped[1],
             self._longest_run,
             self._longest_run_end,
-            self._longest_run_value,
             self._sides[0].at_extreme,
             self._sides[1].at_extreme,
         )

@@ -27,7 +27,6 @@ UNREADABLE = (
     MemoryError,
     OverflowError,
 )
-COMPRESSIONS = ("", "lz4", "zstd")
 # A chunk holds the name of its compression 28 bytes into its content (after two times, a size and a checksum), which is 37
 # bytes into its record.
 _MARK_AT = 28

@@ -1,4 +1,4 @@
-"""What a log needs of arrays, and numpy has not, or in a form that is slow."""
+"""Functions of arrays that numpy lacks, or that are slow in numpy."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def _medians(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
 
 
 def noise_of(values: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.float64]:
-    """Standard deviation of white noise on what moves smoothly most of the time, along the last axis, by second differences."""
+    """Standard deviation of the white noise on a signal that is mostly smooth, along the last axis; by second differences."""
     if values.shape[-1] < 3:
         return np.zeros(values.shape[:-1])
     return 1.4826 * _medians(np.abs(np.diff(values, 2))) / 6.0**0.5

@@ -1,4 +1,4 @@
-"""The events of a log: the first ones of each code, how many there were, the stalls, and what the plant's END says."""
+"""The events of a log: the first of each code, their numbers, the stalls, and the count of blocks in the plant's END."""
 
 import re
 from collections import Counter
@@ -8,10 +8,10 @@ from bridge.log.pause_events import CORE_PAUSE, PAUSE, RunPause, not_watched, pa
 from bridge.wire import stickslip_pb2 as wire
 from bridge.wire.event_codes import EVENTS, FAILURE, MAINTENANCE, OUTSIDE
 
-# Events of one source and code that are kept: a storm of them must not fill the memory, and no reader wants more. Of the stalls
-# all are kept, as two numbers each.
+# Events of one source and code that are kept: a storm of them must not fill the memory, and no reader wants more. Stalls are all
+# kept, as two numbers each.
 KEPT = 20
-_BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; a foreign rig need not hold it
+_BLOCKS = re.compile(r"\bblocks=(\d{1,18})\b")  # in the plant's END; a foreign rig may leave it out
 _WEIGHTY = {FAILURE, OUTSIDE, MAINTENANCE}
 
 
@@ -40,7 +40,7 @@ class EventWatch:
 
     @property
     def blocks_sent(self) -> int | None:
-        """How many blocks there were, by the plant's END; None where it does not hold it."""
+        """Blocks that the plant sent, by its END; None where the log has no END or the END no count."""
         ends = (_BLOCKS.search(event.text) for event in self.kept if (event.source, event.code) == ("plant", "END"))
         found = [int(end[1]) for end in ends if end]
         return found[-1] if found else None

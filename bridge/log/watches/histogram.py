@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-# Ratio of two edges. A quantile is off by half of it at most, 0.25 %, less than a repeated run scatters by. Smaller: more memory
-# (now 5500 bins of 8 bytes); larger: percentiles that visibly come in steps.
+# Ratio of two edges. A quantile is off by half of it at most, 0.25 %, which is less than the scatter of repeated runs. Smaller:
+# more memory (now 5500 bins of 8 bytes); larger: percentiles that visibly come in steps.
 _RATIO = 1.005
 _LOWEST, _HIGHEST = 1e-3, 1e9  # values beyond count in the first or last bin
 _BINS = int(np.ceil(np.log(_HIGHEST / _LOWEST) / np.log(_RATIO)))

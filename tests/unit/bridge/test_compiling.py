@@ -38,17 +38,17 @@ def test_a_terminal_has_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest
     progress = Progress()
     for left in (2, 1, 0):
         progress.show(left, 2)
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert said.count("\r") == 3
+    shown = capsys.readouterr().err
+    assert shown.count("\n") == 1
+    assert shown.count("\r") == 3
 
 
 def test_kernels_are_counted_with_all_that_they_call() -> None:
-    names = {getattr(one, "__name__", "") for one in _called_by(run_blocks.py_func)}
+    names = {getattr(function, "__name__", "") for function in _called_by(run_blocks.py_func)}
     assert {"run_blocks", "advance", "advance_disturbed", "_stribeck_share"} <= names
 
 
-# a command that compiles for ever in a call that no handler of Python interrupts
+# a command that compiles for ever, in a call that no signal handler of Python interrupts
 COMMAND = """
 import ctypes, sys
 from bridge.compiling import compiling

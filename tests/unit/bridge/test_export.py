@@ -119,7 +119,7 @@ def test_tables_chunk_by_chunk_are_the_whole_run(log: Path, monkeypatch: pytest.
         assert b"".join(pieces[name]) == getattr(run, name).tobytes()
 
 
-def test_topics_that_nobody_asks_for_are_not_looked_at(log: Path) -> None:
+def test_only_the_topics_that_are_asked_for_are_read(log: Path) -> None:
     assert {piece.topic for piece in iter_pieces(LogReader(log), {"trace", "snapshot"})} <= {"trace", "snapshot"}
 
 

@@ -83,14 +83,14 @@ def test_a_shared_kernel_is_compiled_once_and_loaded_before_its_callers(tmp_path
 
 
 def test_no_numba_is_installed_whose_internals_may_differ() -> None:
-    """With another one these tests decide whether the bound may rise: numba promises nothing of the classes that link kernels."""
+    """The bound may rise where these tests pass with the next version: numba promises nothing about classes that link kernels."""
     major, minor = map(int, numba.__version__.split(".")[:2])
     needed = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
     assert f"numba>={major}.{minor},<{major}.{minor + 1}" in needed
 
 
 def test_a_process_that_loads_kernels_does_not_import_linear_algebra() -> None:
-    """Numba asks for it as it loads the first one; where it compiles a product it still asks."""
+    """Numba would import it with the first kernel; where it compiles a product of matrices it still does."""
     code = (
         "import sys, bridge.kernel, numba.np.arraymath as of_arrays, numba.np.linalg as of_matrices\n"
         "assert 'scipy.linalg' not in sys.modules\n"

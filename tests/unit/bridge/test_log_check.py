@@ -119,7 +119,7 @@ def test_what_was_done_is_found(tmp_path: Path, change: Callable[[Tables], None]
 
 
 def test_noise_alone_and_a_coarse_position_at_rest_are_no_finding() -> None:
-    """Both repeat values: noise of few steps its largest one, and a position that stands within a step."""
+    """Both repeat values: noise of a few steps its largest value, and a position that rests within a step."""
     noise = np.clip(np.random.default_rng(1).standard_normal(100_000), -3.5, 3.5)
     accel_mps2 = (0.001 * np.round(1.5 * noise)).astype(np.float32)
     accel = Channel(noise=0.0015, step=0.001, low=-490.0, high=490.0)

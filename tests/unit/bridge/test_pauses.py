@@ -1,4 +1,4 @@
-"""Pauses of the computer: what several cores tell alike, in whose time, and the timers' own beginning and end."""
+"""Stalls of the computer: when several cores stall together, the times of the events, and the start and end of the timers."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Which folder a dead worker costs; tests/system/test_many.py kills real ones."""
+"""Which folder is lost with a worker that dies; tests/system/test_many.py kills real workers."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +12,7 @@ from diagnosis import diagnose_many as many
 from diagnosis.diagnose_many import EvidenceFolder, FolderResult
 
 
-def test_a_folder_that_always_kills_its_worker_takes_nobody_along(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_always_kills_its_worker_costs_no_other_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[str] = []
 
     def one(source: EvidenceFolder, _task: Any) -> FolderResult:

@@ -19,7 +19,7 @@ def test_nothing_leaks_from_the_held_out_run(monkeypatch: pytest.MonkeyPatch) ->
 
     def borne_out(contest: Any, judged_on: Any, _jobs: int) -> Any:
         asked.extend(run.file for run in judged_on.runs)
-        raise EOFError  # all that the test wants to see was called
+        raise EOFError  # everything that the test looks at was called
 
     contest = SimpleNamespace(
         decide=lambda _: None, rig=SimpleNamespace(fitter=SimpleNamespace(problem=SimpleNamespace()))

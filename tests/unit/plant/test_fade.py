@@ -27,6 +27,9 @@ class Wire:
     def listen(self, topic: Topic, receive: Any) -> None:
         pass
 
+    def withdraw(self) -> None:
+        pass
+
 
 class Commanded(PlantNode):
     """A rig whose controller wants 30 nm, until it fails at a block."""
@@ -70,6 +73,17 @@ def test_the_vibration_fades_at_its_own_rate_before_the_process_ends(way: str) -
     assert np.diff(applied["amplitude_m"]).min() > -1.001e-9
     assert applied["guard_state"][-1] == wire.DISARMED
     assert applied["cause"][-1] == wire.RUN_ENDED
+
+
+def test_a_stall_that_no_command_follows_is_reported_at_the_end() -> None:
+    """It was published with the next command alone, which a rig without a controller never gets."""
+    bus: Any = Wire()
+    process = PlantProcess(PlantNode(load_rig("paper-c45-c45", []), 1), bus, None)
+    process._paused_ns = 300_000_000
+    process.end()
+    events = [wire.Event.FromString(payload) for payload in bus.sent["event/plant"]]
+    assert [event.code for event in events] == ["PAUSED", "END"]
+    assert events[0].text.startswith("this rig stalled for 0.30 s")
 
 
 def test_a_controller_of_another_run_moves_nothing_and_is_told() -> None:

@@ -73,7 +73,7 @@ def test_a_rig_that_cannot_be_is_further_off_than_any_other(fitter):
 
 @pytest.mark.parametrize(("left", "knees"), [(0.5, [FAR_KNEE, KNEE]), (0.99, [FAR_KNEE]), (2.0, [FAR_KNEE, KNEE])])
 def test_a_trial_ends_after_its_first_steps_where_it_gains_nothing(monkeypatch, left, knees):
-    """Not where it gains, nor where it is astray: there more steps may help. Here by stand-ins for the two stages."""
+    """It goes on where it gains, and where chi2 rises: more steps may help there. The two stages are replaced by stubs."""
     fitter, seen = Fitter.__new__(Fitter), []
     far = SimpleNamespace(chi2=left * 100.0, deviations=np.zeros(1), w=np.zeros(1))
 

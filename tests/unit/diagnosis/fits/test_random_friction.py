@@ -87,7 +87,7 @@ def test_a_load_that_goes_on_comes_in_no_bursts(rig):
 
 
 def test_bursts_are_one_sided_or_rare_and_a_load_that_goes_on_is_neither(monkeypatch):
-    """Breakaways of three kinds, of 200 slips: with a few strong ones, with many weak ones of a heavy tail, and even."""
+    """Three series of 200 breakaways: with a few strong bursts, with rare bursts of both signs, and smooth."""
     drawn = np.random.default_rng(4)
     even = np.sin(np.linspace(0.0, 60.0, 200))
     debris = np.where(drawn.random(200) < 0.1, 1.0, 0.0) + 0.05 * even
