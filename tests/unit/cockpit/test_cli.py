@@ -18,6 +18,7 @@ from cockpit.cli import app
 from cockpit.run.progress import progress_line
 from cockpit.run.run import keep_aside
 from tests.logs import doctored, short_log, verdict_of
+from tests.patience import PATIENCE_S
 
 PNG = b"\x89PNG"
 
@@ -297,3 +298,31 @@ def test_the_progress_line_has_a_bar_only_where_an_end_is_known() -> None:
     assert "  4.0 s [#####               ] " in progress_line(state, 16.0)
     assert "[" not in progress_line(state, 0.0)
     assert progress_line(state, 0.0).startswith("   4.0 s ")
+
+
+def test_a_thread_that_is_left_behind_does_not_change_the_end_of_a_command() -> None:
+    """As Python dismantles itself, a thread with the lock of stderr blocks it, and one of Arrow that frees bytes aborts it."""
+    code = """if True:
+        import io, sys, threading
+        from cockpit.entry import main
+
+        class Stuck(io.RawIOBase):
+            def writable(self):
+                return True
+
+            def write(self, _text):
+                held.set()
+                threading.Event().wait()
+
+        held = threading.Event()
+        sys.stderr = io.TextIOWrapper(io.BufferedWriter(Stuck()), write_through=True)
+        threading.Thread(target=print, args=("a line",), kwargs={"file": sys.stderr, "flush": True}, daemon=True).start()
+        held.wait()
+        sys.argv = ["stickslip", "--version"]
+        main()
+    """
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=PATIENCE_S
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.startswith("stickslip ")

@@ -6,6 +6,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from diagnosis import diagnose
 from diagnosis.processes import each
+from tests.patience import PATIENCE_S
 
 
 class _SeenError(Exception):
@@ -37,3 +38,17 @@ def test_so_have_its_workers(monkeypatch):
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         monkeypatch.setenv(name, "2")
     assert each(2, seen, None, [0, 0]) == [{1}, {1}]
+
+
+@pytest.mark.timeout(PATIENCE_S)
+def test_a_worker_that_stops_is_replaced():
+    """joblib warns of it in a thread that an error would end; `filterwarnings` in pyproject.toml lets that one pass."""
+
+    def grows(_shared: None, item: int) -> int:
+        from joblib.externals.loky import process_executor
+
+        process_executor._MEMORY_LEAK_CHECK_DELAY = -1.0
+        process_executor._MAX_MEMORY_LEAK_SIZE = -(1 << 50)
+        return item
+
+    assert each(2, grows, None, range(12)) == list(range(12))

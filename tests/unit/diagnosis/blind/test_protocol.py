@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from bridge.faults import FAULTS
 from cockpit.cli import app
+from cockpit.entry import main
 from diagnosis import diagnose_many as many
 from diagnosis.blind import sealing
 from diagnosis.blind.version import tool_version
@@ -262,7 +263,7 @@ def slow_run() -> None:
     """In another process: the command with a diagnosis whose second case never ends."""
     many.real_diagnose = slow
     sys.argv = ["stickslip", "blind", "run", sys.argv[1], "--jobs", "1"]
-    app()
+    main()
 
 
 def slow(evidence, progress, jobs, budget_s=None):
