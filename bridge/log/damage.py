@@ -19,6 +19,7 @@ class Damage(NamedTuple):
     nameless: int = 0  # messages of a channel whose definition is lost: their topic cannot be known
     missing: int = 0  # messages that the file's own count has and that were not found
     before: str = ""  # what had been lost of the log that this one was saved from, in words
+    first_bad: str = ""  # why the first message that is whole cannot be read
 
     @property
     def whole(self) -> bool:
@@ -69,7 +70,8 @@ def damage_findings(damage: Damage, path: Path) -> list[Finding]:
             )
         )
     if damage.bad_records:
-        text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense; {remedy}"
+        first = f", first: {damage.first_bad}" if damage.first_bad else ""
+        text = f"{damage.bad_records} definitions, messages or stretches of bytes make no sense{first}; {remedy}"
         found.append(Finding("damaged", path.name, text, damage.bad_records))
     if damage.nameless:
         whose = counted(damage.nameless, "message belongs", "messages belong")

@@ -137,10 +137,10 @@ class LogReader:
         """The channels of the file that is read at present, by their number."""
         return self._definitions.channels
 
-    def count_bad_messages(self, count: int) -> None:
-        """Add `count` messages that are whole but not messages of their topic to the damage."""
+    def count_bad_messages(self, count: int, why: str) -> None:
+        """Add `count` messages that are whole but not messages of their topic to the damage, and why the first of them is not."""
         if count:
-            self.damage = self.damage.and_also(bad_records=count)
+            self.damage = self.damage.and_also(bad_records=count)._replace(first_bad=self.damage.first_bad or why)
 
     def topic(self, channel_id: int) -> str | None:
         """The topic of a channel of this project; None where the channel is another program's, or its definition is lost."""

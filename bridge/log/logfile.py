@@ -66,13 +66,13 @@ def iter_pieces(reader: LogReader, only: Container[str] | None = None) -> Iterat
                 if topic not in layouts:
                     layouts[topic] = sensor_block(_samples(mine))
                 layout = layouts[topic]
-                stacked, kept = _stacked(mine, layout, "/" + topic)
-                reader.count_bad_messages(len(log_ns) - len(kept))
+                stacked, kept, why = _stacked(mine, layout, "/" + topic)
+                reader.count_bad_messages(len(log_ns) - len(kept), why)
                 yield Piece(topic, log_ns[kept], np.frombuffer(stacked, layout.dtype), [])
             else:
                 payloads = mine.payloads()
-                kept = _readable(topic, payloads)
-                reader.count_bad_messages(len(payloads) - len(kept))
+                kept, why = _readable(topic, payloads)
+                reader.count_bad_messages(len(payloads) - len(kept), why)
                 yield Piece(topic, log_ns[kept], np.empty(0), [payloads[index] for index in kept])
 
 
@@ -85,8 +85,8 @@ def _samples(messages: Messages) -> int:
     return found.most_common(1)[0][0] if found else _DEFAULT_SAMPLES
 
 
-def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt.NDArray[np.int64]]:
-    """The readable payloads with every field written and in order, [messages, size]; and which of the messages they are of."""
+def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt.NDArray[np.int64], str]:
+    """The readable payloads with all fields in order, [messages, size]; their rows; why the first other cannot be read."""
     stacked = messages.stacked
     if stacked is not None and (length := stacked.shape[1]) in layout.whole_sizes:
         if length < layout.size:  # of an older schema, without the last fields
@@ -94,26 +94,37 @@ def _stacked(messages: Messages, layout: Layout, topic: str) -> tuple[Bytes, npt
             whole[:, :length] = stacked
             stacked = whole
         if layout.all_canonical(stacked):
-            return stacked, np.arange(len(stacked))
+            return stacked, np.arange(len(stacked)), ""
     good: list[bytes] = []
     kept: list[int] = []
+    why = ""
     for index, payload in enumerate(messages.payloads()):
-        with contextlib.suppress(Fault):
+        try:
             good.append(layout.canonical(payload, topic))
             kept.append(index)
-    return np.frombuffer(b"".join(good), np.uint8).reshape(-1, layout.size), np.array(kept, np.int64)
+        except Fault as fault:
+            why = why or _without_remedy(fault)
+    return np.frombuffer(b"".join(good), np.uint8).reshape(-1, layout.size), np.array(kept, np.int64), why
 
 
-def _readable(topic: str, payloads: list[bytes]) -> list[int]:
-    """Indices of the payloads that are messages of their topic; all of them for a topic that this version does not know."""
+def _without_remedy(fault: Fault) -> str:
+    """The place and the rule of a fault: its remedy is that of a message on the bus."""
+    return fault.line.partition("; ")[0]
+
+
+def _readable(topic: str, payloads: list[bytes]) -> tuple[list[int], str]:
+    """Indices of the payloads that are messages of their topic, all for an unknown topic; why the first other cannot be read."""
     if topic not in BY_NAME:
-        return list(range(len(payloads)))
+        return list(range(len(payloads))), ""
     kept: list[int] = []
+    why = ""
     for index, payload in enumerate(payloads):
-        with contextlib.suppress(Fault):
+        try:
             parsed(BY_NAME[topic].message, payload, "/" + topic)
             kept.append(index)
-    return kept
+        except Fault as fault:
+            why = why or _without_remedy(fault)
+    return kept, why
 
 
 def block_period_ns(sensors: Records) -> float:

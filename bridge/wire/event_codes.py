@@ -160,7 +160,8 @@ EVENTS = {
             "DRIVE_DOUBTED",
             "controller",
             FAILURE,
-            "the place of the drive does not follow slide and force: it jumped, or has another unit. Nothing vibrates until "
+            "the drive position does not follow slide and force: it jumped, froze or has another unit, or the force is at the "
+            "end of its range. Look at the encoder; where the force clips, use a larger range. Nothing vibrates until "
             "`stickslip reset`",
         ),
         EventCode(

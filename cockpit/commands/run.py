@@ -38,7 +38,10 @@ def run(
     insecure: Insecure = False,
     lockstep: Lockstep = False,
     in_process: Annotated[
-        bool, typer.Option("--in-process", help="Lockstep in one process, without a bus: fastest.")
+        bool,
+        typer.Option(
+            "--in-process", help="Lockstep in one process, without a bus: fastest. With faults 0.4 s a second."
+        ),
     ] = False,
     log: LogFile = None,
     wait: Wait = None,

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 from bridge.log.check.channel import Channel, channels_of
 from bridge.log.metadata import is_number
 
-# Share of the larger of force and spring by which they may differ. Smaller: a stiffness that is described 30 % wrong is doubted;
-# larger: a force sensor that shows a half or the double, 0.5, passes. With effects that bend the relation, and for a rig that is
-# not described, of whose stiffness the controller may have a tenth, the sign alone counts.
+# Largest difference of force and spring, as a share of the larger. Smaller: a stiffness that is described 30 % wrong is doubted;
+# larger: a force sensor of half or twice the scale, 0.5, passes. With effects that bend the relation, and for a rig without a
+# description, of whose stiffness the controller may know a tenth, only the sign counts.
 _APART, _APART_SIGN = 0.4, 1.05
 _BENT = {"drive-hardening", "frame-compliance", "drive-damping", "force-sensor-lag", "drive-backlash"}
 
@@ -18,21 +18,21 @@ class Described(NamedTuple):
     """Of a rig and its controller; NaN for a number that is not known."""
 
     channels: dict[str, Channel]
-    stiffness_N_per_m: float  # of the drive, as the force sensor shows it; without a rig, as the controller is told
+    stiffness_N_per_m: (
+        float  # of the drive, as the force sensor shows it; without a rig, as the controller is configured
+    )
     apart: float  # share by which force and spring may differ
     drop_N: float  # F_s - F_c
-    slip_m: float  # way of a slip, 2 (F_s - F_c) / k_d
+    slip_m: float  # length of a slip, 2 (F_s - F_c) / k_d
     mass_kg: float  # of the slide
     contact_per_s2: float  # stiffness of the contact over the mass
     uses_force: bool  # the verdict rests on it: the controller uses it, or the rig is described and has it
     uses_slide: bool
-    enabled_from_s: float
-    v_ratio: float  # set point of v_a / v_d
-    most_ratio: float  # to which the controller may raise it, after slips in spite of the vibration
+    accel_bandwidth_Hz: float  # for which the controller corrects v_a; infinite where it is not known
 
 
 def described(plant: Mapping[str, Any] | None, controller: Mapping[str, Any] | None) -> Described:
-    """From the configurations in a log; None for one that it does not hold."""
+    """From the configurations in a log; None for a missing one."""
     tables = {"rig": (plant or {}).get("rig"), "controller": controller}
 
     def number(path: str, otherwise: float = math.nan) -> float:
@@ -59,9 +59,7 @@ def described(plant: Mapping[str, Any] | None, controller: Mapping[str, Any] | N
         contact_per_s2=number("rig.contact.stiffness_N_per_m") / mass_kg,
         uses_force=k_d > 0.0 or _at(tables, "controller.estimator.use_force") is not False,
         uses_slide=k_d > 0.0 or _at(tables, "controller.estimator.use_slide_position") is not False,
-        enabled_from_s=number("controller.policy.enabled_from_s", 0.0),
-        v_ratio=number("controller.limits.v_ratio"),
-        most_ratio=number("controller.policy.most_ratio"),
+        accel_bandwidth_Hz=number("controller.amplitude.accel_bandwidth_Hz", math.inf),
     )
 
 

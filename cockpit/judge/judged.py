@@ -4,10 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from bridge.faults import Fault
 from bridge.log.check.log_check import LogCheck, feed
 from bridge.log.log_reader import LogReader
 from bridge.log.logfile import RunData, check_log_file
 from cockpit.judge.run_judge import RunJudge
+from cockpit.judge.setup import is_known
 from cockpit.judge.verdict import RunVerdict
 from diagnosis.features.cycles import Cycles
 
@@ -40,6 +42,9 @@ def judge_log(
     reader = LogReader(path)
     judge = RunJudge(path, reader.metadata, margins=margins, stretch_from_s=stretch_from_s)
     chain = feed(reader, judge, progress)
+    if not (reader.damage.closed or is_known(reader.metadata)):
+        line = f"{path}: is cut after {reader.size_bytes} bytes, before the configuration of the controller: cannot be judged"
+        raise Fault("BAD_LOG", f"{line}; `stickslip log check {path}` lists its messages; record the run again")
     verdict = judge.result(reader.damage, chain, reader.foreign)
     return Judged(verdict, judge.log.result(reader, chain), judge)
 

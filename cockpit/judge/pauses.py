@@ -13,37 +13,37 @@ from cockpit.judge.watches import LatencyWatch
 from cockpit.judge.window import Window
 
 Times = npt.NDArray[np.floating[Any]] | npt.NDArray[np.int64]
-# A process that is later than this stalled. Smaller: the scheduling of every busy desktop, 1 to 3 ms, counts; larger: stalls go
-# unseen in which the rig falls back. One of up to 16 ms loses nothing.
+# Lateness of a process from which it stalled. Smaller: the scheduling of every busy desktop, 1 to 3 ms, counts; larger: stalls
+# are missed in which the rig falls back. A stall of up to 16 ms loses nothing.
 _STALL_NS = 5_000_000
-_MOST_OF_A_ROW = 1 << 16  # late commands of one block that are looked at; only bytes that are wrong tell of more
+_MOST_OF_A_ROW = 1 << 16  # late commands of one block that are counted: more are damaged bytes
 
 
 class Pauses(NamedTuple):
-    """How often every core of the computer stalled at the same time, as the recorder watched it, and what was late then."""
+    """Stalls of every core at the same time, as the recorder saw them, and the commands that were late in them."""
 
     number: int
     total_ms: float
     longest_ms: float
     late_inside: int  # commands later than 1 ms while a stall was between their block and the plant
     late_outside: int  # all other late ones
-    late_one_core: int  # of these such while one core stalled alone, which nothing of the loop's priority does
+    late_one_core: int  # those of `late_outside` while one core stalled alone, not because of the loop's priority
     within_1_ms_outside: float  # share of the commands that no stall held up
 
 
 class Computer(NamedTuple):
-    """Stalls as anybody saw them: the recorder's watch, the plant that was late, the controller that was."""
+    """Stalls that the recorder saw, and lateness of plant and controller."""
 
     stalls: int
     longest_ms: float
     whose: str  # plant, controller, or every core; empty where nothing was late
-    at_s: float  # when the longest began, or was seen
+    at_s: float  # begin of the longest
 
 
 class CommandSum:
-    """Which late commands a stall held up, gathered window by window from the plant's own account of each block.
+    """The late commands that a stall held up, window by window, from the plant's row of each block.
 
-    A row of it tells how many commands came before its block, how many of them were late, and which block the newest answers.
+    A row has the number of commands before its block, the number of late ones, and the block that the newest command answers.
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class CommandSum:
         self._inside = self._one_core = 0
 
     def add(self, window: Window, block_ns: float, pauses: Sequence[RunPause], one_core: Sequence[RunPause]) -> None:
-        """The rows of a window that are to be judged, with the stalls that are known."""
+        """Take the rows of a window that are to be judged, with the known stalls."""
         applied = window.applied[window.own(window.applied)]
         if not len(applied):
             return
@@ -60,7 +60,7 @@ class CommandSum:
         self._newest = int(newest[-1])
         late = np.minimum(applied["commands_late"], _MOST_OF_A_ROW)
         row, first = np.repeat(np.arange(len(applied)), late), np.repeat(np.cumsum(late) - late, late)
-        # of the commands of a row the oldest are late; a stale one answers the newest block again
+        # the oldest commands of a row are late; a stale command answers the newest block again
         block = np.minimum(before[row] + 1 + np.arange(len(row)) - first, newest[row])
         due_ns, came_ns = np.round((block + 1) * block_ns), applied["t_ns"][row] + applied["late_ns"][row]
         inside = _held_up(due_ns, came_ns, pauses)
@@ -68,7 +68,7 @@ class CommandSum:
         self._one_core += int(np.count_nonzero(_held_up(due_ns, came_ns, one_core) & ~inside))
 
     def result(self, latency: LatencyWatch, pauses: Sequence[RunPause], end_ns: int) -> Pauses:
-        """Of all the commands, with the stalls of every core up to the end of the run."""
+        """The sums, with the stalls of every core up to the end of the run."""
         lengths_ms = [(pause.until_ns - pause.from_ns) * 1e-6 for pause in pauses if pause.from_ns < end_ns]
         outside = latency.late - self._inside
         return Pauses(
@@ -85,12 +85,12 @@ class CommandSum:
 def _held_up(due_ns: Times, came_ns: Times, pauses: Sequence[RunPause]) -> npt.NDArray[np.bool_]:
     """Commands that stalls held up for at least half of their delay, [commands].
 
-    Half, as the work that a stall leaves behind takes its time as well. A stall is reported up to a period of its timer short.
+    Half, as the work that a stall leaves behind takes time as well. A stall is reported up to one timer period too short.
     """
     if not pauses or not len(due_ns):
         return np.zeros(len(due_ns), bool)
     from_ns, until_ns = np.array(pauses, np.float64).T
-    until_ns = np.maximum.accumulate(until_ns)  # those of two cores may overlap
+    until_ns = np.maximum.accumulate(until_ns)  # stalls of two cores may overlap
     from_ns = np.maximum(from_ns, np.concatenate([from_ns[:1], until_ns[:-1]]))
     edges_ns = np.column_stack([from_ns, np.maximum(from_ns, until_ns)]).ravel()
     paused_ns = np.cumsum(np.diff(edges_ns, prepend=edges_ns[:1]) * (np.arange(len(edges_ns)) % 2))
@@ -99,15 +99,15 @@ def _held_up(due_ns: Times, came_ns: Times, pauses: Sequence[RunPause]) -> npt.N
 
 
 class StallSum:
-    """Stalls from all who saw one: overlapping ones are one."""
+    """Stalls of cores, plant and controller; overlapping stalls count once."""
 
     def __init__(self) -> None:
         self._stalls = 0
         self._until_ns = np.iinfo(np.int64).min  # end of the latest
-        self._longest = (0, 0, "")  # length, begin, and who saw it
+        self._longest = (0, 0, "")  # length [ns], begin [ns], whose
 
     def add(self, window: Window, pauses: Sequence[RunPause]) -> None:
-        """Those of a window that are to be judged."""
+        """Take the stalls of a window that are to be judged."""
         from_ns, until_ns = window.own_ns
         seen = [("every core", *pause) for pause in pauses if from_ns <= pause.from_ns < until_ns]
         for whose, rows, name in (("plant", window.applied, "late_ns"), ("controller", window.trace, "lateness_ns")):
@@ -124,7 +124,7 @@ class StallSum:
                 self._until_ns = max(self._until_ns, end_ns)
 
     def result(self) -> Computer:
-        """All of it."""
+        """The sums."""
         length_ns, at_ns, whose = self._longest
         return Computer(self._stalls, length_ns * 1e-6, whose, at_ns * 1e-9)
 

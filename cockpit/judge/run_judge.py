@@ -1,9 +1,10 @@
 """The judge of a run: messages in, piece by piece, in the order of the log; at the end the verdict.
 
-It is a composition of watches, each with a method for every topic that it looks at, and of sums over windows. One that looks at
-messages goes into `_watches`, one that needs blocks and steps together into `_judge_window`.
+It is a composition of watches, each with a method for every topic that it reads, and of sums over windows. A watch of messages
+goes into `_watches`, a sum over blocks and steps into `_judge_window`.
 """
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
     from cockpit.judge.margins import Margins, MarginSum
 
 _COUNTED_ELSEWHERE = {"NOT_FINITE", "DRIVE_UNSEEN", *WEAK_REASONS}  # from the blocks and steps themselves
+_LETTER = re.compile(
+    r"(^|: )[FCSM]: "
+)  # of NAMUR NE 107, before the help of a cause: the line is a trip or a warning already
 _OF_EVERY_BLOCK = ("applied", "command", "trace")
 _CONTROLLED = tuple(name for name in CHANNELS if name != "mass_accel_mps2")  # channels that the controller works with
 
@@ -51,7 +55,7 @@ class RunJudge:
         path: of its log.
         headers: the tables of the log, which may be filled while it is read.
         margins: of the amplitude loop are wanted.
-        stretch_from_s: a stretch from here to the end is wanted besides, whoever is in charge.
+        stretch_from_s: begin of a further stretch, up to the end, whoever is in charge.
 
     """
 
@@ -148,7 +152,7 @@ class RunJudge:
         plant = configuration_of(self._headers, "plant", self._path) if "plant" in self._headers else None
         of = described(plant, configuration_of(self._headers, "controller", self._path))
         self._sensor_watch = SensorWatch(of, self.log, self._frozen, setup.block_s)
-        self._ratio = RatioWatch(of, setup.block_s)
+        self._ratio = RatioWatch(setup)
         if self._stretch_from_s is not None:
             self._phases["stretch"] = PhaseSum(self._stretch_from_s, np.inf)
 
@@ -193,7 +197,7 @@ class RunJudge:
         return [stretch for stretch in self._fallbacks() if stretch[1] - stretch[0] > GONE_S]
 
     def _without(self, setup: Setup, is_last: bool) -> Stretches:
-        """What is no part of the controller's time: it has a second to settle after it was stopped, or was not there."""
+        """Stretches that do not count as the controller's: stops, fallbacks and stalls, with a second to settle after each."""
         return [*self._steps.stops(setup.block_s, is_last), *_settling([*self._fallbacks(), *self._steps.stale])]
 
     def result(self, damage: Damage, chain: Chain, foreign: dict[str, int]) -> RunVerdict:
@@ -227,7 +231,9 @@ class RunJudge:
         watch = self._sensor_watch
         slips_s = self.cycles.breakaway_t_s if self.cycles is not None else np.empty(0)
         counted_s = apart((settled_s, seconds), self._without(setup, is_last=True))
-        why, disarmed = untested(setup, self._steps, seconds, self._answered, after, in_charge_s), self._disarmed()
+        unreadable = damage.first_bad if damage.first_bad.startswith("/sensors") else ""
+        why = untested(setup, self._steps, seconds, unreadable, self._answered, after, in_charge_s)
+        disarmed = self._disarmed()
         return RunVerdict(
             log=str(self._path),
             seconds=seconds,
@@ -238,6 +244,7 @@ class RunJudge:
             all_losses_known=all_known and not planned_s,
             absent=[name for name in _OF_EVERY_BLOCK if not (setup.imported or self.log.topics[name].messages)],
             controller_missed=self._steps.missed,
+            misses_known=self._misses_known(),
             enabled_from_s=enabled_s,
             stopped_s=stopped_s,
             charge=charge,
@@ -294,9 +301,9 @@ class RunJudge:
         return int(np.count_nonzero(within(at_s, stretches) & ~within(at_s, without)))
 
     def _lost_blocks(self, damage: Damage) -> tuple[int, bool]:
-        """Blocks that are not in the log, and whether it tells of all.
+        """Blocks that are missing in the log, and whether their number is known.
 
-        A damaged chunk may hold the first blocks or the last ones: then the plant's END counts, which says how many there were.
+        A damaged chunk may hold the first or the last blocks: then the number in the plant's END counts.
         """
         watch, whole = self.log.topics["sensors"], damage.whole and not damage.before
         if self.log.events.blocks_sent is None:
@@ -308,10 +315,15 @@ class RunJudge:
         """Blocks after the last one in the log, by the plant's END."""
         return max((self.log.events.blocks_sent or 0) - self.log.topics["sensors"].end, 0)
 
+    def _misses_known(self) -> bool:
+        """Whether the log has every step of the controller, up to the last block: only the step after a gap names it."""
+        last = max(self.log.topics["sensors"].end, self.log.events.blocks_sent or 0) - 1
+        return self.log.topics["trace"].missing == 0 and self._steps.last_block >= last
+
     def _lines(
         self, charge: InCharge, damage: Damage, chain: Chain, foreign: dict[str, int]
     ) -> tuple[list[str], list[str]]:
-        """What harms the run or its log, and what else is of interest; one line for all events of one code of one source."""
+        """Events and findings that harm the run or its log, and others; one line for all events of one code of one source."""
         faults: list[str] = []
         told: list[str] = []
         counts, listed = self.log.events.counts, set[tuple[str, str]]()
@@ -321,7 +333,7 @@ class RunJudge:
                 continue
             listed.add(key)
             many = f" (the first of {counts[key]})" if counts[key] > 1 else ""
-            text = self._open_loop(event) if event.code == "OPEN_LOOP" else event.text
+            text = _LETTER.sub(r"\1", self._open_loop(event) if event.code == "OPEN_LOOP" else event.text)
             (faults if harms(event.code) else told).append(f"{event.code}: {text}{many}")
         told += foreign_in_words(foreign)
         for code, text, is_fault in charge.sentences():

@@ -1,6 +1,6 @@
-"""Whether the sensors of a run can carry a verdict: dead, clipped, swapped and absent channels, and three witnesses of slips.
+"""Whether the sensors of a run can carry a verdict: dead, clipped, swapped and absent channels, and three counts of slips.
 
-The memory does not grow but for the times of slips. A check makes no statement where it has nothing to compare.
+Only the times of slips grow with the run. A check without signals to compare has no finding.
 """
 
 import math
@@ -22,15 +22,14 @@ from cockpit.judge.window import Window
 Floats = npt.NDArray[np.floating[Any]]
 
 _FROZEN_S = 0.1  # of blocks that repeat. Larger: a shorter failure passes; smaller: a doubled block counts
-# Share of samples that are no numbers, from which a channel cannot carry a verdict. Larger: more is left out unseen; smaller: a
-# single dropout of a long run takes its verdict.
+# Share of samples that are no finite number, above which a channel cannot carry a verdict. Larger: slips may hide in these
+# samples; smaller: a long run is not judged because of one dropout.
 _NOT_FINITE_SHARE = 1e-3
-_SIGMAS = 10.0  # of noise in a fall that counts as a slip, as in `diagnosis.features.cycles`, whose value this is
 _CODES = {"not-finite": "SENSOR_ABSENT", "dead": "SENSOR_DEAD", "clipped": "SENSOR_CLIPPED"}
 
 
 class SensorVerdict(NamedTuple):
-    """What the sensors say of themselves."""
+    """Findings on the sensors, and three counts of slips."""
 
     findings: list[Doubt]
     by_force: int  # slips in the judged stretches
@@ -44,27 +43,29 @@ class SensorVerdict(NamedTuple):
 
 
 class SensorWatch:
-    """Looks at the channels of one log, at their blocks that repeat, and window by window at slips and relations."""
+    """Checks the channels of one log, their blocks that repeat, and window by window slips and relations."""
 
     def __init__(self, of: Described, log: LogWatch, frozen: FrozenWatch, block_s: float) -> None:
         self._of, self._log, self._frozen = of, log, frozen
         self._relations = Relations(of, block_s)
-        self._least_m = 0.0  # the smallest fall of drive less slide that counted in every window
+        self._least_N = self._least_m = (
+            0.0  # the smallest falls of force and of drive less slide that count in every window
+        )
         self._slips_s: dict[str, list[Floats]] = {"position": [], "slips": [], "surges": []}
 
     def add(self, window: Window, forces: Forces) -> None:
         """Take a window with its slips by force and by position."""
         self._relations.add(window)
-        self._least_m = max(self._least_m, forces.least_m)
+        self._least_N, self._least_m = max(self._least_N, forces.least_N), max(self._least_m, forces.least_m)
         self._slips_s["position"].append(forces.by_position_s)
         trace, own = window.trace, window.own(window.trace)
         for name in ("slips", "surges"):
-            # a controller that begins again counts from 0
+            # a restarted controller counts from 0
             more = np.maximum(np.diff(trace[name], prepend=trace[name][:1]), 0)
             self._slips_s[name].append(np.repeat(trace["t_ns"][own] * 1e-9, more[own]))
 
     def result(self, force_slips_s: Floats, judged: Stretches) -> SensorVerdict:
-        """All of it, at the end of the log, with the times of the slips in the force; `judged`: when slips count."""
+        """The findings at the end of the log, with the times of the slips in the force; `judged`: when slips count."""
         of = self._of
         findings = [doubt for name in CHANNELS for doubt in self._of_channel(name)]
         broken = [doubt.text.partition(" ")[0] for doubt in findings]
@@ -73,14 +74,15 @@ class SensorWatch:
         slips_s["force"] = force_slips_s
         whole = {name: len(at_s) for name, at_s in slips_s.items()}
         inside = {name: int(within(at_s, judged).sum()) for name, at_s in slips_s.items()}
-        # surges at stops and turns are no witness, and the controller alone counts up to 7 slips in the bank where there is none
+        # not by surges, which come at stops and turns as well; nor by the controller alone, which counts up to 7 false slips in
+        # the bank
         if of.uses_force and any(not by["force"] and by["position"] and by["slips"] for by in (inside, whole)):
             text = "{force} by drive_force_N, {position} by the positions and {slips} by the controller"
-            text = f"slips where the controller is judged: {text.format(**inside)}; in the whole log: {text.format(**whole)}"
+            text = f"slips with the controller in charge: {text.format(**inside)}; in the whole log: {text.format(**whole)}"
             findings.append(Doubt("SLIPS_DISAGREE", text, True))
-        fall_N, noise_N = 2.0 * of.drop_N, self._relations.noise_N
-        if of.uses_force and of.slip_m > 0.0 and fall_N < _SIGMAS * noise_N < math.inf:
-            text = f"drive_force_N has noise of {noise_N:.3g} N in 1 ms, in which a slip of {fall_N:.3g} N is not seen"
+        fall_N = 2.0 * of.drop_N
+        if of.uses_force and of.slip_m > 0.0 and fall_N < self._least_N < math.inf:
+            text = f"drive_force_N shows only falls above {self._least_N:.3g} N, and a slip is {fall_N:.3g} N: use less noise"
             findings.append(Doubt("SENSOR_NOISE", text, True))
         by_position = inside["position"] if self._least_m < of.slip_m or whole["position"] else None
         by_trace = inside["slips"] + inside["surges"]
@@ -100,12 +102,12 @@ class SensorWatch:
         return found
 
     def _decides(self, name: str) -> bool:
-        """Whether a verdict rests on a channel."""
+        """Whether the verdict rests on a channel."""
         return {
             "drive_force_N": self._of.uses_force,
             "mass_position_m": self._of.uses_slide,
             "drive_position_m": True,
             "base_accel_mps2": self._relations.vibrated,
-            # by it the controller knows accelerometers that are swapped
+            # the controller finds swapped accelerometers by it
             "mass_accel_mps2": math.isfinite(self._of.channels["mass_accel_mps2"].noise),
         }[name]

@@ -1,4 +1,4 @@
-"""What the judge needs to know of a run before it can judge a block of it: from the configurations in its log."""
+"""The numbers that the judge needs before the first block, from the configurations in the log."""
 
 import math
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from bridge.log.metadata import Metadata, configuration_of, is_number, number_of, source_of_import, texts_of
 
-SETTLING_S = 1.0  # after the controller is enabled, was stopped or was not there, it has this long
+SETTLING_S = 1.0  # time to settle after the controller is enabled, was stopped or was gone
 
 
 class Setup(NamedTuple):
@@ -18,31 +18,33 @@ class Setup(NamedTuple):
     slowest_fall_s: float  # of a slip
     absent: list[str]  # channels that the file of another program did not hold; they are zeros in its log
     known_gain: bool  # of the exciter, by the configuration
-    duration_s: float  # of the whole run, by the plant's configuration; 0: it has no end, or another rig does not tell
+    v_ratio: float  # configured set point of v_a / v_d; infinite where it is not known
+    duration_s: float  # of the whole run, by the plant's configuration; 0: without an end, or not known
 
     @property
     def settled_from_s(self) -> float:
-        """From when on the controller is judged."""
+        """Time from which the controller is judged."""
         return settled_from_s(self.enabled_from_s)
 
 
 def settled_from_s(enabled_from_s: float) -> float:
-    """From when on a controller that is enabled then is judged."""
+    """Time from which a controller is judged that is enabled at `enabled_from_s`."""
     return enabled_from_s + SETTLING_S if enabled_from_s > 0 else 0.0
 
 
 def is_known(headers: Metadata) -> bool:
-    """Whether the tables of a log that were read so far tell how to judge it."""
+    """Whether the tables of a log that were read so far suffice to judge it."""
     return "import" in headers or "controller" in headers
 
 
 def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
-    """Of a log; `period_ns` of its blocks counts where no controller tells it. Raises Fault BAD_LOG."""
+    """Of a log; `period_ns` of its blocks counts without a controller. Raises Fault BAD_LOG."""
     absent = absent_channels(headers, path)
     plant = configuration_of(headers, "plant", path) if "plant" in headers else {}
     if source := source_of_import(headers, path):
-        return Setup(source, period_ns * 1e-9, math.inf, _slowest_fall_s(plant), absent, True, 0.0)
+        return Setup(source, period_ns * 1e-9, math.inf, _slowest_fall_s(plant), absent, True, math.inf, 0.0)
     controller = configuration_of(headers, "controller", path)
+    v_ratio = controller.get("limits", {}).get("v_ratio")
     return Setup(
         imported="",
         block_s=number_of(controller, "block_s", path),
@@ -50,6 +52,7 @@ def setup_of(headers: Metadata, path: Path, period_ns: float) -> Setup:
         slowest_fall_s=_slowest_fall_s(plant),
         absent=absent,
         known_gain=bool(controller.get("amplitude", {}).get("known_gain")),
+        v_ratio=v_ratio if is_number(v_ratio) else math.inf,
         duration_s=plant["duration_s"] if is_number(plant.get("duration_s")) else 0.0,
     )
 

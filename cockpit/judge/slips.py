@@ -24,9 +24,8 @@ from diagnosis.features.cycles import Cycles, find_cycles, smallest_drop_N
 Floats = npt.NDArray[np.floating[Any]]
 
 BIN_S = 1e-3  # of means, as slips are found in
-_BESIDE_S = (
-    0.02  # before and after a fall, in which the drive's velocity is looked at, and in which no block may be missing
-)
+# Before and after a fall: the drive's velocity there decides, and no block may be missing there.
+_BESIDE_S = 0.02
 _STOPS = 0.5  # of the drive's velocity before the fall
 # Velocity of the slide over the drive's, mean from 10 to 90 % of a fall: that of a sine whose peak is the 1.5 v_d of a slip.
 _RUNS_AHEAD = 1.4
@@ -45,6 +44,7 @@ class Forces(NamedTuple):
     end: int  # row after the last of the window: where the drive turns, if it does
     turned: bool
     stroke: int  # number of the stroke that begins, or goes on, at `end`
+    least_N: float  # the smallest fall of the force that counts; infinite where no force is known
     by_position_s: Floats  # times of the slips in drive less slide, by the rule of the force
     least_m: float  # the smallest fall of drive less slide that counts; infinite where a position is not known
 
@@ -63,8 +63,9 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
         nothing = np.empty(0)
         none = np.empty(0, np.int64)
         return Forces(
-            _NONE, np.empty(0, bool), nothing, nothing, none, none, window.end, False, window.stroke, nothing, math.inf
-        )
+            _NONE, np.empty(0, bool), nothing, nothing, none, none, window.end, False, window.stroke,
+            math.inf, nothing, math.inf,
+        )  # fmt: skip
     blocks = blocks.part(usable) if len(usable) < len(finite) else blocks
     force_N = blocks.force_N.astype(np.float64)
     samples, bins = force_N.shape[1], blocks.drive_m.shape[1]
@@ -115,6 +116,7 @@ def forces_of(window: Window, setup: Setup, moved: Moved) -> Forces:
         end,
         turned,
         window.stroke - present + next(goes_on, present),
+        drop_N,
         np.concatenate(by_position_s),
         least_m,
     )

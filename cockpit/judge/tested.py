@@ -1,4 +1,4 @@
-"""Whether a run tests its controller at all: why not, in words."""
+"""Why a run does not test its controller, in words."""
 
 from collections.abc import Mapping
 
@@ -8,14 +8,21 @@ from cockpit.judge.watches import StepWatch
 
 
 def untested(
-    setup: Setup, steps: StepWatch, seconds: float, answered: bool, after: Phase | None, in_charge_s: float
+    setup: Setup,
+    steps: StepWatch,
+    seconds: float,
+    unreadable: str,
+    answered: bool,
+    after: Phase | None,
+    in_charge_s: float,
 ) -> str:
-    """Why nothing was tested, in words; empty where something was.
+    """Why nothing was tested; empty where something was.
 
     Args:
         setup: of the run.
         steps: of the controller.
         seconds: end of the last block; 0 without any.
+        unreadable: why the first block that cannot be read cannot; empty where all can.
         answered: whether a block has a fresh command.
         after: the stretch in which the controller is judged.
         in_charge_s: time of the controller, its settling too.
@@ -24,7 +31,11 @@ def untested(
     if setup.imported:
         return "measured data of another program: no controller was there to be judged"
     if not seconds:
-        return "no block was recorded"
+        return (
+            f"no block can be read: {unreadable}; every block must hold all channels"
+            if unreadable
+            else "no block was recorded"
+        )
     if not steps.steps:
         return "no step of a controller was recorded: nothing was tested"
     if not steps.armed:
@@ -38,13 +49,13 @@ def untested(
     if in_charge_s <= 0.0 or not answered:
         return "the controller was not in charge in this run"
     why = f"too short to judge: it has {SETTLING_S:g} s to settle"
-    if in_charge_s > SETTLING_S:  # the force is no number, or stops and stalls left it no second to settle in
-        why = "but nothing there can be judged"
+    if in_charge_s > SETTLING_S:  # its force is no number, or stops and stalls left no second to settle in
+        why = "but none of it can be judged"
     return f"the controller was in charge for {in_charge_s:.2g} s, {why}"
 
 
 def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: float) -> str:
-    """Why the motion with the controller in charge shows nothing; empty where a slip would have come in it."""
+    """Why the motion with the controller in charge is too short to show a slip; empty where it is long enough."""
     if after is None:
         return ""
     moving_s, before = phases["after"].moving * block_s, phases["before"]
@@ -52,5 +63,5 @@ def too_little(after: Phase | None, phases: Mapping[str, PhaseSum], block_s: flo
         return f"the drive did not move in the {after.seconds:.2g} s with the controller in charge"
     if before.slips and moving_s < (period_s := before.moving * block_s / before.slips):
         line = f"the drive moved for {moving_s:.2g} s with the controller in charge"
-        return f"{line}: must be {period_s:.2g} s at least, in which a slip came before"
+        return f"{line}: must be {period_s:.2g} s, the time of a slip before; make the run longer"
     return ""

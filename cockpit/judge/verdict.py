@@ -1,4 +1,4 @@
-"""What came of a run, in numbers, and whether the controller did its work."""
+"""The figures of a run, and whether control is ok, not ok or not judged."""
 
 from typing import Any, NamedTuple
 
@@ -31,10 +31,11 @@ class RunVerdict(NamedTuple):
     planned_s: float  # of a run whose log ends before, and without the plant's END; 0 for any other
     blocks: int
     lost_blocks: int
-    lost_messages: int  # at least: of blocks alone it is known how many there were
+    lost_messages: int  # at least: only the number of blocks is known for certain
     all_losses_known: bool  # False: a log that is cut or damaged may lack more than it shows
     absent: list[str]  # topics of every block that have no message in the log
     controller_missed: int  # blocks that never came to the controller, by its own count
+    misses_known: bool  # False: the log lacks steps of the controller, which may have missed more blocks
     enabled_from_s: float
     stopped_s: float  # by an operator, and no part of `after`
     charge: InCharge  # when the rig was on its own, which is no part of `after` either, and blocks without an answer
@@ -54,10 +55,10 @@ class RunVerdict(NamedTuple):
     latency: Latency | None
     late_commands: int  # that took more than 1 ms
     pauses: Pauses | None  # of every core of the computer; None in lockstep, and where they were not watched
-    computer: Computer | None  # stalls that anybody saw; None in lockstep
+    computer: Computer | None  # all stalls; None in lockstep
     not_watched: str  # why the computer's stalls are not known; empty where they are, and in lockstep
     faults: list[str]  # events and findings that harm the run, or its log
-    told: list[str]  # what else is of interest
+    told: list[str]  # other events
     chain: Chain
     normal_scheduling: list[str]  # processes without a real-time priority; in lockstep none needs it
     untested: str  # why nothing was tested; empty where the drive moved with the controller in charge
@@ -77,8 +78,9 @@ class RunVerdict(NamedTuple):
 
     @property
     def cut(self) -> str:
-        """Where the log ends, in words, if that is before the run did; else empty."""
-        return f"the log ends at {self.seconds:.2f} of {self.planned_s:.2f} s" if self.planned_s else ""
+        """Where the log ends, in words, if that is before the end of its run; else empty."""
+        ends = f"the log ends at {self.seconds:.2f} s, the run was to end at {self.planned_s:.2f} s"
+        return ends if self.planned_s and self.blocks else ""
 
     @property
     def good(self) -> bool:
@@ -112,7 +114,7 @@ class RunVerdict(NamedTuple):
         return 0 if self.good else 1
 
     def losses(self) -> list[str]:
-        """What was lost or late on the way, in words; what an acceptance test does not allow."""
+        """Lost and late messages in words: an acceptance test allows none."""
         counts = (
             (self.lost_messages, "message lost in the log", "messages lost in the log"),
             (self.controller_missed, "block missed by the controller", "blocks missed by the controller"),
@@ -125,7 +127,7 @@ class RunVerdict(NamedTuple):
 
     def _judged(self) -> tuple[str, str]:
         if self.imported:
-            return NOT_JUDGED, "measured data of another program: no controller was there"
+            return NOT_JUDGED, self.untested
         wrong = self._who_failed()
         if not wrong and (self.untested or self.after is None):
             return NOT_JUDGED, self.untested
@@ -139,19 +141,19 @@ class RunVerdict(NamedTuple):
             if self.unsure_slips
             else []
         )
-        cut = [f"{self.cut} and does not say why; record the run again"] if self.cut else []
+        cut = [f"{self.cut}; record the run again"] if self.cut else []
         absent = [f"no message of /{name} is in the log" for name in self.absent]
         doubts = [*cut, *blind, *absent, *self.doubts, *unsure]
         return (NOT_JUDGED, "; ".join(doubts)) if doubts else (OK, "")
 
     @property
     def blind(self) -> list[str]:
-        """Sensors that a verdict rests on and that cannot carry one."""
+        """Findings on sensors on which the verdict rests."""
         findings = self.sensors.findings if self.sensors is not None else []
         return [f"{finding.code}: {finding.text}" for finding in findings if finding.decides]
 
     def _who_failed(self) -> list[str]:
-        """What no sensor of the axis is needed for: a controller that was gone, trips, a vibration without effect."""
+        """Failures that need no sensor of the axis: a controller that was gone, trips, a vibration without effect."""
         if self.alone is not None:
             held_s = max(self.seconds - self.enabled_from_s - self.stopped_s - self.alone.seconds, 0.0)
             gone = ", then it was gone" if self.charge.controller_until_s is not None else ""
@@ -160,7 +162,7 @@ class RunVerdict(NamedTuple):
         return [*wrong, *(name for name, seconds in self.charge.reasons_s.items() if seconds > WEAK_S)]
 
     def _figures_that_fail(self) -> list[str]:
-        """What the sensors show: slips, and far more vibration than is needed."""
+        """Failures that the sensors show: slips, and far more vibration than is needed."""
         wrong: list[str] = []
         if self.after is not None and self.after.slips > self.unsure_slips:
             wrong.append(f"{counted(self.after.slips, 'slip')} with the controller in charge")

@@ -3,7 +3,6 @@
 import math
 from typing import Any
 
-from bridge.log.in_charge import WEAK_S
 from bridge.log.storage.chain import chain_in_words
 from bridge.units import counted
 from bridge.wire import realtime
@@ -101,18 +100,20 @@ def _figures(verdict: RunVerdict) -> list[str]:
 
 
 def strictly(verdict: RunVerdict, strict: bool) -> list[str]:
-    """A line with what an acceptance test does not allow; none where it asks for nothing more, or all is there."""
+    """A line with the losses that an acceptance test does not allow; none without `strict` or without losses."""
     losses = verdict.losses() if strict and verdict.exit_status(strict=False) != 1 else []
     return [f"strict   not ok: {', '.join(losses)}"] if losses else []
 
 
 def data_in_words(verdict: RunVerdict) -> str:
-    """What of the run is in the log, and whether the controller had what is not."""
+    """How much of the run is in the log, and whether the controller had the missing blocks."""
     v = verdict
-    total, missed = v.blocks + v.lost_blocks, f"the controller missed {v.controller_missed}"
+    total = v.blocks + v.lost_blocks
+    missed = f"the controller missed {'' if v.misses_known else 'at least '}{v.controller_missed}"
     parts = [f"{v.seconds:.2f} of {v.planned_s:.2f} s; the rest is not in the log"] if v.planned_s else []
     if v.lost_blocks:
-        had = missed if v.controller_missed else "the controller had them all"
+        had = "the controller had them all" if v.misses_known else "not known whether the controller had them"
+        had = missed if v.controller_missed else had
         few = "" if v.all_losses_known else "at least "
         parts.append(f"{few}{v.lost_blocks} of {total} blocks missing in the log{'' if v.imported else f' ({had})'}")
     else:
@@ -180,7 +181,7 @@ def _um(size_m: float) -> str:
 
 
 def noted(verdict: RunVerdict) -> dict[str, Any]:
-    """The fields of the table `verdict` in a log: what came of the run, as its end was judged."""
+    """The fields of the table `verdict` in a log."""
     apart = "log", "chain", "good", "headline"  # the first two change when the file is moved, or written again
     figures = {name: value for name, value in verdict.as_dict().items() if name not in apart}
     return {"good": verdict.good, "headline": headline(verdict), "figures": figures}
@@ -199,22 +200,19 @@ def _answer(verdict: RunVerdict) -> str:
     if v.alone is not None:
         slips = f"; {counted(v.alone.slips, 'slip')} without a controller" if v.alone.slips else ""
         return f"{v.reason}{slips}"
-    if v.untested or v.after is None:
-        return v.untested
     tripped = next((fault for fault in v.faults if fault.startswith("FAULT: ")), None)
     if tripped is not None:
         return f"the rig's guard stopped the vibration: {tripped.removeprefix('FAULT: ')}"
-    rest = "".join(f"; {name}" for name, seconds in v.charge.reasons_s.items() if seconds > WEAK_S)
+    if v.control == NOT_JUDGED and (v.untested or v.after is None):
+        return v.untested
+    rest = ""
     if v.stopped_slips:  # a picture of the run shows them
-        rest += f"; {counted(v.stopped_slips, 'slip')} while it was stopped or not armed"
-    if v.after.slips > v.unsure_slips and not v.blind:
+        rest = f"; {counted(v.stopped_slips, 'slip')} while it was stopped or not armed"
+    if v.after is not None and v.after.slips > v.unsure_slips and not v.blind:
         return f"stick-slip is still there: {counted(v.after.slips, 'slip')} while the controller was in charge{rest}"
-    if v.control == NOT_OK and v.blind:
-        return f"not ok: {v.reason.partition('; ')[0]}; slips cannot be judged: {v.blind[0]}{rest}"
-    if v.control == NOT_JUDGED:
-        return f"not judged: {v.reason.partition('; ')[0]}{rest}"
-    if v.control == NOT_OK and not rest:  # what is good above the line must not hide why the run is not
-        rest = f"; but {v.reason.partition('; ')[0]}"
+    if v.control != OK:
+        blind = f"; slips cannot be judged: {v.blind[0]}" if v.control == NOT_OK and v.blind else ""
+        return f"{v.control}: {v.reason.partition('; ')[0]}{blind}{rest}"
     if v.before is not None and v.before.slips:
         then = v.taking_over.slips if v.taking_over is not None else 0
         over = f"{then} while the controller took over, none after" if then else "none with the controller in charge"

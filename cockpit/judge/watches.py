@@ -1,4 +1,4 @@
-"""What a verdict needs of a run besides its motion, each gathered message by message in a memory that does not grow."""
+"""Latency, repeated blocks and steps of the controller, message by message in a memory that does not grow."""
 
 from typing import NamedTuple
 
@@ -14,8 +14,8 @@ from cockpit.judge.setup import SETTLING_S
 from controller.codes import STALE
 
 STANDSTILL_MPS = 2e-5  # the controller's own, unless it was set up otherwise
-# A drive that turns stands for a moment, and a slip may come then: 17 in an hour of the belt axis, which has 718 turns. Smaller:
-# they count as slips with a dead transducer; larger: a transducer at the end of its range is found later.
+# A drive that turns is at rest for a moment, and may slip then: 17 times in an hour of the belt axis, which has 718 turns.
+# Smaller: these count as slips with a dead transducer; larger: a transducer at the end of its range is found later.
 _TURN_S = 0.2
 
 
@@ -29,7 +29,7 @@ class Latency(NamedTuple):
 
 
 class LatencyWatch:
-    """How long the commands took, from the plant's own account."""
+    """Delays of the commands, as the plant recorded them."""
 
     def __init__(self) -> None:
         self.took_us = Histogram()
@@ -37,7 +37,7 @@ class LatencyWatch:
         self.blocks = self.commands = 0
 
     def applied(self, records: Records) -> None:
-        """Take what the rig did, [blocks]."""
+        """Take rows of the rig, [blocks]."""
         self.blocks += len(records)
         self.commands += int(records["commands"].sum())
         self.late += int(records["commands_late"].sum())
@@ -45,7 +45,7 @@ class LatencyWatch:
         self.took_us.add(round_trip_ns[round_trip_ns > 0] * 1e-3)
 
     def result(self) -> Latency | None:
-        """All of it; None in lockstep, where nothing takes time."""
+        """The percentiles; None in lockstep, where nothing takes time."""
         if not self.took_us.count:
             return None
         # a command that never came is a late one; the last block's comes after the end
@@ -55,7 +55,7 @@ class LatencyWatch:
 
 
 class FrozenWatch:
-    """Blocks that repeat the one before, sample by sample: a converter that stopped, of which a driver sends the last buffer."""
+    """Blocks that repeat the block before, sample by sample: a driver sends the last buffer of a converter that stopped."""
 
     def __init__(self) -> None:
         self.runs = {name: Longest() for name in CHANNELS}  # of such blocks
@@ -74,17 +74,18 @@ class FrozenWatch:
 
 
 class StepWatch:
-    """What the controller's steps say of the run: whether it was armed, what it missed, when it was stopped."""
+    """From the controller's steps: whether the rig was armed, missed blocks, stops."""
 
     def __init__(self) -> None:
         self.steps = 0
         self.missed = 0  # blocks that never came to the controller
+        self.last_block = -1
         self.armed = self.moved = False
         self.highest_set_point = 0.0  # of v_a / v_d while it vibrated
         self.drive_velocity_max_mps = 0.0
         self.loop_delay_s = 0.0
         self._slips: int | None = None
-        self._unseen = 0  # slips while the drive seemed to stand
+        self._unseen = 0  # slips while the drive position did not change
         self._unseen_s = 0.0
         self._moved_s = -np.inf  # when the drive was last seen to move
         self.stale: list[tuple[float, float]] = []  # first and last step of the stretches without a block in time
@@ -98,6 +99,7 @@ class StepWatch:
             return
         self.steps += len(records)
         self.missed += int(records["gap_blocks"].sum())
+        self.last_block = max(self.last_block, int(records["block"].max()))
         not_armed = records["reason"] == wire.NOT_ARMED
         self.armed = self.armed or not not_armed.all()
         v_d_mps, t_s = records["drive_velocity_mps"], records["t_ns"] * 1e-9
@@ -129,7 +131,7 @@ class StepWatch:
         self._last_s = float(t_s[-1])
 
     def stops(self, block_s: float, is_last: bool) -> list[tuple[float, float]]:
-        """When an operator had stopped the controller, or the rig was not armed, and until it was in charge again; in s."""
+        """Times in which the controller was stopped or the rig not armed, with the second after each [s]."""
         found = [(from_s - block_s, last_s + SETTLING_S) for from_s, last_s in self._idle]
         if self._idle_from_s is not None:
             until_s = self._last_s + SETTLING_S if is_last else np.inf
@@ -137,7 +139,7 @@ class StepWatch:
         return found
 
     def unseen(self) -> str:
-        """A line about slips while the drive position stood; empty without any."""
+        """A line about slips at a constant drive position; empty without any."""
         if not self._unseen:
             return ""
         return (

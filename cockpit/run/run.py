@@ -258,7 +258,8 @@ class _Room:
 def _in_process(scenario: Scenario, path: Path) -> _Came:
     """Simulate, with a bar on a terminal; without an end show the simulated time, until the operator or the disk ends it.
 
-    A run without faults is judged while it is written.
+    A run without faults is judged while it is written. A run with faults goes message by message, 0.4 s of CPU a second in place
+    of 0.01 s.
     """
     from rich.console import Console
     from rich.progress import Progress, TextColumn
@@ -271,6 +272,8 @@ def _in_process(scenario: Scenario, path: Path) -> _Came:
         Progress.get_default_columns() if scenario.duration_s else (TextColumn("{task.completed:.1f} s simulated"),)
     )
     console = Console(stderr=True)
+    if scenario.fault:
+        say("simulating with faults, message by message: 0.4 s for a second of the run, longer on a busy computer")
     judge, chain = RunJudge(path, {}, margins=bool(scenario.rig.effects)), None
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
         task = bar.add_task("simulating", total=scenario.duration_s or None)

@@ -1,8 +1,8 @@
 """The sensors of a scenario against its description: range, noise, resolution and band that the motion needs.
 
 Before a run, so that no verdict rests on a sensor that cannot show the motion. The number to use in a refusal has room: 1.25
-times a force or a way, twice an acceleration or a frequency, half of a limit of noise, a quarter of one of steps. Faults
-(`[[fault]]`) are no part of the description. The figures below were counted with shipped and drawn axes: docs/method/sensors.md.
+times the largest force or travel, twice the largest acceleration or the frequency, half of a limit of noise, a quarter of a limit
+of steps. Faults (`[[fault]]`) do not belong to the description. Figures below: shipped and drawn axes, docs/method/sensors.md.
 """
 
 import math
@@ -16,16 +16,18 @@ from plant.drive_motion import Motion, lowest_mps, reach_m
 from plant.records import build
 
 _ROOM = 1.25  # of a range over the largest value. Smaller: noise and overshoot reach its end; larger: coarser sensors are advised
-# Noise of a sample in a slip, of the force or the position. Larger: forces with 9 are refused, which show each slip; smaller:
-# with 4.5 the controller doubts them, with 2.2 the judge counts no slip.
+# A slip over the noise of a sample, of force and positions. Larger: forces with 9 are refused, which show each slip; smaller:
+# with 4.5 the controller doubts the force, with 2.2 the judge counts no slip.
 _NOISES_A_SLIP = 5.0
-# The same in the amplitude of the base. Larger: 44 are refused, which hold v_a; smaller: with 22 it slips in open loop.
+# The amplitude of the base over the noise of a sample. Larger: 44 is refused, which holds v_a; smaller: with 22 the controller
+# goes to open loop, and the axis slips.
 _NOISES_AN_AMPLITUDE = 32.0
-# Steps of a resolution in either. Larger: steps of 1/99 are refused, which show each slip; smaller: with 1/81 a channel counts
-# as frozen, cut or of a wrong scale. Steps up to twice the noise are hidden by it: those of drawn stiff axes, 1/1 of a slip.
+# A slip, or the amplitude of the base, over the resolution. Larger: 99 is refused, which shows each slip; smaller: with 81 a
+# channel counts as frozen, clipped or of a wrong scale. Noise hides steps up to twice its size, as on drawn stiff axes with steps
+# of a slip.
 _STEPS, _HIDDEN = 96.0, 2.0
-# Of the drive's way that noise of its position has to be below as well. Larger: noise of 10 um passes on a ball screw, in which
-# slips are lost; smaller: a feed of 0.02 mm/s without slips is refused, which the controller follows.
+# Time in which the drive's travel counts like a slip for the noise of its position. Larger: noise of 10 um passes on a ball
+# screw, and hides slips; smaller: a feed of 0.02 mm/s without slips is refused, which the controller follows.
 _WAY_S = 0.125
 # Band over the frequency of the slide on its spring. Larger: 0.5 is refused, which shows each slip; smaller: 0.46 passes.
 _LEAST_BAND = 0.5
@@ -65,7 +67,7 @@ def refuse_out_of_travel(rig: RigConfig, duration_s: float) -> None:
 
 
 def _until_s(rig: RigConfig, motion: Motion, duration_s: float) -> float:
-    """To when the motion is looked at: of a run without an end one cycle, or until its last velocity has left every range."""
+    """End of the motion that is checked: of a run without an end one cycle, or until its last velocity has left every range."""
     if duration_s or math.isfinite(motion.period_s):
         return duration_s or motion.period_s
     last_mps, span_m = abs(float(motion.velocity_mps[-1])), rig.sensors.position_range_m - rig.sensors.position_lowest_m
@@ -74,7 +76,7 @@ def _until_s(rig: RigConfig, motion: Motion, duration_s: float) -> float:
 
 
 class _Needs(NamedTuple):
-    """What the description implies for the sensors, along the drive."""
+    """Needs of the description, along the drive."""
 
     most_N: float  # of the drive force, forwards, as the sensor shows it
     least_N: float  # backwards; 0 where the drive does not go back and the slide does not overshoot
@@ -153,23 +155,15 @@ def _force(rig: RigConfig, needs: _Needs) -> None:
 
 def _noise(sensors: SensorsConfig, name: str, most: float, signal: str) -> None:
     if (value := getattr(sensors, name)) > most:
-        _refuse(
-            f"sensors.{name}",
-            value,
-            f"{signal}; noise above {most:.3g} {_unit(name)} hides it",
-            f"{_below(0.5 * most):g}",
-        )
+        why = f"{signal}; noise above {most:.3g} {_unit(name)} hides it"
+        _refuse(f"sensors.{name}", value, why, f"{_below(0.5 * most):g}")
 
 
 def _steps(sensors: SensorsConfig, name: str, noise: str, size: float, signal: str) -> None:
     most = max(size / _STEPS, _HIDDEN * getattr(sensors, noise))
     if (value := getattr(sensors, name)) > most:
-        _refuse(
-            f"sensors.{name}",
-            value,
-            f"{signal}; steps above {most:.3g} {_unit(name)} distort it",
-            f"{_below(0.25 * most):g}",
-        )
+        why = f"{signal}; steps above {most:.3g} {_unit(name)} distort it"
+        _refuse(f"sensors.{name}", value, why, f"{_below(0.25 * most):g}")
 
 
 def _band(sensors: SensorsConfig, name: str, natural_Hz: float) -> None:
@@ -209,8 +203,10 @@ def _base(
         _refuse("sensors.accel_range_mps2", sensors.accel_range_mps2, why, f"{_above(2.0 * most_mps2):g}")
     band_Hz = sensors.accel_bandwidth_Hz
     if band_Hz < frequency_Hz and band_Hz != controller.amplitude.accel_bandwidth_Hz:
-        remedy = f"{_above(2.0 * frequency_Hz):g}, or controller.amplitude.accel_bandwidth_Hz to {band_Hz:g}, to correct for it"
-        _refuse("sensors.accel_bandwidth_Hz", band_Hz, f"the base vibrates at {frequency_Hz:g} Hz, above it", remedy)
+        why = f"the base vibrates at {frequency_Hz:g} Hz, where this sensor shows too little"
+        known = f"or, for a sensor of {band_Hz:g} Hz, set controller.amplitude.accel_bandwidth_Hz = {band_Hz:g}"
+        remedy = f"{_above(2.0 * frequency_Hz):g}, {known}: the controller then corrects v_a"
+        _refuse("sensors.accel_bandwidth_Hz", band_Hz, why, remedy)
     if sensors.accel_lowest_Hz > 0.5 * candidates_Hz[0]:
         why = f"the base vibrates from {candidates_Hz[0]:g} Hz on"
         _refuse("sensors.accel_lowest_Hz", sensors.accel_lowest_Hz, why, f"{_below(0.1 * float(candidates_Hz[0])):g}")

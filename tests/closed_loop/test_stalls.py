@@ -45,7 +45,7 @@ def test_a_stall_loses_nothing_and_teaches_nothing(tmp_path: Path, role: str, fo
     assert after == pytest.approx(before, rel=0.01)
 
 
-def test_an_accelerometer_that_fails_in_a_stall_is_reported_a_second_after_it(tmp_path: Path) -> None:
+def test_an_accelerometer_that_fails_in_a_stall_is_reported_soon_after_it(tmp_path: Path) -> None:
     frozen = {"kind": "frozen", "target": "plant", "from_s": FROM_S, "for_s": 0.03}
     dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
     told = list(blamed(run(tmp_path / "run.mcap", 3.0, frozen, dead)))
@@ -53,20 +53,24 @@ def test_an_accelerometer_that_fails_in_a_stall_is_reported_a_second_after_it(tm
     assert "stalled" not in told[0][2]
 
 
-def test_a_computer_that_stalls_all_the_time_is_named_and_delays_a_doubt_by_half_of_the_longest_wait(
-    tmp_path: Path,
-) -> None:
+def test_a_computer_that_stalls_all_the_time_is_named_and_delays_a_doubt_by_the_longest_wait(tmp_path: Path) -> None:
+    """Stalls that leave no time to compare v_a: every 0.15 s, with 0.12 s between them."""
     stalls = [
-        {"kind": "frozen", "target": "plant", "from_s": at_s, "for_s": 0.03} for at_s in np.arange(FROM_S, 6.0, 0.4)
+        {"kind": "frozen", "target": "plant", "from_s": at_s, "for_s": 0.03} for at_s in np.arange(FROM_S, 6.0, 0.15)
     ]
     dead = {"kind": "off", "target": "base_accel_mps2", "from_s": FROM_S}
     told = list(blamed(run(tmp_path / "run.mcap", 6.0, *stalls, dead)))
-    assert FROM_S + 0.5 * MOST_S - 0.1 < told[0][0] < FROM_S + 0.5 * MOST_S + 0.5
+    # steps without a block and the late blocks of the same stall both count
+    assert FROM_S + MOST_S - 0.3 < told[0][0] < FROM_S + MOST_S + 0.5
     assert "the computer or the link stalled" in told[0][2]
 
 
-@pytest.mark.parametrize("role", ["controller", "plant"])
-def test_a_sound_rig_is_not_doubted_though_the_computer_stalls_all_the_time(tmp_path: Path, role: str) -> None:
-    """A stall of 0.1 s every 0.8 s gave OPEN_LOOP or PIEZO_WEAK once the longest wait was over."""
-    stalls = [{"kind": "frozen", "target": role, "from_s": at_s, "for_s": 0.1} for at_s in np.arange(FROM_S, 6.0, 0.8)]
+@pytest.mark.parametrize(("role", "every_s"), [("controller", 0.3), ("plant", 0.8)])
+def test_a_sound_rig_is_not_doubted_though_the_computer_stalls_all_the_time(
+    tmp_path: Path, role: str, every_s: float
+) -> None:
+    """Such stalls gave OPEN_LOOP or PIEZO_WEAK once the longest wait was over."""
+    stalls = [
+        {"kind": "frozen", "target": role, "from_s": at_s, "for_s": 0.1} for at_s in np.arange(FROM_S, 6.0, every_s)
+    ]
     assert list(blamed(run(tmp_path / "run.mcap", 6.0, *stalls))) == []

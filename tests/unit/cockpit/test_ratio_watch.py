@@ -9,15 +9,15 @@ import pytest
 from bridge.log.logfile import read_run
 from bridge.wire.messages import APPLIED, TRACE
 from bridge.wire.stickslip_pb2 import EXCITE
-from cockpit.judge.described import described
 from cockpit.judge.ratio_watch import MOST_ABOVE_S, RatioVerdict, RatioWatch
+from cockpit.judge.setup import Setup
 from cockpit.judge.window import APPLIED_ROW, COMMAND_ROW, TRACE_ROW, Blocks, Window, rows_of
 from controller.codes import GAP, LATE, STALE
 from tests.logs import verdict_of
 
 GOLDEN = Path(__file__).parents[2] / "golden"
-CONTROLLER = {"policy": {"enabled_from_s": 0.0, "most_ratio": 2.4}, "limits": {"v_ratio": 1.2}, "block_s": 1e-3}
 BLOCK_S = 1e-3
+SETUP = Setup("", BLOCK_S, 0.0, 0.1, [], known_gain=False, v_ratio=1.2, duration_s=0.0)
 
 
 def made(ratio: Any) -> tuple[Any, Any]:
@@ -34,7 +34,7 @@ def made(ratio: Any) -> tuple[Any, Any]:
 
 def watched(applied: Any, trace: Any, per_window: int = 2500) -> RatioVerdict:
     """In windows of so many blocks, each with what came before and comes after."""
-    watch, count = RatioWatch(described(None, CONTROLLER), BLOCK_S), len(trace)
+    watch, count = RatioWatch(SETUP), len(trace)
     blocks = Blocks(*(np.asarray(trace["sequence"]), np.asarray(trace["t_ns"]), *[np.empty(0)] * 5))
     rows = rows_of(trace, TRACE_ROW), rows_of(applied, APPLIED_ROW), np.empty(0, COMMAND_ROW)
     for first in range(0, count, per_window):
@@ -72,8 +72,7 @@ def test_a_set_point_that_the_controller_raised_is_the_set_point() -> None:
     applied, trace = made(stretch(1.0, 2.4))
     trace["velocity_ratio"] = 2.4
     assert watched(applied, trace).ok
-    trace["velocity_ratio"] = 9.0  # no more than the configuration allows
-    trace["vibration_velocity_mps"] *= 1.6
+    trace["velocity_ratio"] = 0.0  # of an older log: the set point of the configuration
     assert not watched(applied, trace).ok
 
 

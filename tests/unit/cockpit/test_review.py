@@ -154,5 +154,5 @@ def test_the_answer_says_why_a_run_without_a_slip_is_not_good(tmp_path: Path) ->
         vibration_dose_mm2_per_s=0.0,
     )
     verdict = judge(cut)._replace(after=still, untested="", alone=None)
-    assert headline(verdict) == "not judged: the log ends at 0.32 of 0.40 s and does not say why"
+    assert headline(verdict) == "not judged: the log ends at 0.32 s, the run was to end at 0.40 s"
     assert any("cut: has no end" in line for line in verdict.warnings)

@@ -1,14 +1,17 @@
 """The streaming judge: windows change nothing, stalls and gaps change no status, and what is missing where it decides does."""
 
 import json
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
 from typer.testing import CliRunner
 
-from bridge.faults import FAULTS
+from bridge.faults import FAULTS, Fault
 from bridge.log.logfile import RunData, read_run
 from bridge.wire import stickslip_pb2 as wire
 from cockpit.cli import app
@@ -98,6 +101,7 @@ def gap(first: int, count: int, seen: bool) -> Any:
         if not seen:
             tables["trace"]["gap_blocks"][first + count] = count
             tables["trace"] = np.delete(tables["trace"], slice(first, first + count))
+            tables["trace"]["sequence"] = np.arange(len(tables["trace"]))
 
     return change
 
@@ -132,11 +136,65 @@ def test_a_log_that_ends_early_and_does_not_say_why_is_not_judged(run: RunData) 
     """It read "data whole" and "control ok"."""
     verdict = verdict_of(until(run, 5000, None))
     assert data_in_words(verdict) == "5.00 of 6.00 s; the rest is not in the log"
-    assert headline(verdict) == "not judged: the log ends at 5.00 of 6.00 s and does not say why"
+    assert headline(verdict) == "not judged: the log ends at 5.00 s, the run was to end at 6.00 s"
     assert (verdict.exit_status(strict=False), verdict.exit_status(strict=True)) == (14, 1)
     assert verdict.losses() == ["how many messages are lost is not known"]
     short = headline(verdict_of(until(run, 2000, None)))
-    assert short == "the log ends at 2.00 of 6.00 s; ended before the controller was enabled (at 3.0 s)"
+    ends = "the log ends at 2.00 s, the run was to end at 6.00 s"
+    assert short == f"{ends}; ended before the controller was enabled (at 3.0 s)"
+
+
+def test_who_had_the_blocks_after_the_end_of_a_log_is_not_known(run: RunData) -> None:
+    """It read "the controller had them all"."""
+    verdict = verdict_of(until(run, 5000, "blocks=6000"))
+    assert (
+        data_in_words(verdict) == "1000 of 6000 blocks missing in the log (not known whether the controller had them)"
+    )
+
+
+def test_the_headline_of_a_run_that_is_not_ok_says_so(run: RunData) -> None:
+    """It read "stick-slip is gone: ...; PIEZO_WEAK"."""
+    sound = verdict_of(run)
+    weak = sound._replace(charge=sound.charge._replace(reasons_s={"PIEZO_WEAK": 2.0}))
+    assert (headline(sound).partition(":")[0], headline(weak)) == ("stick-slip is gone", "not ok: PIEZO_WEAK")
+
+
+def test_a_trip_is_in_words_without_the_letter_of_its_cause(run: RunData) -> None:
+    text = "ACTIVE -> FAULT: OVERTRAVEL: S: stroke beyond guard.stroke_m"
+    verdict = verdict_of(run._replace(events=[wire.Event(source="plant", code="FAULT", text=text), *run.events]))
+    assert headline(verdict).endswith(
+        "stopped the vibration: ACTIVE -> FAULT: OVERTRAVEL: stroke beyond guard.stroke_m"
+    )
+    assert ": S:" not in "".join(in_words(verdict, verbose=True))
+
+
+def test_the_first_bytes_of_a_log_are_a_cut_log(log: Path, tmp_path: Path) -> None:
+    """It read "holds no configuration of the controller; it was not there when it was recorded"."""
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(log.read_bytes()[:200])
+    with pytest.raises(Fault, match="is cut after 200 bytes, before the configuration of the controller"):
+        judge(path)
+
+
+def test_a_channel_that_is_in_no_block_is_named(log: Path, tmp_path: Path) -> None:
+    """It read "no block was recorded"."""
+    path = tmp_path / "without.mcap"
+    with log.open("rb") as old, path.open("wb") as new:
+        reader, writer = make_reader(old), Writer(new)
+        writer.start(library="another program")
+        for table in reader.iter_metadata():
+            writer.add_metadata(table.name, table.metadata)
+        for schema, channel, message in islice(reader.iter_messages("/sensors"), 3):
+            assert schema is not None
+            block = wire.SensorBlock.FromString(message.data)
+            block.ClearField("mass_position_m")
+            number = writer.register_channel(
+                channel.topic, "protobuf", writer.register_schema(schema.name, schema.encoding, schema.data)
+            )
+            writer.add_message(number, message.log_time, block.SerializeToString(), message.publish_time)
+        writer.finish()
+    rule = "no block can be read: /sensors: mass_position_m has 0 samples: must have 20; every block must hold all channels"
+    assert headline(judge(path)) == rule
 
 
 def test_a_run_that_an_operator_ended_is_whole(run: RunData) -> None:
@@ -191,7 +249,7 @@ def test_a_slip_in_a_stall_is_counted_apart(run: RunData, tmp_path: Path, table:
     verdict = judge(changed(run, tmp_path / "stalled.mcap", stalled))
     assert verdict.after is not None
     assert (verdict.after.slips, verdict.stalled_slips, verdict.control) == (0, 1, NOT_JUDGED)
-    assert "a slip came before" in verdict.reason  # the stall and its second leave 0.6 s
+    assert "the time of a slip before" in verdict.reason  # the stall and its second leave 0.6 s
 
 
 def test_a_rig_that_disarmed_itself_is_not_judged_and_named(run: RunData) -> None:
@@ -271,7 +329,7 @@ def test_a_run_that_a_fault_ends_is_judged_on_its_recorded_part(
     ("profile", "why"),
     [
         ("[[0.0, 0.0005], [2.9, 0.0005], [2.95, 0.0]]", "the drive did not move"),
-        ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "a slip came before"),
+        ("[[0.0, 0.0005], [5.0, 0.0005], [5.1, 0.0]]", "the time of a slip before"),
     ],
 )
 def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
@@ -282,3 +340,12 @@ def test_a_drive_that_rests_while_the_controller_is_in_charge_shows_nothing(
     verdict = judge(tmp_path / "run.mcap")
     assert verdict.control == NOT_JUDGED
     assert why in verdict.reason
+
+
+def test_a_run_with_faults_in_one_process_says_how_long_it_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It ran 40 times slower than a run without faults, and no line said so."""
+    fault = "fault=[{kind='scaled', target='drive_force_N', value=0.5}]"
+    run_scenario("from-the-start", ["duration_s=0.1", fault], False, True, tmp_path / "run.mcap")
+    assert "with faults, message by message: 0.4 s for a second of the run" in capsys.readouterr().err

@@ -202,6 +202,24 @@ def test_an_accelerometer_that_shows_its_noise_in_the_last_second_is_not_judged(
     assert [(one.code, one.decides) for one in found] == [(code, True)]
 
 
+def test_a_slow_accelerometer_that_the_controller_corrects_is_sound() -> None:
+    """The remedy of a refusal, `controller.amplitude.accel_bandwidth_Hz`: it was SENSOR_OTHER."""
+    run = golden("slip-then-control")
+    frequency_Hz = run.applied["frequency_Hz"].max()
+    rolled_off = np.float32(np.hypot(1.0, frequency_Hz / 1e4) / np.hypot(1.0, frequency_Hz / 900.0))
+
+    def slow(sensors: Any) -> None:
+        for name in (BASE_MPS2, SLIDE_MPS2):
+            sensors[name] *= rolled_off
+
+    controller = run.configuration("controller")
+    controller["amplitude"]["accel_bandwidth_Hz"] = 900.0
+    headers = {**run.headers, "controller": {"configuration": json.dumps(controller)}}
+    for table, codes in ((run.headers, {"SENSOR_OTHER"}), (headers, set())):
+        found = watched(with_channels(run._replace(headers=table), slow)).findings
+        assert {finding.code for finding in found} == codes
+
+
 def codes_of(step_m: float = 0.0, **columns: Any) -> list[str]:
     """Of the relations that do not hold in 20 s of vibration at 4 kHz, 10 m/s2, with a drive that creeps."""
     count = 20_000
