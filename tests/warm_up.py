@@ -31,6 +31,13 @@ def control(folder: Path) -> None:
     replay(run, changes_of(run, []))
 
 
+def guard() -> None:
+    """By itself, as its unit tests call it: they are several files, and each worker would compile it."""
+    from tests.unit.bridge.guard.rigs import Rig
+
+    Rig().run(1)
+
+
 def bench_of_the_controller() -> None:
     """The rig with its judge, with the controller and with the rules."""
     from cockpit.bank.cost import step_cost_ratio
@@ -69,6 +76,7 @@ if __name__ == "__main__":
         with tempfile.TemporaryDirectory() as folder:
             control(Path(folder))
             generator(Path(folder) / "rig")
+        guard()
         bench_of_the_controller()
         diagnosis()
         DONE.touch()

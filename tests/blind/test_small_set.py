@@ -37,7 +37,7 @@ def tool(part, tmp_path_factory):
         patch.setattr(strata, "_real_faults", lambda: 0)  # measured logs have tests of their own
         asked = ("--cases", CASES, "--seed", SEED, "--out", sealed, "--key", key, "--jobs", 1)
         succeeds(making_app, "make", *asked)
-    succeeds(app, "blind", "run", sealed)
+    succeeds(app, "blind", "run", sealed, "--jobs", part.jobs)
     succeeds(app, "blind", "score", sealed, "--key", key, "--json", scores)
     found = json.loads(scores.read_text())
     assert found["sealed"] is True

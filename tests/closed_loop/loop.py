@@ -9,10 +9,14 @@ from bridge.config import validate
 from bridge.wire.messages import TRACE as TRACE_LAYOUT
 from bridge.wire.messages import sealed
 from bridge.wire.topics import TRACE
+from cockpit.bank import rules
+from cockpit.bank.loop import Hum, JudgedLoop
 from controller.config import ControllerConfig
 from controller.node import ControllerNode
+from controller.records import build
 from plant.config import RigConfig
 from plant.node import PlantNode
+from plant.records import TRUTH
 
 
 class Loop(NamedTuple):
@@ -63,18 +67,39 @@ def close_the_loop(
     controller: dict[str, Any] | None = None,
     pair: str = "C45-C45 @ 0.063",
     seed: int = 1,
-    deliver: Callable[[int, bytes], bytes | None] = lambda _, payload: payload,
+    deliver: Callable[[int, bytes], bytes | None] | None = None,
 ) -> Loop:
-    """Run the loop in lockstep for `seconds`; `deliver` says what becomes of each block on its way, None for lost."""
+    """Run the loop in lockstep for `seconds`; `deliver` says what becomes of each block on its way, None for lost.
+
+    Without `deliver` a block takes 20 µs of compiled code, with it 150 µs; both make the same bits.
+    """
     rig_config = validate(RigConfig, {"contact": {"pair": pair}} | (rig or {}), "rig")
-    plant, node = (
-        PlantNode(rig_config, seed, arm=True),
-        ControllerNode(validate(ControllerConfig, controller or {}, "controller")),
-    )
+    config = validate(ControllerConfig, controller or {}, "controller")
+    blocks = round(seconds / rig_config.solver.block_s)
+    if deliver is not None:
+        return _block_by_block(blocks, rig_config, config, seed, deliver)
+    no_rule = rules.build(rules.NONE, rig_config, 0.0, 0.0, [1000.0])
+    loop = JudgedLoop(rig_config, seed, build(config), no_rule, False, Hum(0.0, 0.0, 0.0))
+    stretch = loop.advance(blocks)
+    truth = dict(zip(TRUTH, stretch.truth.reshape(len(TRUTH), blocks, -1), strict=True))
+    return _looped(stretch.traces, truth["true_drive_force_N"], truth["true_velocity_mps"])
+
+
+def _looped(trace: Any, drive_force_N: Any, velocity_mps: Any) -> Loop:
+    """Of traces and of the truth, [blocks, samples]."""
+    fastest = np.abs(velocity_mps).argmax(axis=1)[:, None]
+    fastest_mps = np.take_along_axis(velocity_mps, fastest, axis=1)[:, 0]
+    return Loop(trace["t_ns"] * 1e-9, trace, drive_force_N[:, -1], fastest_mps)
+
+
+def _block_by_block(
+    blocks: int, rig: RigConfig, config: ControllerConfig, seed: int, deliver: Callable[[int, bytes], bytes | None]
+) -> Loop:
+    plant, node = PlantNode(rig, seed, arm=True), ControllerNode(config)
     traces: list[bytes] = []
-    truth: list[tuple[float, float]] = []
+    truth: list[Any] = []
     commands: list[bytes] = []
-    for block in range(round(seconds / rig_config.solver.block_s)):
+    for block in range(blocks):
         sensors, _ = plant.advance(commands)
         for message in plant.announcements:
             node.announcement(message.payload)
@@ -86,7 +111,6 @@ def close_the_loop(
         assert command is not None
         commands = [command.payload]
         traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)
-        velocity_mps = plant.truth[2]
-        truth.append((plant.truth[0, -1], velocity_mps[np.abs(velocity_mps).argmax()]))
+        truth.append(plant.truth[[0, 2]])
     trace = np.frombuffer(b"".join(traces), TRACE_LAYOUT.dtype)
-    return Loop(trace["t_ns"] * 1e-9, trace, *np.array(truth).T)
+    return _looped(trace, *np.stack(truth, axis=1))

@@ -14,18 +14,18 @@ from bridge.log.check.channel import Channel, channels_of
 from bridge.log.logfile import RunData, read_run
 from bridge.log.watches.arrays import Longest
 from bridge.wire.messages import CHANNELS
-from cockpit.bank.scenario import load_bank
 from cockpit.judge.verdict import OK, RunVerdict
 from cockpit.run.in_process import run_onboard
 from cockpit.run.scenario import Scenario, load_scenario
+from tests.bank import BANK
 from tests.channel_edits import edited, edits_of
 from tests.logs import verdict_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 SHIPPED = sorted(path.stem for path in (Path(__file__).parents[3] / "deploy/scenarios").glob("*.toml"))
-BANK = [axis for axis in load_bank() if axis.bank.small and axis.bank.expect == "helped"]
+HELPED = [axis for axis in BANK if axis.bank.small and axis.bank.expect == "helped"]
 BROKEN = {"paper-c45-c45", "stop-and-go", "drawn-05"}
-DRAWN = [axis for axis in load_bank() if axis.name in BROKEN]
+DRAWN = [axis for axis in BANK if axis.name in BROKEN]
 # What no other channel shows: the sign of an acceleration, the scale of one that the controller saw as well, and a limit that the
 # channel itself exceeded before.
 UNSEEN = {(accel, word) for accel in ("base_accel_mps2", "mass_accel_mps2") for word in ("negated", "x 0.5", "clipped")}
@@ -33,7 +33,7 @@ UNSEEN |= {("mass_accel_mps2", "x 2"), ("mass_accel_mps2", "x 10")}
 
 
 def scenario_of(name: str) -> Scenario:
-    axis = next((axis for axis in [*BANK, *DRAWN] if axis.name == name), None)
+    axis = next((axis for axis in [*HELPED, *DRAWN] if axis.name == name), None)
     return load_scenario(name, []) if axis is None else axis.scenario().model_copy(update={"arm": True})
 
 
@@ -62,7 +62,7 @@ def rival_is_ok(run: RunData, verdict: RunVerdict, channels: dict[str, Channel])
     return without.control == OK and not rival_doubts(run, verdict, channels)
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, *(axis.name for axis in [*BANK, *DRAWN])])
+@pytest.mark.parametrize("name", [*SHIPPED, *(axis.name for axis in [*HELPED, *DRAWN])])
 def test_sound_logs_are_without_a_doubt_and_broken_ones_are_not_ok(name: str, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     run_onboard(scenario_of(name), path, {"scenario": name})

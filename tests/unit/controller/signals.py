@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 
 from bridge.config import validate
-from bridge.wire.messages import TRACE as TRACE_LAYOUT
-from bridge.wire.messages import sensor_block
-from bridge.wire.topics import TRACE
+from bridge.kernel import kernel
+from bridge.wire.messages import COMMAND, TRACE, sensor_block
+from controller.codes import BLOCK
 from controller.config import ControllerConfig
-from controller.node import ControllerNode
+from controller.core import step
+from controller.records import build
 
 SAMPLES = 20  # a block of 1 ms
 SAMPLE_S = 5e-5
@@ -43,22 +44,27 @@ def listen(
     """
     chance = np.random.default_rng(seed)
     tables = {"policy": {"enabled_from_s": 1000.0}, **config}
-    node = ControllerNode(validate(ControllerConfig, tables, "test"))
-    sensors = sensor_block(SAMPLES).blank()
+    params, state = build(validate(ControllerConfig, tables, "test"))
+    blocks = len(drive_m) // SAMPLES
+    sensors = sensor_block(SAMPLES).blank(blocks)
+    sensors["sequence"], sensors["t_ns"] = np.arange(blocks), 1_000_000 * np.arange(1, blocks + 1)
     force_N = offset_N + STIFFNESS_N_PER_M * (drive_m - slide_m)
     channels = {
         "drive_force_N": force_N + chance.normal(0.0, FORCE_NOISE_N, len(force_N)),
         "drive_position_m": drive_m + chance.normal(0.0, position_noise_m, len(drive_m)),
         "mass_position_m": slide_m + chance.normal(0.0, position_noise_m, len(slide_m)),
     }
-    traces: list[bytes] = []
-    for block in range(len(drive_m) // SAMPLES):
-        sensors["sequence"], sensors["t_ns"] = block, 1_000_000 * (block + 1)
-        for name, values in channels.items():
-            sensors[name][0] = values[SAMPLES * block : SAMPLES * (block + 1)] if name != missing else np.nan
-        node.block(sensors.tobytes())
-        traces.extend(message.payload for message in node.rest(0) if message.topic is TRACE)
-    return np.frombuffer(b"".join(traces), TRACE_LAYOUT.dtype)
+    for name, values in channels.items():
+        sensors[name] = values.reshape(blocks, SAMPLES) if name != missing else np.nan
+    traces = TRACE.blank(blocks)
+    _steps(params, state, sensors, COMMAND.blank(), traces)
+    return traces
+
+
+@kernel
+def _steps(params: Any, state: Any, sensors: Any, command: Any, traces: Any) -> None:
+    for i in range(sensors.shape[0]):
+        step(params, state, sensors[i : i + 1], BLOCK, 0, sensors[i].t_ns, command, traces[i : i + 1])
 
 
 def stick_slip(seconds: float, velocity_mps: float, stick_s: float, slip_s: float) -> tuple[Any, Any]:

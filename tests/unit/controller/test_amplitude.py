@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bridge.config import validate
+from bridge.kernel import Record, kernel
 from bridge.wire import stickslip_pb2 as wire
 from controller.amplitude import FIRST_SHARE, amplitude, listen, note_sent
 from controller.codes import BLOCK
@@ -53,26 +54,39 @@ def run(
     s.listening, s.onset_steps, s.loop_delay_steps, s.growth = 1, -1, -1, FIRST_SHARE
     s.candidate = int(np.argmin(np.abs(p.candidate_Hz - FREQUENCY_HZ)))
     s.wanted_Hz, s.tuned, s.held_mps = p.candidate_Hz[s.candidate], 1, WANTED_MPS / 1.2
+    arrives = np.array([max(step - delay - later(step), 0) for step in range(steps)])
+    gains = np.array([gain(step) for step in range(steps)], float)
+    wanted_mps = np.array([wanted(step) if step >= silent else 0.0 for step in range(steps)])
+    noise = np.random.default_rng(1).normal(0.0, NOISE_MPS2, (steps, samples))
+    true_mps = np.empty(steps)
+    _steps(p, s, arrives, gains, wanted_mps, noise, true_mps)
+    return p, s, true_mps
+
+
+@kernel
+def _steps(p: Record, s: Record, arrives: Any, gains: Any, wanted_mps: Any, noise: Any, true_mps: Any) -> None:
+    """The loop and its exciter; `arrives` is the step whose command moves the base. In Python a step takes 0.3 ms."""
     omega = 2.0 * math.pi * s.wanted_Hz
     rolled_off = math.sqrt(1.0 + (s.wanted_Hz / p.accel_bandwidth_Hz) ** 2)
-    chance = np.random.default_rng(1)
-    sent_m = [0.0]
-    now_m, true_mps = 0.0, []
+    steps, samples = noise.shape
+    sent_m = np.zeros(steps + 1)
+    heard_mps2 = np.empty(samples, np.float32)
+    now_m = 0.0
     for step in range(steps):
-        before_m, now_m = now_m, sent_m[max(step - delay - later(step), 0)] * gain(step)
-        t_s = block_s * step + p.sample_s * np.arange(1, samples + 1)
-        share = np.arange(1, samples + 1) / samples
-        accel = (before_m + share * (now_m - before_m)) * omega**2 / rolled_off * np.cos(omega * t_s)
-        measure(p, s, (accel + chance.normal(0.0, NOISE_MPS2, samples)).astype(np.float32))
+        before_m, now_m = now_m, sent_m[arrives[step]] * gains[step]
+        for i in range(samples):
+            phase = omega * (samples * step + i + 1) * p.sample_s
+            amplitude_m = before_m + (i + 1) / samples * (now_m - before_m)
+            heard_mps2[i] = amplitude_m * omega**2 / rolled_off * math.cos(phase) + noise[step, i]
+        measure(p, s, heard_mps2)
         listen(p, s, False)
-        s.wanted_velocity_mps = wanted(step) if step >= silent else 0.0
+        s.wanted_velocity_mps = wanted_mps[step]
         amplitude(p, s)
         allow(p, s, BLOCK, s.wanted_Hz, s.wanted_m)
         note_sent(p, s)
-        sent_m.append(s.allowed_m)
+        sent_m[step + 1] = s.allowed_m
         s.steps += 1
-        true_mps.append(omega * now_m)
-    return p, s, np.array(true_mps)
+        true_mps[step] = omega * now_m
 
 
 @pytest.mark.parametrize("delay", [0, 2, 20, 50])

@@ -7,13 +7,13 @@ import pytest
 
 from cockpit.bank.axes_map import Noise, draw, needed_window_s, points, stick_s, window_s
 from cockpit.bank.figures import Figures, refused
-from cockpit.bank.scenario import load_bank
+from tests.bank import BANK
 
-BANK = {one.name: one for one in load_bank()}
+NAMED = {one.name: one for one in BANK}
 
 
 def run(name: str, **values: object) -> Figures:
-    scenario = BANK[name]
+    scenario = NAMED[name]
     made = refused(scenario, "controller", "nothing")._replace(failures=[], expect=scenario.bank.expect)
     return made._replace(**values)  # pyright: ignore[reportArgumentType]
 
@@ -41,7 +41,7 @@ def test_a_stick_winds_up_twice_the_drop() -> None:
 def test_each_run_stands_in_the_panel_of_its_noise() -> None:
     came = {"slips": 1}
     found = points(
-        list(BANK.values()),
+        BANK,
         [
             run("pair-c45-0.5"),
             run("noise-both", **came),
@@ -61,5 +61,5 @@ def test_each_run_stands_in_the_panel_of_its_noise() -> None:
 @pytest.mark.slow
 def test_it_is_a_picture(tmp_path: Path) -> None:
     path = tmp_path / "axes.svg"
-    draw(list(BANK.values()), [run("step-stiff", surges=1), run("pair-c45-0.5"), run("pair-c45-1")], path)
+    draw(BANK, [run("step-stiff", surges=1), run("pair-c45-0.5"), run("pair-c45-1")], path)
     assert "<dc:title>for which axes it works" in path.read_text()

@@ -15,8 +15,8 @@ from cockpit.bank.least import Least
 from cockpit.bank.scenario import chosen, load_bank
 from cockpit.cli import app
 from cockpit.commands.as_json.schemas import FORMATS
+from tests.bank import BANK
 
-BANK = load_bank()
 OWN = rules.NAMES[rules.CONTROLLER]
 
 

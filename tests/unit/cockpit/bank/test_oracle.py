@@ -5,11 +5,12 @@ import math
 import pytest
 
 from cockpit.bank.oracle import IN_PART, LIMIT, MISSED, TOO_LATE, Oracle, ask, slew_s, verdict
-from cockpit.bank.scenario import BankScenario, load_bank
+from cockpit.bank.scenario import BankScenario
 from cockpit.run.scenario_file import merged
 from plant.config import RigConfig
+from tests.bank import BANK
 
-PAPER = next(one for one in load_bank() if one.name == "pair-c45-0.5")
+PAPER = next(one for one in BANK if one.name == "pair-c45-0.5")
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,12 @@ from cockpit.bank import record, rules
 from cockpit.bank.figures import SILENT, figures
 from cockpit.bank.least import is_clean
 from cockpit.bank.run import Judged, Subject, judge
-from cockpit.bank.scenario import BankScenario, load_bank
+from cockpit.bank.scenario import BankScenario
+from tests.bank import BANK
 
 pytestmark = pytest.mark.slow  # together, not each
-BANK = {one.name: one for one in load_bank()}
-PAPER = BANK["pair-c45-0.5"]
+NAMED = {one.name: one for one in BANK}
+PAPER = NAMED["pair-c45-0.5"]
 
 
 def shortened(scenario: BankScenario, duration_s: float) -> BankScenario:
@@ -39,13 +40,13 @@ def test_the_papers_rig_slips_once_a_period() -> None:
 
 
 def test_the_way_back_is_judged_as_the_way_forth() -> None:
-    forth, back = (run(BANK[name], rules.NONE) for name in ("pair-c45-1", "return-only-backwards"))
+    forth, back = (run(NAMED[name], rules.NONE) for name in ("pair-c45-1", "return-only-backwards"))
     np.testing.assert_allclose(of(forth, record.SLIPPED)[:, 0], of(back, record.SLIPPED)[:, 0], atol=1e-3)
 
 
 def test_pairs_without_a_drop_never_slip() -> None:
     for name in ("ptfe-stops", "no-drop-stiff"):
-        judged = run(shortened(BANK[name], 20.0), rules.NONE)
+        judged = run(shortened(NAMED[name], 20.0), rules.NONE)
         assert len(of(judged, record.SLIPPED)) + len(of(judged, record.SURGED)) == 0
 
 
@@ -55,7 +56,7 @@ def test_the_edge_of_the_papers_rig_is_at_v_d(ratio: float, clean: bool) -> None
 
 
 def test_a_wave_along_the_track_surges_at_1_2_v_d_and_not_at_2_4() -> None:
-    wave = shortened(BANK["wave-0.3-mm"], 14.0)
+    wave = shortened(NAMED["wave-0.3-mm"], 14.0)
     surges = of(run(wave, rules.CONSTANT, 1.2), record.SURGED)
     assert len(surges) > 10
     assert is_clean(wave, 2.4, 1.0)
@@ -63,9 +64,9 @@ def test_a_wave_along_the_track_surges_at_1_2_v_d_and_not_at_2_4() -> None:
 
 def test_the_true_v_a_is_that_of_mount_and_exciter() -> None:
     # the rule takes a gain of 1; at the resonance with zeta 0.05 it is 10
-    judged = run(shortened(BANK["mount-2600-gain-10"], 4.0), rules.MOVING)
+    judged = run(shortened(NAMED["mount-2600-gain-10"], 4.0), rules.MOVING)
     assert judged.sums["energy"] / judged.sums["drive_energy"] == pytest.approx(144.0, rel=0.05)
-    judged = run(shortened(BANK["mount-2600-gain-10"], 4.0), rules.CONSTANT)
+    judged = run(shortened(NAMED["mount-2600-gain-10"], 4.0), rules.CONSTANT)
     assert judged.sums["energy"] / judged.sums["drive_energy"] == pytest.approx(1.44, rel=0.05)
 
 
@@ -91,7 +92,7 @@ def test_hours_come_in_stretches_and_every_seed_gives_its_own_run() -> None:
 
 
 def test_figures_count_from_when_the_exciter_can_have_come() -> None:
-    late = BANK["late-3.2"]
+    late = NAMED["late-3.2"]
     none = figures(late, "none", run(late, rules.NONE), own=False)
     assert none.slips == none.slips_from_enabling == 16
     moving = figures(late, "moving", run(late, rules.MOVING), own=False)
@@ -100,14 +101,14 @@ def test_figures_count_from_when_the_exciter_can_have_come() -> None:
 
 
 def test_who_leaves_an_axis_alone_without_a_word_is_found() -> None:
-    screw = BANK["stiff-20"]
+    screw = NAMED["stiff-20"]
     assert any(line.startswith(SILENT) for line in figures(screw, "none", run(screw, rules.NONE), own=True).failures)
     assert figures(screw, "moving", run(screw, rules.MOVING), own=True).failures == []
     # one slip at the end is not that
-    late = run(BANK["late-3.2"], rules.MOVING)
+    late = run(NAMED["late-3.2"], rules.MOVING)
     one = np.array([[record.SLIPPED, 19.0, 19.04, 40.0, 0.0, 0.0, 0.02]])
     lines = figures(
-        BANK["late-3.2"], "made", late._replace(events=np.concatenate([late.events, one])), own=True
+        NAMED["late-3.2"], "made", late._replace(events=np.concatenate([late.events, one])), own=True
     ).failures
     assert lines[0].startswith("1 slips")
     assert not any(line.startswith(SILENT) for line in lines)
@@ -115,7 +116,7 @@ def test_who_leaves_an_axis_alone_without_a_word_is_found() -> None:
 
 def test_who_cannot_see_says_so_or_vibrates_while_it_moves() -> None:
     def lines(name: str, rule: int) -> list[str]:
-        scenario = BANK[name]
+        scenario = NAMED[name]
         return [line for line in figures(scenario, "made", run(scenario, rule), own=True).failures if "BLIND" in line]
 
     assert lines("blind-heavy", rules.NONE) == ["BLIND never said; within 1.00 s"]
