@@ -20,7 +20,7 @@ PARALLEL = OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(NICE) $(BIN)/pytest -n a
 EACH_CPU_S := 5 # of a test that is not marked slow
 # CPU of all tests of `make quick` and of `make test`: may only fall, but for the 40 s that an issue may add to the second
 QUICK_CPU_S := 110
-TEST_CPU_S := 1050 # 900 on a quiet computer, with `check` and `warm`, is the bar; it needs some 700, a busy one half as much again
+TEST_CPU_S := 950 # 625 on a quiet computer; a busy one takes half as much again
 
 quick: warm ## under a minute once kernels are compiled; what every edit is tried with
 	@$(PARALLEL) -x -m "not slow and not realtime and not nightly" --cpu-each $(EACH_CPU_S) --cpu-all $(QUICK_CPU_S)
