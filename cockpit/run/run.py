@@ -183,12 +183,14 @@ class _Came(NamedTuple):
 
 
 def _say_verdict(path: Path) -> None:
-    """Write the verdict on the recorded part to stderr; nothing where the log is too short to judge."""
+    """Write the verdict on the recorded part to stderr; nothing where the log holds no block."""
     from cockpit.judge.judged import judge
     from cockpit.judge.verdict_words import in_words
 
     with contextlib.suppress(Fault):
-        say("\n".join(in_words(judge(path), verbose=False)))
+        verdict = judge(path)
+        if verdict.blocks:
+            say("\n".join(in_words(verdict, verbose=False)))
 
 
 def _judged(scenario: Scenario, path: Path, interrupted: str, without: bool, came: _Came) -> RunOutcome:

@@ -73,9 +73,9 @@ def test_a_controller_that_stood_still_goes_on(tmp_path: Path, runs: list[Run]) 
     if verdict.pauses is None:
         assert verdict.not_watched
         return
-    # the computer did not stall: late commands in these 1.5 s are the loop's
+    # the computer did not stall: blocks of these 1.5 s without a command in time are counted for the loop
     assert verdict.pauses.longest_ms < 500.0
-    assert verdict.pauses.late_outside > 1000
+    assert verdict.pauses.late_outside + verdict.charge.unanswered > 1000
 
 
 def test_a_dead_parent_leaves_no_orphan(tmp_path: Path, runs: list[Run]) -> None:

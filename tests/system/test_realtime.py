@@ -150,7 +150,10 @@ def test_operator_stop_and_reset(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("state", "told"),
-    [(wire.ACTIVE, "the rig is ACTIVE with a vibration of 37 nm after a stop"), (None, "no rig says")],
+    [
+        (wire.ACTIVE, "the rig did not confirm STOP within 5 s, and is ACTIVE with a vibration of 37 nm"),
+        (None, "no rig says"),
+    ],
 )
 def test_a_rig_that_does_not_obey_is_said(state: int | None, told: str) -> None:
     config = BusConfig(endpoint=free_endpoint())
